@@ -1,0 +1,97 @@
+"""What the bridge reads from a scene: plain arrays and polygons, nothing of Blender's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """One object's evaluated surface.
+
+    Parameters
+    ----------
+    name : str
+        The object's name, for messages.
+    triangles : (n, 3, 3) float64, metres
+        Corners in local site axes, z up.
+    """
+
+    name: str
+    triangles: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Pole:
+    """A post that can carry a sensor.
+
+    Parameters
+    ----------
+    name : str
+        The object's name.
+    base : (3,) float64, metres
+        Foot of the post, local site axes.
+    forbidden, mandatory : bool
+        No sensor may hang here; at least one sensor must.
+    """
+
+    name: str
+    base: Float
+    forbidden: bool = False
+    mandatory: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class NamedArea:
+    """A named area in plan, local site axes in metres; ``weight`` counts for weighted regions alone."""
+
+    name: str
+    polygon: BaseGeometry
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SceneGeometry:
+    """A scene as the core sees it. All coordinates are local: metres, z up, right-handed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene, for titles.
+    origin : (3,) float64, metres
+        Map coordinates of the local origin: map = local + origin.
+    roads : tuple of Mesh
+        Surfaces on which targets stand; rays end on them too.
+    ground : tuple of Mesh
+        Other surfaces that rays end on (pavements, verges); no targets.
+    occluders : tuple of Mesh
+        Everything else that stands in the way (buildings, trees, poles).
+    region : shapely geometry
+        Region of interest in plan.
+    weighted_regions, forbidden_areas, mandatory_areas : tuple of NamedArea
+        In plan. A weighted region multiplies the weight of the targets in it.
+        At least one sensor must stand in each mandatory area.
+    candidate_areas : shapely geometry
+        Where a new post may stand, in plan.
+    poles : tuple of Pole
+        Existing posts that can carry a sensor.
+    """
+
+    name: str
+    origin: Float
+    roads: tuple[Mesh, ...]
+    ground: tuple[Mesh, ...]
+    occluders: tuple[Mesh, ...]
+    region: BaseGeometry
+    candidate_areas: BaseGeometry = field(default_factory=Polygon)
+    weighted_regions: tuple[NamedArea, ...] = ()
+    forbidden_areas: tuple[NamedArea, ...] = ()
+    mandatory_areas: tuple[NamedArea, ...] = ()
+    poles: tuple[Pole, ...] = ()

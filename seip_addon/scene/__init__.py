@@ -1,0 +1,1 @@
+"""The only bridge between Blender's scene and the core."""
