@@ -1,0 +1,108 @@
+"""What every batch command needs around its work: arguments, the scene's file, exit status, progress.
+
+The same file runs as ``blender -b … -P headless/x.py -- arguments`` in the
+real program and as ``python -m headless.x arguments`` on the bpy module.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NoReturn
+
+import bpy
+from tqdm import tqdm
+
+from seip_addon.core.errors import SeipError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from seip_addon.core.progress import Progress
+
+STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
+SECONDS_BETWEEN_LINES = 10.0
+
+
+def in_blender() -> bool:
+    """Return whether the real program runs this, not Python with the bpy module."""
+    return not bpy.app.module
+
+
+def arguments(argv: Sequence[str] | None = None) -> list[str]:
+    """Return the command's own arguments: in Blender those after ``--``, else all but the first."""
+    given = list(sys.argv if argv is None else argv)
+    if not in_blender():
+        return given[1:]
+    return given[given.index("--") + 1 :] if "--" in given else []
+
+
+def open_blend(path: Path) -> None:
+    """Open a .blend, without running scripts that it may carry.
+
+    Raises
+    ------
+    SeipError
+        There is no such file or it is not a .blend.
+    """
+    if not path.is_file():
+        raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
+
+
+def run(main: Callable[[list[str]], None]) -> NoReturn:
+    """Run a command and end the process: 0, or 1 after a user's mistake, or 130 after Ctrl-C.
+
+    Parameters
+    ----------
+    main : callable
+        The command, called with its own arguments. Exceptions other than
+        `SeipError` and `KeyboardInterrupt` are defects and show their traceback.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
+    try:
+        main(arguments())
+    except SeipError as error:
+        _end(1, f"error: {error}")
+    except KeyboardInterrupt:
+        _end(STOPPED, "stopped, nothing written")
+    _end(0)
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[Progress], None]]:
+    """Yield a callable for `finish` that shows work done and time left on standard error.
+
+    A terminal sees a moving bar, a log file a line every ten seconds. Work
+    that starts anew (a smaller count, another total) gets a bar of its own.
+    """
+    bar: tqdm | None = None
+
+    def report(progress: Progress) -> None:
+        nonlocal bar
+        if bar is None or progress.total != bar.total or progress.done < bar.n:
+            if bar is not None:
+                bar.close()
+            pause = 0.1 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
+            bar = tqdm(total=progress.total, file=sys.stderr, mininterval=pause, maxinterval=pause)
+        bar.set_description(progress.what, refresh=False)
+        bar.update(progress.done - bar.n)
+
+    try:
+        yield report
+    finally:
+        if bar is not None:
+            bar.close()
+
+
+def _end(status: int, message: str = "") -> NoReturn:
+    if message:
+        sys.stderr.write(f"{message}\n")
+    sys.stdout.flush()
+    sys.stderr.flush()
+    sys.exit(status)
