@@ -16,7 +16,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from headless.system_libraries import cure, missing_libraries
+from headless.system_libraries import complaint, missing_libraries
 
 SUPPORTED = ((3, 11), (3, 13))
 PIP = "pip==26.3"  # the first pip of Debian's Pythons knows no dependency groups
@@ -40,18 +40,16 @@ def main(arguments: list[str]) -> str | None:
 
 
 def what_is_missing() -> str | None:
-    """Return the first thing that this system lacks, with its cure, before anything is downloaded."""
+    """Return what this system lacks, with its cure, before anything is downloaded."""
     if sys.version_info[:2] not in SUPPORTED:
         return (
             f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists for 3.11 and "
             "3.13 alone; name one of these: make PYTHON=python3.13 ..."
         )
-    if importlib.util.find_spec("ensurepip") is None:
-        return "this Python cannot make virtual environments; install with: apt-get install python3-venv"
     missing = missing_libraries()
-    if missing:
-        return cure(missing)
-    return None
+    if importlib.util.find_spec("ensurepip") is None:
+        missing = {"the module ensurepip": "python3-venv", **missing}
+    return complaint(missing) if missing else None
 
 
 def fingerprint() -> str:

@@ -19,18 +19,18 @@ DEBIAN_PACKAGES = {
 }
 
 
-def missing_libraries() -> list[str]:
-    """Return the names of the libraries that ``import bpy`` or a render would miss here."""
+def missing_libraries() -> dict[str, str]:
+    """Return the libraries that ``import bpy`` or a render would miss here, each with its Debian package."""
     if not sys.platform.startswith("linux"):
-        return []
-    return [library for library in DEBIAN_PACKAGES if not _loads(library)]
+        return {}
+    return {library: package for library, package in DEBIAN_PACKAGES.items() if not _loads(library)}
 
 
-def cure(missing: list[str]) -> str:
-    """Return the one sentence that names missing libraries and the line that installs them."""
-    packages = " ".join(sorted(DEBIAN_PACKAGES[library] for library in missing))
+def complaint(missing: dict[str, str]) -> str:
+    """Return the one sentence that names what is missing and the line that installs its packages."""
+    packages = " ".join(missing.values())
     return (
-        f"Blender's module needs {', '.join(missing)}, which this system lacks; "
+        f"this system lacks {', '.join(missing)}; "
         f"install with: apt-get install --no-install-recommends {packages}"
     )
 
