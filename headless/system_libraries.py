@@ -29,10 +29,7 @@ def missing_libraries() -> dict[str, str]:
 def complaint(missing: dict[str, str]) -> str:
     """Return the one sentence that names what is missing and the line that installs its packages."""
     packages = " ".join(missing.values())
-    return (
-        f"this system lacks {', '.join(missing)}; "
-        f"install with: apt-get install --no-install-recommends {packages}"
-    )
+    return f"this system lacks {', '.join(missing)}; install with: apt-get install --no-install-recommends {packages}"
 
 
 def _loads(library: str) -> bool:
