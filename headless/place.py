@@ -27,20 +27,22 @@ import numpy as np
 from seip_addon.core.candidate_table import save_candidate_table
 from seip_addon.core.carla import save_carla_spawns
 from seip_addon.core.deployment import Deployment, deploy
-from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.placement import Placement, solve_greedy
 from seip_addon.core.placement_record import Record, Run, placement_record, save_placement_record, versions
 from seip_addon.core.plan_view import save_plan_view
-from seip_addon.core.visibility import VisibilityGrid, VisibilitySettings, resolution_warnings, stored_visibility
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.write import save_scene, write_result
 
 from headless import session
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.goal import DEFAULT_COUNT, Goal, placement_problem, reach
+from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.progress import Progress, finish
+from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site, make_site
+from seip_addon.core.visibility import VisibilityGrid, VisibilitySettings
+from seip_addon.core.visibility_store import stored_visibility
 from seip_addon.scene.read import read_scene
 
 Result = TypeVar("Result")
@@ -83,10 +85,10 @@ def main(argv: list[str]) -> None:
     clock = _Clock()
     reading = clock.time("read the scene", lambda: read_scene(scene))
     site = clock.time("lay out the site", lambda: make_site(reading.geometry, layout, options.grid))
-    _say(_site_line(site))
+    session.say(_site_line(site))
     warnings = reading.warnings + resolution_warnings(site, models, visibility)
     for sentence in warnings:
-        _say(f"warning: {sentence}")
+        session.say(f"warning: {sentence}")
     store = options.output / "visibility.npz"
     grid = clock.run("visibility", stored_visibility(store, site, models, visibility, engine=options.engine))
     problem = placement_problem(site, grid.visible, models, goal)
@@ -109,8 +111,8 @@ def main(argv: list[str]) -> None:
     )
     record = placement_record(site, deployment, placement, run, weighted=goal.weighted, greedy=greedy)
     _write(options, _Outcome(reading.geometry, site, models, grid, placement, deployment), record)
-    _say(_result_lines(deployment, placement, greedy))
-    _say(f"written to {options.output}/")
+    session.say(_result_lines(deployment, placement, greedy))
+    session.say(f"written to {options.output}/")
 
 
 @dataclass(frozen=True)
@@ -241,11 +243,6 @@ class _Heights(argparse.Action):
             else:
                 parser.error(f"argument --heights: {text!r} is neither a height in metres nor a range FROM:TO:STEP")
         setattr(namespace, self.dest, tuple(heights))
-
-
-def _say(text: str) -> None:
-    sys.stdout.write(f"{text}\n")
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":
