@@ -9,11 +9,10 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from build.seip_addon.core.errors import SeipError
-from build.seip_addon.core.progress import Progress
-from build.seip_addon.core.site_parts import Role
-from build.seip_addon.core.storage import digest, whole_file
-
+from ..core.errors import SeipError
+from ..core.progress import Progress
+from ..core.site_parts import Role
+from ..core.storage import digest, whole_file
 from . import collections
 from .materials import material
 
@@ -21,9 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
 
-    from build.seip_addon.core.site_model import SiteModel
-    from build.seip_addon.core.site_parts import Part
-    from build.seip_addon.core.street_furniture import Solid
+    from ..core.site_model import SiteModel
+    from ..core.site_parts import Part
+    from ..core.street_furniture import Solid
 
 DRESSING = "Dressing"
 VIEW = "View"

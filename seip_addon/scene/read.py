@@ -12,7 +12,6 @@ import numpy as np
 from ..core.candidates import plan_outline
 from ..core.errors import SeipError
 from ..core.scene_geometry import Float, Mesh, NamedArea, Pole, SceneGeometry
-
 from . import collections as names
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
