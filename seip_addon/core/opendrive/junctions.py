@@ -9,7 +9,8 @@ import shapely
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from ..errors import SeipError
+from seip_addon.core.errors import SeipError
+
 from .lanes import LaneSurface
 from .road_map import Junction, RoadMap
 
