@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from engines import each_engine, needs_embree
 from float64_rays import first_hits
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,10 +12,6 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.ray_casting import Engine, make_ray_caster
 
-pytest.importorskip("bpy", reason="Blender's BVH tree comes with bpy")
-pytest.importorskip("embreex", reason="Embree is an extra")
-
-both = pytest.mark.parametrize("engine", ["bvh", "embree"])
 SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5], [-1, 1, 5]]], dtype=np.float64)
 UP = np.array([[0.0, 0.0, 1.0]])
 
@@ -24,7 +21,7 @@ def unit(random: np.random.Generator, count: int) -> np.ndarray:
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
-@both
+@each_engine
 def test_hit_miss_and_reach(engine: Engine) -> None:
     caster = make_ray_caster(SQUARE, engine)
     assert caster.name == engine
@@ -36,14 +33,14 @@ def test_hit_miss_and_reach(engine: Engine) -> None:
     assert (distance[0], triangle[0]) == (np.inf, -1)
 
 
-@both
+@each_engine
 def test_both_sides_stop_a_ray(engine: Engine) -> None:
     caster = make_ray_caster(SQUARE, engine)
     assert caster.cast(np.array([0.1, 0.2, 9.0]), -UP, 100.0)[0][0] == pytest.approx(4)
     assert caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)[0][0] == pytest.approx(5)
 
 
-@both
+@each_engine
 def test_triangles_without_area_are_counted_and_stop_nothing(engine: Engine) -> None:
     point = np.broadcast_to([0.1, 0.2, 1.0], (1, 3, 3))
     line = np.array([[[-1.0, 0, 2], [1, 0, 2], [3, 0, 2]]])
@@ -54,19 +51,19 @@ def test_triangles_without_area_are_counted_and_stop_nothing(engine: Engine) -> 
     assert triangle[0] == 3
 
 
-@both
+@each_engine
 def test_an_empty_scene_stops_nothing(engine: Engine) -> None:
     distance, triangle = make_ray_caster(np.zeros((0, 3, 3)), engine).cast(np.zeros(3), UP, 100.0)
     assert (distance[0], triangle[0]) == (np.inf, -1)
 
 
-@both
+@each_engine
 def test_no_rays_have_no_hits(engine: Engine) -> None:
     distance, triangle = make_ray_caster(SQUARE, engine).cast(np.zeros(3), np.zeros((0, 3)), 100.0)
     assert distance.shape == triangle.shape == (0,)
 
 
-@both
+@each_engine
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_coordinates_that_are_not_finite(engine: Engine, bad: float) -> None:
     triangles = SQUARE.copy()
@@ -75,7 +72,7 @@ def test_coordinates_that_are_not_finite(engine: Engine, bad: float) -> None:
         make_ray_caster(triangles, engine)
 
 
-@both
+@each_engine
 def test_map_coordinates_lose_nothing(engine: Engine) -> None:
     random = np.random.default_rng(3)
     triangles = random.uniform(-40, 40, (300, 1, 3)) + random.normal(0, 3, (300, 3, 3))
@@ -88,7 +85,7 @@ def test_map_coordinates_lose_nothing(engine: Engine) -> None:
     np.testing.assert_allclose(here[same], there[same], atol=1e-4)
 
 
-@both
+@each_engine
 @given(seed=st.integers(0, 2**32 - 1))
 def test_hits_are_those_of_float64_arithmetic(engine: Engine, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -101,7 +98,7 @@ def test_hits_are_those_of_float64_arithmetic(engine: Engine, seed: int) -> None
     assert ((triangle >= 0) == np.isfinite(distance)).all()
 
 
-@both
+@each_engine
 def test_a_rays_result_does_not_depend_on_its_company(engine: Engine) -> None:
     random = np.random.default_rng(5)
     triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
@@ -119,5 +116,6 @@ def test_an_unknown_engine_names_the_known() -> None:
         make_ray_caster(SQUARE, "optix")  # type: ignore[arg-type]
 
 
+@needs_embree
 def test_auto_takes_embree_where_it_is() -> None:
     assert make_ray_caster(SQUARE).name == "embree"

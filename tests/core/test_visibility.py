@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
 from float64_rays import nearest_return
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
@@ -30,11 +31,7 @@ from seip_addon.core.visibility import (
     visibility_key,
 )
 
-pytest.importorskip("bpy", reason="Blender's BVH tree comes with bpy")
-pytest.importorskip("embreex", reason="Embree is an extra")
-
 Float = NDArray[np.float64]
-both = pytest.mark.parametrize("engine", ["bvh", "embree"])
 
 
 def small_model(key: str, channels: int = 12, steps: int = 90, **changes: float) -> LidarModel:
@@ -83,7 +80,7 @@ def random_site(seed: int, poses: int = 3) -> Site:
     )
 
 
-def grid_of(site: Site, settings: VisibilitySettings, engine: Engine = "bvh") -> VisibilityGrid:
+def grid_of(site: Site, settings: VisibilitySettings, engine: Engine = ANY) -> VisibilityGrid:
     return finish(compute_visibility(site, MODELS, settings, make_ray_caster(site.triangles, engine)))
 
 
@@ -98,7 +95,7 @@ def nearest_returns(site: Site) -> Float:
     )
 
 
-@both
+@each_engine
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2, 0.6]))
 def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: float, min_intensity: float) -> None:
     site, settings = random_site(seed), VisibilitySettings(delta, min_intensity)
@@ -110,7 +107,7 @@ def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: flo
     assert lazy.parameters["rays_cast"] <= full.parameters["rays_cast"] == full.parameters["rays_of_full_scan"]
 
 
-@both
+@each_engine
 @pytest.mark.parametrize("key", ["type1", "type3", "vls128"])
 def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     models = load_catalogue()
@@ -123,7 +120,7 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     assert lazy.parameters["rays_cast"] < 0.25 * full.parameters["rays_cast"]
 
 
-@both
+@each_engine
 def test_same_as_plain_arithmetic_but_for_borderline_targets(engine: Engine) -> None:
     borderline = seen = total = 0
     for seed in range(40):
@@ -159,7 +156,7 @@ def moved(site: Site, shift: Float, turn: float) -> Site:
     )
 
 
-@both
+@each_engine
 @hypothesis_settings(max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1), turn=st.floats(-7, 7))
 def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: float) -> None:
@@ -172,7 +169,7 @@ def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: floa
     assert (grid_of(turned, settings, engine).visible == expected).all()
 
 
-@both
+@each_engine
 @given(seed=st.integers(0, 2**32 - 1))
 @hypothesis_settings(max_examples=30)
 def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
@@ -206,6 +203,7 @@ def one_sensor_site(*walls: Float) -> Site:
     )
 
 
+@needs_any
 def test_a_wall_hides_what_lies_behind_it() -> None:
     open_site = one_sensor_site()
     x = open_site.targets.xyz[:, 0]
@@ -217,10 +215,11 @@ def test_a_wall_hides_what_lies_behind_it() -> None:
     assert (behind_wall == free)[x < 3].all()
 
 
+@needs_any
 def test_range_limits_returns() -> None:
     site = one_sensor_site()
     x = np.abs(site.targets.xyz[:, 0])
-    caster = make_ray_caster(site.triangles)
+    caster = make_ray_caster(site.triangles, ANY)
     models = {"fine": small_model("fine", 64, 360, min_range=7.0, max_range=10.0)}
     visible = finish(compute_visibility(site, models, VisibilitySettings(0.6), caster)).visible[0]
     slant = np.hypot(x, 5.0)
@@ -228,11 +227,12 @@ def test_range_limits_returns() -> None:
     assert visible[(slant > 7.1) & (slant < 9.9)].all()
 
 
+@needs_any
 def test_weak_returns_do_not_count() -> None:
     site = one_sensor_site()
     x = np.abs(site.targets.xyz[:, 0])
     models = {"fine": small_model("fine", 64, 360)}
-    caster = make_ray_caster(site.triangles)
+    caster = make_ray_caster(site.triangles, ANY)
     everything, strong = (
         finish(compute_visibility(site, models, VisibilitySettings(0.6, least), caster)).visible[0]
         for least in (0.0, 0.5)
@@ -244,10 +244,11 @@ def test_weak_returns_do_not_count() -> None:
     assert (strong == everything)[strength > 0.54].all()
 
 
+@needs_any
 def test_progress_counts_poses() -> None:
     site = random_site(1)
     seen: list[Progress] = []
-    steps = compute_visibility(site, MODELS, VisibilitySettings(), make_ray_caster(site.triangles))
+    steps = compute_visibility(site, MODELS, VisibilitySettings(), make_ray_caster(site.triangles, ANY))
     finish(steps, seen.append)
     assert [step.done for step in seen] == [0, 1, 2, 3]
     assert {step.total for step in seen} == {3}
@@ -261,9 +262,10 @@ def test_settings_that_mean_nothing(delta: float, min_intensity: float) -> None:
         VisibilitySettings(delta, min_intensity)
 
 
+@needs_any
 def test_sites_that_mean_nothing() -> None:
     site = random_site(1)
-    caster = make_ray_caster(site.triangles)
+    caster = make_ray_caster(site.triangles, ANY)
 
     def compute(changed: Site) -> VisibilityGrid:
         return finish(compute_visibility(changed, MODELS, VisibilitySettings(), caster))
@@ -290,6 +292,7 @@ def test_a_grid_answers_for_chosen_poses() -> None:
     assert grid.coverage(np.array([1]), weight=np.array([3.0, 1, 1, 1, 1, 1, 1, 1, 1])) == pytest.approx(4 / 11)
 
 
+@needs_any
 def test_a_grid_comes_back_from_its_file_and_the_file_is_the_same_each_time(tmp_path: Path) -> None:
     grid = grid_of(random_site(2), VisibilitySettings())
     for name in ("a.npz", "b.npz"):
@@ -300,6 +303,7 @@ def test_a_grid_comes_back_from_its_file_and_the_file_is_the_same_each_time(tmp_
     assert (back.shape, back.key, back.parameters) == (grid.shape, grid.key, grid.parameters)
 
 
+@needs_any
 def test_files_that_are_no_grid(tmp_path: Path) -> None:
     grid_of(random_site(2), VisibilitySettings()).save(tmp_path / "good.npz")
     whole = (tmp_path / "good.npz").read_bytes()
@@ -322,6 +326,8 @@ def test_files_that_are_no_grid(tmp_path: Path) -> None:
         VisibilityGrid.load(tmp_path / "bad.npy")
 
 
+@needs_bvh
+@needs_embree
 def test_the_key_follows_from_what_the_grid_follows_from() -> None:
     site, settings = random_site(3), VisibilitySettings()
     caster = make_ray_caster(site.triangles, "bvh")
