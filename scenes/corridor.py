@@ -37,13 +37,13 @@ PARKING = 2.2
 
 def corridor_map() -> Map:
     """Return the map; the first junction's centre is the origin."""
-    west = _furnish(_arterial("1", (0.0, MILL - 11.5), (-0.6, 0.0), (None, "100")))
-    middle = _furnish(_arterial("2", (MILL + 11.5, SCHOOL - 12.5), (0.0, 1.6), ("100", "200"), parking=-1))
-    inner = _furnish(_arterial("3", (SCHOOL + 12.5, STATION - 15.0), (1.6, 0.9), ("200", "300"), parking=1))
+    west = _furnish(_arterial("1", (0.0, MILL - 11.0), (-0.6, 0.0), (None, "100")))
+    middle = _furnish(_arterial("2", (MILL + 11.0, SCHOOL - 10.0), (0.0, 1.6), ("100", "200"), parking=-1))
+    inner = _furnish(_arterial("3", (SCHOOL + 10.0, STATION - 15.0), (1.6, 0.9), ("200", "300"), parking=1))
     east = _furnish(_arterial("4", (STATION + 15.0, ARTERIAL.length), (0.9, 1.5), ("300", None)))
-    mill_north = _side_street("11", "Mill Lane North", (MILL, 90.0, 15.0, 75.0), "100", 0.0, SIDE_LANES, grade=0.02)
-    mill_south = _side_street("12", "Mill Lane South", (MILL, -95.0, 15.5, 75.0), "100", 0.0, SIDE_LANES)
-    school = _side_street("13", "School Street", (SCHOOL, -82.0, 16.0, 80.0), "200", 1.6, SIDE_LANES, grade=-0.01)
+    mill_north = _side_street("11", "Mill Lane North", (MILL, 90.0, 14.5, 75.0), "100", 0.0, SIDE_LANES, grade=0.02)
+    mill_south = _side_street("12", "Mill Lane South", (MILL, -95.0, 14.5, 75.0), "100", 0.0, SIDE_LANES)
+    school = _side_street("13", "School Street", (SCHOOL, -82.0, 13.5, 80.0), "200", 1.6, SIDE_LANES, grade=-0.01)
     north = _side_street("14", "Station Road North", (STATION, 86.0, 15.0, 90.0), "300", 0.9, LANES)
     south = _side_street("15", "Station Road South", (STATION, -88.0, 15.0, 90.0), "300", 0.9, LANES, grade=-0.012)
     junctions = (
