@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from build.seip_addon.core.errors import SeipError
-from build.seip_addon.core.progress import Progress
-from build.seip_addon.core.site_parts import Role
-from build.seip_addon.core.storage import digest, whole_file
+from ..core.errors import SeipError
+from ..core.progress import Progress
+from ..core.site_parts import Role
+from ..core.storage import digest, whole_file
 
 from . import collections
 from .materials import material
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
 
-    from build.seip_addon.core.site_model import SiteModel
-    from build.seip_addon.core.site_parts import Part
-    from build.seip_addon.core.street_furniture import Solid
+    from ..core.site_model import SiteModel
+    from ..core.site_parts import Part
+    from ..core.street_furniture import Solid
 
 DRESSING = "Dressing"
 VIEW = "View"
@@ -98,6 +98,7 @@ def save_blend(path: Path) -> None:
     if path.suffix != ".blend":
         raise SeipError(f"{path} is no name for a Blender file; let it end in .blend")
     with whole_file(path) as temporary:
+        temporary.unlink()  # Blender would keep a backup of a file that is there
         bpy.ops.wm.save_as_mainfile(filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False)
 
 
