@@ -47,16 +47,24 @@ def flat_triangles(*boxes: tuple[float, float, float, float], z: float = 0.0) ->
 
 
 def make_example(spacing: float = 2.0, reach: float = 55.0, heights: tuple[float, ...] = (3.5, 5.4)) -> Example:
-    """Return the junction with the two poses chosen that see most, one after the other, and a third."""
+    """Return the junction with three poses chosen greedily."""
     geometry = make_geometry(reach)
     site = make_site(geometry, spacing, heights)
     models = load_catalogue()
     visible = lines_of_sight(site, geometry, models)
-    chosen = [int(np.argmax(visible.sum(axis=1)))]
-    for _ in range(2):
-        unseen = ~visible[chosen].any(axis=0)
-        chosen.append(int(np.argmax((visible & unseen).sum(axis=1))))
-    return Example(geometry, site, models, visible, deploy(site, models, visible, chosen))
+    return Example(geometry, site, models, visible, deploy(site, models, visible, greedy(site, visible, 3)))
+
+
+def greedy(site: Site, visible: np.ndarray, count: int) -> list[int]:
+    """Return poses at different positions, each adding the most targets to those before it."""
+    chosen: list[int] = []
+    unseen = np.ones(visible.shape[1], bool)
+    free = np.ones(len(visible), bool)
+    for _ in range(count):
+        chosen.append(int(np.argmax(np.where(free, (visible & unseen).sum(axis=1), -1))))
+        unseen &= ~visible[chosen[-1]]
+        free &= site.candidates.position_of != site.candidates.position_of[chosen[-1]]
+    return chosen
 
 
 def make_geometry(reach: float) -> SceneGeometry:
@@ -132,11 +140,12 @@ def make_candidates(geometry: SceneGeometry, reach: float, heights: tuple[float,
 
 
 def lines_of_sight(site: Site, geometry: SceneGeometry, models: dict[str, LidarModel]) -> np.ndarray:
-    """Return which pose sees which target when buildings are endless in height and range is a third."""
-    walls = shapely.union_all([shapely.box(a, b, c, d) for a, b, c, d, _ in BUILDINGS])
+    """Return which pose sees which target when obstacles are endless in height and ranges a sixth."""
+    trunks = [shapely.box(x - 0.8, y - 0.6, x + 0.8, y + 0.6) for x, y in TREES]
+    walls = shapely.union_all([*(shapely.box(a, b, c, d) for a, b, c, d, _ in BUILDINGS), *trunks])
     shapely.prepare(walls)
     eyes, targets = site.candidates.xyz[:, :2], site.targets.xyz[:, :2]
-    ranges = np.array([models[key].max_range for key in site.candidates.sensor]) / 3
+    ranges = np.array([models[key].max_range for key in site.candidates.sensor]) / 6
     visible = np.empty((len(eyes), len(targets)), bool)
     for row, eye, most in zip(visible, eyes, ranges, strict=True):
         row[:] = np.hypot(*(targets - eye).T) < most

@@ -78,6 +78,11 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
         "upper_fov": math.degrees(model.elevations.max()),
         "lower_fov": math.degrees(model.elevations.min()),
         "horizontal_fov": 360.0,
+        "atmosphere_attenuation_rate": model.attenuation,
+        "noise_stddev": model.range_noise_std,
+        "dropoff_general_rate": model.dropoff_general,
+        "dropoff_intensity_limit": model.dropoff_intensity_limit,
+        "dropoff_zero_intensity": model.dropoff_zero_intensity,
     }
     return {name: f"{value:.10g}" if isinstance(value, float) else str(value) for name, value in values.items()}
 

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
-from .callouts import place_callouts
-from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK, markers_of
+from .drawing import SENSOR_MARK, draw_sensors, draw_title, markers_of, percent
+from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 from .storage import whole_file
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from .deployment import Deployment, Sensor
+    from .deployment import Deployment
     from .scene_geometry import Mesh, SceneGeometry
     from .site import Site
 
@@ -40,13 +40,11 @@ AROUND = 0.06  # of the region's size, shown around it
 LAND, PAVEMENT, ROAD, KERB = "#eceee8", "#dad7cf", "#b9bcc0", "#8f949a"
 HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
 WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
-HIGHEST_DETAIL = 60
-"""More sensors than these get no label of their own on the plan."""
 ROWS = 12
 """More sensors than these are counted, not listed, in the panel."""
 FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
 
-BACK, SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, SENSOR, TEXT = range(9)
+BACK, SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(9)
 
 
 def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment) -> None:
@@ -67,7 +65,7 @@ def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: 
     """
     figure = draw_plan(geometry, site, deployment)
     with whole_file(path) as temporary:
-        FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
+        figure.canvas.print_png(temporary, metadata={"Software": None})
 
 
 def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Figure:
@@ -76,7 +74,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     width, height = window[2] - window[0], window[3] - window[1]
     map_height = MAP_WIDTH * height / width
     figure = Figure((MAP_WIDTH + PANEL_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
-    canvas = FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)
     plan = _axes(figure, MARGIN, MARGIN, MAP_WIDTH, map_height)
     plan.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
     shown = shapely.box(*window)
@@ -86,11 +84,10 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     norm = _draw_obstacles(plan, geometry.occluders, site, shown)
     _draw_areas(plan, geometry, site.region)
     _draw_candidates(plan, site)
-    _draw_sensors(plan, deployment)
+    draw_sensors(plan, deployment, np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2), SENSOR)
     _draw_scale(plan, width)
     _draw_north(plan)
-    _label_sensors(plan, canvas, deployment)
-    _draw_title(figure, site, deployment)
+    draw_title(figure, site, deployment, MARGIN)
     panel = _axes(figure, MAP_WIDTH + 2 * MARGIN, MARGIN, PANEL_WIDTH, map_height)
     panel.set(xlim=(0.0, PANEL_WIDTH), ylim=(map_height, 0.0), facecolor=PAPER)
     panel.axis("off")
@@ -160,7 +157,7 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
     colours = HEIGHTS(norm(height[order]))
     plan.add_collection(
         PolyCollection(
-            triangles[order, :, :2], facecolors=colours, edgecolors=colours, linewidths=0.4, zorder=OBSTACLE
+            triangles[order, :, :2], facecolors=colours, edgecolors="none", antialiaseds=False, zorder=OBSTACLE
         ),
         autolim=False,
     )
@@ -210,40 +207,6 @@ def _draw_candidates(plan: Axes, site: Site) -> None:
 
 SIDEWALK_MARK = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
 POLE_MARK = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
-SENSOR_MARK = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
-
-
-def _draw_sensors(plan: Axes, deployment: Deployment) -> None:
-    markers = markers_of(deployment)
-    for sensor in deployment.sensors:
-        plan.plot(*sensor.xyz[:2], marker=markers[sensor.model.key], zorder=SENSOR, **SENSOR_MARK)
-
-
-def _label_sensors(plan: Axes, canvas: FigureCanvasAgg, deployment: Deployment) -> None:
-    """Write label, type and height next to each sensor, with a line where it is not close."""
-    if not 0 < len(deployment.sensors) <= HIGHEST_DETAIL:
-        return
-    boxed = {"boxstyle": "round,pad=0.35", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6, "alpha": 0.93}
-    texts = [
-        plan.text(0, 0, _label(sensor), ha="center", va="center", size=8.5, color=INK, bbox=boxed, zorder=TEXT)
-        for sensor in deployment.sensors
-    ]
-    renderer = canvas.get_renderer()
-    extents = [text.get_window_extent(renderer) for text in texts]
-    padding = 8.5 * 0.35 * 2 * DPI / 72
-    sizes = np.array([(extent.width + padding, extent.height + padding) for extent in extents])
-    anchors = plan.transData.transform([sensor.xyz[:2] for sensor in deployment.sensors])
-    bounds = plan.get_window_extent(renderer).extents
-    centres = place_callouts(anchors, sizes, tuple(bounds), clearance=9.0 * DPI / 72)
-    to_data = plan.transData.inverted()
-    for text, anchor, centre in zip(texts, anchors, centres, strict=True):
-        text.set(position=to_data.transform(centre), parse_math=False)
-        line = to_data.transform([anchor, centre])
-        plan.plot(line[:, 0], line[:, 1], color=INK, linewidth=0.9, zorder=CANDIDATE)
-
-
-def _label(sensor: Sensor) -> str:
-    return f"{sensor.label}  {sensor.model.key} · {sensor.height:.3g} m"
 
 
 def _draw_scale(plan: Axes, width: float) -> None:
@@ -301,30 +264,6 @@ def _draw_north(plan: Axes) -> None:
     plan.text(x, y + 0.46 * inch, "N", ha="center", va="bottom", size=9, weight="bold", color=INK, zorder=TEXT)
 
 
-def _draw_title(figure: Figure, site: Site, deployment: Deployment) -> None:
-    width, height = figure.get_size_inches()
-    at = MARGIN / width
-    figure.text(
-        at, 1 - 0.26 / height, site.name, ha="left", va="top", size=17, weight="bold", color=INK, parse_math=False
-    )
-    figure.text(
-        at, 1 - 0.62 / height, summary(deployment), ha="left", va="top", size=11, color=SOFT_INK, parse_math=False
-    )
-
-
-def summary(deployment: Deployment) -> str:
-    """Return the result in one line."""
-    count = len(deployment.sensors)
-    parts = [
-        f"{count} sensor{'' if count == 1 else 's'} see{'s' if count == 1 else ''} {deployment.coverage:.1%} of the road"
-    ]
-    if deployment.central is not None:
-        parts.append(f"{deployment.central:.1%} of the weighted part")
-    parts.append(f"{deployment.seen_twice:.1%} is seen twice")
-    parts.append(f"price ${deployment.price:,.0f}")
-    return "  ·  ".join(parts)
-
-
 class _Panel:
     """The legend, written from top to bottom; lengths in inches."""
 
@@ -361,7 +300,7 @@ class _Panel:
         for times in reversed(range(SEEN_TWICE + 1)):
             self._swatch(facecolor=SEEN_COLOURS[times])
             self._text(0.34, SEEN_WORDS[times])
-            self._text(PANEL_WIDTH, f"{counts[times] / len(site.targets):.1%}", ha="right", weight="bold")
+            self._text(PANEL_WIDTH, percent(counts[times] / len(site.targets)), ha="right", weight="bold")
             self.y += 0.24
         self._text(0.0, f"{len(site.targets):,} points, {site.targets.spacing:g} m apart", color=SOFT_INK, size=8)
         self.y += 0.38
