@@ -11,9 +11,9 @@ import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
-import bpy
 from tqdm import tqdm
 
+from headless.system_libraries import complaint, missing_libraries
 from seip_addon.core.errors import SeipError
 
 if TYPE_CHECKING:
@@ -21,6 +21,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from seip_addon.core.progress import Progress
+
+try:
+    import bpy
+except ImportError:
+    missing = missing_libraries()
+    if not missing:
+        raise
+    sys.exit(f"error: {complaint(missing)}")
 
 STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0

@@ -31,14 +31,14 @@ class Progress:
     what: str
 
 
-def finish(
-    steps: Generator[Progress, None, Result], report: Callable[[Progress], object] | None = None
-) -> Result:
+def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress], object] | None = None) -> Result:
     """Run work to its end, calling ``report`` at each step, and return its result."""
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            return stop.value
+    ended: list[Result] = []
+
+    def run() -> Generator[Progress, None, None]:
+        ended.append((yield from steps))
+
+    for progress in run():
         if report is not None:
             report(progress)
+    return ended[0]

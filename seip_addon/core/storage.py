@@ -8,8 +8,10 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import SeipError
 
@@ -50,7 +52,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def digest(*parts: np.ndarray | str | bytes | float | None) -> str:
+def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     """Return the SHA-256 of values, with the shape and type of each array among them.
 
     Parameters

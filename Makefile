@@ -1,0 +1,56 @@
+# make demo        set up, and place sensors at the shipped junction
+# make test        set up, and run the tests (the slow ones: make test-slow)
+# make lint        set up, and check style and types
+# make scenes      rebuild the shipped scenes from their sources
+# make study       redo the coverage study on the shipped junction
+# make extension   build the Blender extension in dist/
+# make clean       remove what was built; make distclean removes the environment and the wheels as well
+#
+# Another Python: make PYTHON=python3.13 VENV=.venv313 test
+
+PYTHON ?= python3
+VENV ?= .venv
+PLATFORMS ?= linux-x64
+PY := "$(VENV)/bin/python"
+DEMO := scenes/junction.blend -o out/junction
+
+.DEFAULT_GOAL := help
+.PHONY: help environment demo test test-slow lint scenes study extension clean distclean
+
+help:
+	@sed -n '/^# /s/^# //p' Makefile
+
+environment:
+	@$(PYTHON) -m headless.set_up "$(VENV)"
+
+demo: environment
+	$(PY) -m headless.place $(DEMO)
+	@echo "pictures: out/junction/"; ls out/junction/*.png
+
+test: environment
+	$(PY) -m pytest -m "not slow"
+
+test-slow: environment
+	$(PY) -m pytest -m slow
+
+lint: environment
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy
+
+scenes: environment
+	$(PY) -m headless.build_scene scenes/junction.toml -o scenes/junction.blend
+	$(PY) -m headless.build_scene scenes/corridor.toml -o scenes/corridor.blend
+
+study: environment
+	$(PY) -m headless.study scenes/junction.blend -o out/study
+
+extension: environment
+	$(PY) -m headless.build_extension --platforms $(PLATFORMS)
+
+clean:
+	rm -rf build dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -not -path './.venv*' -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf "$(VENV)" wheels

@@ -1,0 +1,182 @@
+"""Candidates stand where a post can stand, evenly, and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.candidates import CandidateSettings, lay_candidates, spread, winding_number
+from seip_addon.core.errors import SeipError
+from seip_addon.core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
+
+PLAIN = CandidateSettings(sensors=("type1",), heights=(3.5, 8.0), spacing=4.0)
+
+
+def sheet(low_x, low_y, high_x, high_y, z=0.0):
+    a, b, c, d = ((low_x, low_y, z), (high_x, low_y, z), (high_x, high_y, z), (low_x, high_y, z))
+    return np.array([[a, b, c], [a, c, d]], dtype=float)
+
+
+def block(low, high):
+    """Twelve triangles of a closed box, outward normals."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    p = np.array([(x, y, z) for x in (x0, x1) for y in (y0, y1) for z in (z0, z1)], dtype=float)
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return np.array([p[list(t)] for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+
+
+def street(**changes):
+    """A road along x with a 3 m pavement, 0.1 m high, on its north side."""
+    geometry = SceneGeometry(
+        name="street",
+        origin=np.zeros(3),
+        roads=(Mesh("road", sheet(-40, -7, 40, 7)),),
+        ground=(Mesh("pavement", sheet(-40, 7, 40, 10, 0.1)),),
+        occluders=(),
+        region=shapely.box(-30, -7, 30, 7),
+        candidate_areas=shapely.box(-40, 7, 40, 10),
+    )
+    return replace(geometry, **changes)
+
+
+def test_posts_keep_the_setback_and_stand_on_the_pavement():
+    candidates = lay_candidates(street(), replace(PLAIN, setback=1.0))
+    assert candidates.position[:, 1].min() >= 8.0 - 1e-6
+    np.testing.assert_allclose(candidates.position[:, 2], 0.1)
+    np.testing.assert_allclose(candidates.xyz[:, 2], 0.1 + candidates.height)
+
+
+def test_poses_are_positions_by_heights_by_types():
+    candidates = lay_candidates(street(), replace(PLAIN, sensors=("type1", "type3")))
+    positions = len(candidates.position)
+    assert len(candidates) == positions * 2 * 2
+    assert np.bincount(candidates.position_of).tolist() == [4] * positions
+    assert candidates.sensor[:4].tolist() == ["type1", "type3"] * 2
+    assert candidates.height[:4].tolist() == [3.5, 3.5, 8.0, 8.0]
+
+
+def test_a_narrow_strip_is_filled_evenly():
+    plan = spread(shapely.box(0, 0, 100, 0.6), 4.0)
+    gaps = np.diff(np.sort(plan[:, 0]))
+    assert len(plan) >= 24
+    assert gaps.max() <= 4.0 + 0.5 + 1e-9
+
+
+@settings(max_examples=25)
+@given(spacing=st.floats(1.0, 6.0), angle=st.floats(0, 3), width=st.floats(2.0, 30.0))
+def test_spread_is_even_and_leaves_no_room(spacing, angle, width):
+    area = shapely.affinity.rotate(shapely.box(0, 0, 30, width), angle, use_radians=True)
+    plan = spread(area, spacing)
+    tree = shapely.STRtree(shapely.points(plan))
+    a, b = tree.query(shapely.points(plan), predicate="dwithin", distance=spacing * (1 - 1e-6))
+    assert (a == b).all()
+    room = area.difference(shapely.union_all(shapely.buffer(shapely.points(plan), spacing * 1.02)))
+    assert room.area < 0.02 * spacing**2
+
+
+def test_a_pole_carries_its_sensor_on_a_bracket_towards_the_region():
+    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
+    candidates = lay_candidates(street(candidate_areas=shapely.Polygon(), poles=(pole,)), PLAIN)
+    assert candidates.position_name.tolist() == ["signal"]
+    assert candidates.on_pole.all()
+    np.testing.assert_allclose(candidates.xyz, [(0, 8.6, 3.6), (0, 8.6, 8.1)])
+
+
+def test_a_pole_serves_its_surroundings():
+    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
+    candidates = lay_candidates(street(poles=(pole,)), PLAIN)
+    posts = candidates.position[~candidates.on_pole]
+    assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
+
+
+def test_what_lies_inside_an_object_is_dropped_and_counted():
+    shed = Mesh("shed", block((-5, 6.5, 0), (5, 12, 5)))
+    candidates = lay_candidates(street(occluders=(shed,)), replace(PLAIN, heights=(3.5,)))
+    assert (np.abs(candidates.position[:, 0]) > 5).all()
+    assert candidates.dropped["inside an object"] >= 2
+
+
+def test_posts_keep_clear_of_walls_but_low_kerbs_are_none():
+    wall = Mesh("wall", block((-40, 9.5, 0), (40, 9.6, 2)))
+    kerb = Mesh("kerb", block((-40, 7.0, 0), (40, 8.0, 0.25)))
+    candidates = lay_candidates(street(occluders=(wall, kerb)), replace(PLAIN, clearance=1.0, setback=0.2))
+    assert candidates.position[:, 1].max() <= 8.5 + 1e-6
+    assert candidates.position[:, 1].min() < 8.0
+
+
+def test_a_crown_stops_the_tall_post_and_lets_the_low_one_stand():
+    crown = Mesh("crown", block((-40, 6, 5), (40, 12, 7)))
+    candidates = lay_candidates(street(occluders=(crown,)), PLAIN)
+    assert set(candidates.height) == {3.5}
+    assert candidates.dropped["too close to a wall or object"] > 0
+
+
+def test_forbidden_areas_and_poles_are_left_out():
+    poles = (Pole("a", np.array((0.0, 9.0, 0.1)), forbidden=True), Pole("b", np.array((9.0, 9.0, 0.1))))
+    area = NamedArea("museum", shapely.box(-40, 0, -10, 20))
+    candidates = lay_candidates(street(poles=poles, forbidden_areas=(area,)), PLAIN)
+    assert "a" not in candidates.position_name
+    assert "b" in candidates.position_name
+    assert candidates.position[:, 0].min() > -10
+    assert candidates.dropped["forbidden poles"] == 1
+    assert candidates.dropped["in a forbidden area"] > 0
+
+
+def test_mandatory_places_become_groups():
+    poles = (Pole("signal", np.array((0.0, 9.0, 0.1)), mandatory=True),)
+    area = NamedArea("school", shapely.box(10, 0, 20, 20))
+    candidates = lay_candidates(street(poles=poles, mandatory_areas=(area,)), PLAIN)
+    assert candidates.mandatory_name.tolist() == ["signal", "school"]
+    assert candidates.mandatory[0].sum() == 1
+    inside = (candidates.position[:, 0] >= 10) & (candidates.position[:, 0] <= 20)
+    assert candidates.mandatory[1].tolist() == inside.tolist()
+
+
+@given(st.permutations(range(4)))
+def test_names_and_order_of_poles_change_no_place(order):
+    feet = np.array([(x, 9.0, 0.1) for x in (-20.0, -3.0, 5.0, 17.0)])
+    poles = tuple(Pole(f"pole {i}", feet[i]) for i in range(4))
+    one = lay_candidates(street(poles=poles), PLAIN)
+    two = lay_candidates(street(poles=tuple(replace(poles[i], name=f"x{i}") for i in order)), PLAIN)
+    assert one.xyz.tobytes() == two.xyz.tobytes()
+
+
+def test_winding_number_tells_inside_whatever_the_normals():
+    points = np.array([(0.5, 0.5, 0.5), (1.5, 0.5, 0.5), (0.9, 0.1, 0.2)])
+    cube = block((0, 0, 0), (1, 1, 1))
+    np.testing.assert_allclose(np.abs(winding_number(points, cube)), [1, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(np.abs(winding_number(points, cube[:, ::-1])), [1, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "sentence"),
+    [
+        ({"candidate_areas": shapely.Polygon()}, {}, "no candidate"),
+        ({"occluders": (Mesh("hall", block((-90, -90, -1), (90, 90, 30))),)}, {}, r"no candidate is left \(\d+ inside"),
+        ({}, {"heights": (-1.0,)}, "mounting height must be a positive"),
+        ({}, {"heights": ()}, "no mounting height"),
+        ({}, {"sensors": ()}, "no sensor type"),
+        ({}, {"spacing": 0.0}, "candidate spacing must be"),
+        ({}, {"clearance": -1.0}, "clearance must be"),
+        ({"mandatory_areas": (NamedArea("moon", shapely.box(900, 900, 901, 901)),)}, {}, "'moon' must carry a sensor"),
+        (
+            {"poles": (Pole("p", np.array((0.0, 9.0, 0.1)), forbidden=True, mandatory=True),)},
+            {},
+            "'p' is both forbidden and mandatory",
+        ),
+        (
+            {
+                "poles": (Pole("p", np.array((0.0, 9.0, 0.1)), mandatory=True),),
+                "forbidden_areas": (NamedArea("park", shapely.box(-5, 5, 5, 15)),),
+            },
+            {},
+            "mandatory pole 'p' stands in a forbidden area",
+        ),
+    ],
+)
+def test_each_fault_has_its_sentence(changes, options, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        lay_candidates(street(**changes), replace(PLAIN, **options))

@@ -1,0 +1,84 @@
+"""Targets lie on the road, on an even grid, at the road's height."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.scene_geometry import NamedArea
+from seip_addon.core.targets import lay_targets, surface_height
+
+
+def rectangle(low_x, low_y, high_x, high_y, slope=0.0):
+    """Two triangles that rise with x."""
+    corners = [(x, y, slope * x) for x, y in ((low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y))]
+    return np.array([[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]], dtype=float)
+
+
+def test_a_square_holds_a_centred_grid():
+    targets = lay_targets(shapely.box(0, 0, 4, 2), rectangle(-10, -10, 10, 10), 1.0)
+    assert len(targets) == 5 * 3
+    assert targets.xyz.min(axis=0).tolist() == [0, 0, 0]
+    assert targets.xyz.max(axis=0).tolist() == [4, 2, 0]
+
+
+def test_targets_off_the_road_are_left_out():
+    targets = lay_targets(shapely.box(0, 0, 10, 10), rectangle(0, 0, 5, 10), 1.0)
+    assert targets.xyz[:, 0].max() <= 5
+    assert len(targets) == 6 * 11
+
+
+def test_the_height_is_the_roads():
+    targets = lay_targets(shapely.box(0, 0, 10, 2), rectangle(-20, -20, 20, 20, slope=0.1), 1.0)
+    np.testing.assert_allclose(targets.xyz[:, 2], 0.1 * targets.xyz[:, 0], atol=1e-6)
+
+
+def test_the_highest_of_two_roads_counts():
+    bridge = rectangle(0, 0, 10, 10) + np.array((0, 0, 6))
+    surfaces = np.concatenate((rectangle(0, 0, 10, 10), bridge))
+    assert surface_height(np.array([[5.0, 5.0], [20.0, 5.0]]), surfaces).tolist() == pytest.approx(
+        [6, np.nan], nan_ok=True
+    )
+
+
+def test_weights_multiply_where_regions_overlap():
+    regions = (NamedArea("a", shapely.box(-1, -1, 2, 9), 2.0), NamedArea("b", shapely.box(1, -1, 9, 9), 3.0))
+    targets = lay_targets(shapely.box(0, 0, 4, 0.5), rectangle(-9, -9, 9, 9), 1.0, regions)
+    assert targets.weight.tolist() == [2, 6, 6, 3, 3]
+    assert targets.central.all()
+
+
+@given(
+    shift=st.tuples(*[st.floats(-1e4, 1e4)] * 2),
+    spacing=st.floats(0.3, 3.0),
+)
+def test_moving_the_scene_moves_the_targets(shift, spacing):
+    move = np.array((*shift, 0.0))
+    region, road = shapely.box(0, 0, 7.3, 4.1), rectangle(-20, -20, 20, 20)
+    still = lay_targets(region, road, spacing)
+    moved = lay_targets(shapely.transform(region, lambda xy: xy + move[:2]), road + move, spacing)
+    assert len(moved) == len(still)
+    np.testing.assert_allclose(moved.xyz - move, still.xyz, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("region", "spacing", "sentence"),
+    [
+        (shapely.box(0, 0, 4, 4), 0.0, "must be a positive number"),
+        (shapely.box(0, 0, 4, 4), float("nan"), "must be a positive number"),
+        (shapely.Polygon(), 1.0, "region of interest is empty"),
+        (shapely.box(500, 500, 510, 510), 1.0, "no target"),
+        (shapely.box(0, 0, 4, 4), 1e-5, "choose a coarser one"),
+    ],
+)
+def test_each_fault_has_its_sentence(region, spacing, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        lay_targets(region, rectangle(-10, -10, 10, 10), spacing)
+
+
+def test_a_weight_must_be_positive():
+    regions = (NamedArea("centre", shapely.box(0, 0, 1, 1), -1.0),)
+    with pytest.raises(SeipError, match="weight of 'centre'"):
+        lay_targets(shapely.box(0, 0, 4, 4), rectangle(-10, -10, 10, 10), 1.0, regions)

@@ -1,0 +1,200 @@
+"""What the bridge reads is what the viewport shows, and reading changes nothing."""
+
+import hashlib
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.scene import collections as names
+from seip_addon.scene.read import read_scene
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    sheet(scene, "region", (names.REGION,), 40, 5)
+    sheet(scene, "road", (names.ROADS,), 60, 7)
+    return scene
+
+
+def collection(scene, name):
+    found = names.find(scene, name)
+    return found or names.find_or_make(scene, name)
+
+
+def sheet(scene, name, where, half_x, half_y, at=(0, 0, 0)):
+    mesh = bpy.data.meshes.new(name)
+    corners = [(-half_x, -half_y, 0), (half_x, -half_y, 0), (half_x, half_y, 0), (-half_x, half_y, 0)]
+    mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
+    return put(scene, bpy.data.objects.new(name, mesh), where, at)
+
+
+def put(scene, item, where, at=(0, 0, 0)):
+    item.location = at
+    for name in where:
+        collection(scene, name).objects.link(item)
+    return item
+
+
+def occluders(scene):
+    return {mesh.name: mesh.triangles for mesh in read_scene(scene).geometry.occluders}
+
+
+def test_region_road_and_origin_arrive_in_metres(scene):
+    scene["seip_origin"] = [5.4e6, 0.125, 3.0]
+    geometry = read_scene(scene).geometry
+    assert geometry.region.area == pytest.approx(800)
+    assert geometry.roads[0].triangles.shape == (2, 3, 3)
+    assert geometry.roads[0].triangles.dtype == np.float64
+    assert geometry.origin.tolist() == [5.4e6, 0.125, 3.0]
+
+
+def test_modifiers_count(scene):
+    wall = sheet(scene, "wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0))
+    array = wall.modifiers.new("row", "ARRAY")
+    array.count = 3
+    triangles = occluders(scene)["wall"]
+    assert len(triangles) == 6
+    assert triangles[..., 0].max() == pytest.approx(5)
+
+
+def test_parents_count(scene):
+    parent = put(scene, bpy.data.objects.new("parent", None), (), (100, 0, 0))
+    scene.collection.objects.link(parent)
+    wall = sheet(scene, "wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0))
+    wall.parent = parent
+    assert occluders(scene)["wall"][..., 0].mean() == pytest.approx(100, abs=1)
+
+
+def test_collection_instances_count_by_the_instancers_collection(scene):
+    asset = bpy.data.collections.new("tree asset")
+    leaf = bpy.data.objects.new("leaf", sheet(scene, "leaf", (), 1, 1).data)
+    asset.objects.link(leaf)
+    for x in (5, 15):
+        instancer = bpy.data.objects.new("tree", None)
+        instancer.instance_type, instancer.instance_collection = "COLLECTION", asset
+        put(scene, instancer, (names.OCCLUDERS,), (x, 20, 3))
+    found = occluders(scene)
+    assert sorted(found) == ["tree 1", "tree.001 1"]
+    assert found["tree 1"][..., 0].mean() == pytest.approx(5, abs=0.5)
+
+
+def test_geometry_nodes_instances_count(scene):
+    host = sheet(scene, "host", (names.OCCLUDERS,), 10, 10, (0, 40, 0))
+    tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    nodes = {kind: tree.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput")}
+    instance = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    cube = tree.nodes.new("GeometryNodeMeshCube")
+    tree.links.new(nodes["NodeGroupInput"].outputs[0], instance.inputs["Points"])
+    tree.links.new(cube.outputs["Mesh"], instance.inputs["Instance"])
+    tree.links.new(instance.outputs["Instances"], nodes["NodeGroupOutput"].inputs[0])
+    host.modifiers.new("scatter", "NODES").node_group = tree
+    found = occluders(scene)
+    assert sum(len(triangles) for triangles in found.values()) == 4 * 12
+    everything = np.concatenate(list(found.values()))
+    assert everything[..., 0].min() == pytest.approx(-10.5)
+    assert everything[..., 1].max() == pytest.approx(50.5)
+
+
+def test_curves_and_text_with_faces_count(scene):
+    curve = bpy.data.curves.new("rail", "CURVE")
+    curve.dimensions = "3D"
+    spline = curve.splines.new("POLY")
+    spline.points.add(1)
+    spline.points[0].co, spline.points[1].co = (0, 20, 1, 1), (10, 20, 1, 1)
+    curve.bevel_depth = 0.1
+    put(scene, bpy.data.objects.new("rail", curve), (names.OCCLUDERS,))
+    assert len(occluders(scene)["rail"]) > 8
+
+
+def test_linked_collections_count(scene, tmp_path):
+    library = tmp_path / "library.blend"
+    sheet(scene, "linked wall", (names.OCCLUDERS,), 1, 1, (0, 30, 0))
+    bpy.data.libraries.write(str(library), {names.find(scene, names.OCCLUDERS)}, fake_user=True)
+    bpy.data.objects.remove(bpy.data.objects["linked wall"])
+    bpy.data.collections.remove(names.find(scene, names.OCCLUDERS))
+    sheet(scene, "own wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0))
+    with bpy.data.libraries.load(str(library), link=True) as (_source, target):
+        target.collections = [names.OCCLUDERS]
+    scene.collection.children.link(target.collections[0])
+    assert sorted(occluders(scene)) == ["linked wall", "own wall"]
+
+
+def test_an_object_in_two_collections_is_cast_against_once(scene):
+    sheet(scene, "pavement", (names.GROUND, names.CANDIDATE_AREAS, names.OCCLUDERS), 60, 2, (0, 9, 0))
+    geometry = read_scene(scene).geometry
+    assert [mesh.name for mesh in geometry.ground] == ["pavement"]
+    assert geometry.occluders == ()
+    assert geometry.candidate_areas.area == pytest.approx(480)
+
+
+def test_poles_stand_at_their_origins_and_their_faces_occlude(scene):
+    post = sheet(scene, "post", (names.POLES,), 0.1, 0.1, (3, 9, 0.1))
+    post["seip_mandatory"] = True
+    put(scene, bpy.data.objects.new("mark", None), (names.POLES,), (8, 9, 0.1))
+    geometry = read_scene(scene).geometry
+    poles = {pole.name: pole for pole in geometry.poles}
+    np.testing.assert_allclose(poles["post"].base, (3, 9, 0.1), atol=1e-6)
+    assert poles["post"].mandatory
+    assert not poles["mark"].mandatory
+    assert [mesh.name for mesh in geometry.occluders] == ["post"]
+
+
+def test_hidden_objects_do_not_count_and_are_reported(scene):
+    sheet(scene, "ghost", (names.OCCLUDERS,), 1, 1, (0, 20, 0)).hide_set(True)
+    reading = read_scene(scene)
+    assert reading.geometry.occluders == ()
+    assert reading.warnings == ("1 hidden object in 'SEIP Occluders' did not count: show them if they should",)
+
+
+def test_weights_come_from_the_property(scene):
+    sheet(scene, "centre", (names.WEIGHTED_REGIONS,), 4, 4)["seip_weight"] = 3.5
+    sheet(scene, "plain", (names.WEIGHTED_REGIONS,), 2, 2)
+    weights = {area.name: area.weight for area in read_scene(scene).geometry.weighted_regions}
+    assert weights == {"centre": 3.5, "plain": 2.0}
+
+
+def test_reading_changes_nothing(scene):
+    sheet(scene, "wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0)).modifiers.new("row", "ARRAY")
+
+    def state():
+        text = []
+        for item in bpy.data.objects:
+            text.append(f"{item.name} {item.matrix_world} {[m.name for m in item.modifiers]} {item.hide_get()}")
+            text.extend(str(tuple(vertex.co)) for vertex in item.data.vertices)
+        text.append(f"{len(bpy.data.meshes)} {len(bpy.data.objects)} {len(bpy.data.collections)}")
+        return hashlib.sha256("".join(text).encode()).hexdigest()
+
+    bpy.context.view_layer.update()
+    before = state()
+    read_scene(scene)
+    assert state() == before
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda s: bpy.data.objects.remove(bpy.data.objects["region"]), "has no region of interest"),
+        (lambda s: bpy.data.objects.remove(bpy.data.objects["road"]), "has no road"),
+        (lambda s: put(s, bpy.data.objects.new("bare", None), (names.OCCLUDERS,)), "'bare' .* has no mesh"),
+        (lambda s: sheet(s, "flat", (names.OCCLUDERS,), 1, 0), "'flat' has only faces of zero area"),
+        (
+            lambda s: setattr(sheet(s, "n", (names.OCCLUDERS,), 1, 1).data.vertices[0], "co", (np.nan, 0, 0)),
+            "'n' has a",
+        ),
+        (lambda s: s.__setitem__("seip_origin", [1.0, 2.0]), "seip_origin must be three finite numbers"),
+        (
+            lambda s: sheet(s, "w", (names.WEIGHTED_REGIONS,), 1, 1).__setitem__("seip_weight", "high"),
+            "seip_weight of object 'w' must be a number",
+        ),
+    ],
+)
+def test_each_fault_has_its_sentence(scene, spoil, sentence):
+    spoil(scene)
+    with pytest.raises(SeipError, match=sentence):
+        read_scene(scene)
