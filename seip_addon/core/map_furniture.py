@@ -57,7 +57,7 @@ def building_parts(name: str, base: Float, height: Float, number: int) -> tuple[
     """Return a block (k, 3) raised by (k,) metres, and its windows where it is a house with level eaves."""
     walls = street_furniture.block(base, height, side=FACADES[number % len(FACADES)], cap="roof")
     block = Part(name, walls, (Role.OCCLUDERS,))
-    level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1  # noqa: PLR2004  # metres
+    level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1  # metres
     if not level or height[0] < street_furniture.STOREY:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
@@ -163,7 +163,7 @@ def _outlined(  # noqa: PLR0913  # an outline with its object's properties
     if outline.height.max() < LEAST_HEIGHT:
         return ()
     height = np.maximum(outline.height, 0.0)
-    if not outline.closed or len(base) < 3:  # noqa: PLR2004  # no area
+    if not outline.closed or len(base) < 3:  # no area
         panel = street_furniture.fence(base, height, width or 0.1, side=_material(kind))
         return (Part(name, panel, (Role.OCCLUDERS,)),)
     if kind == "building" or "building" in name.lower():

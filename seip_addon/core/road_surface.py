@@ -247,8 +247,8 @@ def _line(edge: Float, lane: LaneSurface, *, dashed: bool) -> Float:
 
 def _ribbon(path: Float) -> Float:
     """Return quads of marking width along a path (n, 3)."""
-    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]  # noqa: PLR2004  # metres
-    if len(path) < 2:  # noqa: PLR2004  # two ends
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]  # metres
+    if len(path) < 2:  # two ends
         return np.empty((0, 4, 3))
     along = np.gradient(path[:, :2], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)

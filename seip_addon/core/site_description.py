@@ -277,7 +277,7 @@ class _Table:
 
     def line(self, key: str) -> Float:
         value = self._take(key)
-        if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):  # noqa: PLR2004  # ends
+        if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):  # ends
             raise self._wrong(key, "a list of at least two points [[x, y], [x, y]]")
         return np.array(value, dtype=np.float64)
 
@@ -328,7 +328,7 @@ class _Table:
                 raise SeipError(f"{self.where}: unknown key {key!r}; did you mean {' or '.join(close)}?")
 
     def _ring(self, key: str, value: Any) -> Polygon:  # noqa: ANN401  # as _take
-        if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):  # noqa: PLR2004  # triangle
+        if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):  # triangle
             raise self._wrong(key, "a list of at least three points [[x, y], [x, y], [x, y]]")
         polygon = Polygon(value)
         if not polygon.is_valid or polygon.area == 0.0:
@@ -342,4 +342,4 @@ def _is_number(value: object) -> bool:
 
 
 def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))  # noqa: PLR2004  # x and y
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))  # x and y

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from seip_addon.core.candidates import plan_outline
-from seip_addon.core.errors import SeipError
-from seip_addon.core.scene_geometry import Float, Mesh, NamedArea, Pole, SceneGeometry
-
+from ..core.candidates import plan_outline
+from ..core.errors import SeipError
+from ..core.scene_geometry import Float, Mesh, NamedArea, Pole, SceneGeometry
 from . import collections as names
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}

@@ -14,7 +14,7 @@ from defusedxml.ElementTree import ParseError, parse
 from ..errors import SeipError
 
 if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element  # noqa: S405 - the type alone; defusedxml does the parsing
+    from xml.etree.ElementTree import Element
 
 
 @dataclass(frozen=True, eq=False)
