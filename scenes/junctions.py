@@ -134,9 +134,9 @@ def driving(lanes: Sequence[EdgeLane]) -> tuple[EdgeLane, ...]:
     return tuple(lane for lane in lanes if lane.kind == "driving")
 
 
-def connect(identity: str, name: str, arms: Sequence[Arm], phases: Sequence[Sequence[int]]) -> tuple[
-    tuple[Road, ...], Junction
-]:
+def connect(
+    identity: str, name: str, arms: Sequence[Arm], phases: Sequence[Sequence[int]]
+) -> tuple[tuple[Road, ...], Junction]:
     """Return the connecting roads and the junction of arms.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from xml.etree.ElementTree import Element, SubElement, indent, tostring  # noqa: S405  # it writes, nothing is parsed
+from xml.etree.ElementTree import Element, SubElement, indent, tostring  # it writes, nothing is parsed
 
 from scenes.alignment import Geometry
 

@@ -50,8 +50,7 @@ def linked(sections: Sequence[Section]) -> tuple[Section, ...]:
                 result[index],
                 **{
                     side: tuple(
-                        replace(lane, successor=others.get(key))
-                        for lane, key in zip(leaving, numbers, strict=True)
+                        replace(lane, successor=others.get(key)) for lane, key in zip(leaving, numbers, strict=True)
                     )
                 },
             )
@@ -59,8 +58,7 @@ def linked(sections: Sequence[Section]) -> tuple[Section, ...]:
                 result[index + 1],
                 **{
                     side: tuple(
-                        replace(lane, predecessor=numbers.get(key))
-                        for lane, key in zip(second, others, strict=True)
+                        replace(lane, predecessor=numbers.get(key)) for lane, key in zip(second, others, strict=True)
                     )
                 },
             )

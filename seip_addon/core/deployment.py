@@ -93,7 +93,9 @@ class Deployment:
     price: float
 
 
-def deploy(site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer) -> Deployment:
+def deploy(
+    site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer
+) -> Deployment:
     """Return the chosen poses as sensors, with what they see.
 
     Parameters

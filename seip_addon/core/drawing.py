@@ -64,7 +64,9 @@ def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) 
 def summary(deployment: Deployment) -> str:
     """Return the result in one line."""
     one = len(deployment.sensors) == 1
-    parts = [f"{len(deployment.sensors)} {'sensor sees' if one else 'sensors see'} {percent(deployment.coverage)} of the road"]
+    parts = [
+        f"{len(deployment.sensors)} {'sensor sees' if one else 'sensors see'} {percent(deployment.coverage)} of the road"
+    ]
     if deployment.central is not None:
         parts.append(f"{percent(deployment.central)} of its weighted part")
     parts.append(f"{percent(deployment.seen_twice)} seen twice")
@@ -74,7 +76,7 @@ def summary(deployment: Deployment) -> str:
 
 def percent(share: float) -> str:
     """Return a share in per cent; only all of it is 100 %, and only nothing is 0 %."""
-    if 0.0 < share < 0.0005:  # noqa: PLR2004 - half of the last digit
+    if 0.0 < share < 0.0005:
         return "<0.1%"
     return f"{min(share, 1.0 if share == 1.0 else 0.999):.1%}"
 

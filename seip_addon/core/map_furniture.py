@@ -106,7 +106,7 @@ def signal_parts(
     )
 
 
-def signal_part(  # noqa: PLR0913  # a pole has these properties
+def signal_part(  # a pole has these properties
     name: str, foot: Float, heading: float, height: float, arm: float, *, faces_left: bool = True
 ) -> Part:
     """Return a signal pole."""
@@ -156,7 +156,7 @@ def _object(  # noqa: PLR0911  # one return for each kind of object
     return (Part(name, street_furniture.block(base, height, side=_material(kind)), (Role.OCCLUDERS,)),)
 
 
-def _outlined(  # noqa: PLR0913  # an outline with its object's properties
+def _outlined(  # an outline with its object's properties
     outline: Outline, name: str, number: int, kind: str, width: float, origin: Float
 ) -> tuple[Part, ...]:
     base = outline.base - origin

@@ -70,7 +70,13 @@ def versions(**more: str) -> dict[str, str]:
 
 
 def placement_record(
-    site: Site, deployment: Deployment, placement: Placement, run: Run, *, weighted: bool, greedy: Placement | None = None
+    site: Site,
+    deployment: Deployment,
+    placement: Placement,
+    run: Run,
+    *,
+    weighted: bool,
+    greedy: Placement | None = None,
 ) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
 

@@ -186,7 +186,13 @@ def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> No
     for area in geometry.weighted_regions:
         _draw_area(plan, area.polygon, facecolor="none", edgecolor=PAPER, linewidth=2.8, zorder=BORDER)
         _draw_area(
-            plan, area.polygon, facecolor="none", edgecolor=WEIGHTED, linewidth=1.5, linestyle=(0, (5, 2)), zorder=BORDER
+            plan,
+            area.polygon,
+            facecolor="none",
+            edgecolor=WEIGHTED,
+            linewidth=1.5,
+            linestyle=(0, (5, 2)),
+            zorder=BORDER,
         )
 
 

@@ -266,7 +266,7 @@ def _region_part(street: _Street) -> Part:
     return Part("Region of interest", _draped(street.region, street), (Role.REGION,))
 
 
-def _weighted_parts(  # noqa: PLR0913  # the map, the place and its axes
+def _weighted_parts(  # the map, the place and its axes
     road_map: RoadMap,
     surfaces: Sequence[LaneSurface],
     description: SiteDescription,

@@ -13,7 +13,6 @@ from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.site_parts import Role
 from ..core.storage import digest, whole_file
-
 from . import collections
 from .materials import material
 

@@ -45,7 +45,9 @@ AREAS = {
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
 
-def save_rendered_view(path: str | os.PathLike[str], scene: bpy.types.Scene, site: Site, deployment: Deployment) -> None:
+def save_rendered_view(
+    path: str | os.PathLike[str], scene: bpy.types.Scene, site: Site, deployment: Deployment
+) -> None:
     """Render the scene from an oblique angle in the south-west and label the sensors, as PNG.
 
     The picture is taken in a scene of its own that shares the objects and is
@@ -125,7 +127,9 @@ def _add_camera(stage: bpy.types.Scene, site: Site) -> bpy.types.Object:
     data = bpy.data.cameras.new("SEIP view")
     data.angle = FIELD_OF_VIEW
     camera = bpy.data.objects.new("SEIP view", data)
-    backwards = Vector((math.cos(ELEVATION) * math.cos(AZIMUTH), math.cos(ELEVATION) * math.sin(AZIMUTH), math.sin(ELEVATION)))
+    backwards = Vector(
+        (math.cos(ELEVATION) * math.cos(AZIMUTH), math.cos(ELEVATION) * math.sin(AZIMUTH), math.sin(ELEVATION))
+    )
     turn = backwards.to_track_quat("Z", "Y").to_matrix()
     place, distance = _viewpoint(np.array(turn), site.targets.xyz)
     camera.matrix_world = Matrix.Translation(place) @ turn.to_4x4()

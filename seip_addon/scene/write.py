@@ -230,5 +230,5 @@ def _material(name: str, colour: str) -> bpy.types.Material:
 def _linear(colour: str) -> tuple[float, float, float, float]:
     """Return a web colour (sRGB) as Blender's linear RGBA (IEC 61966-2-1)."""
     srgb = [int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
-    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)  # noqa: PLR2004
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)
     return red, green, blue, 1.0

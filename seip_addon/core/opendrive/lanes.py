@@ -13,7 +13,6 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
-
 from .road_map import Frame, Lane, LaneSection, Road, RoadMap
 from .sampling import sample
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
-
 from .document import Node, read_document
 from .profile import NONE, Profile, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3

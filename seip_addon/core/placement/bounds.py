@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import Progress
-from ..site import Float, Integer
+from ..arrays import Float, Integer
 from .clock import Clock
 from .instance import SLACK, Instance
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import Progress
-from ..site import Integer
+from ..arrays import Integer
 from .bounds import Bound, can_reach, lagrangian_bound
 from .clock import Clock
 from .feasibility import starting_choice

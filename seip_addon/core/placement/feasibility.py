@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import SeipError
-from ..site import Integer
+from ..arrays import Integer
 from .instance import Instance
 from .integer_program import CoverProgram
 from .problem import PlacementProblem

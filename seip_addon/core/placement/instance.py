@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
-from ..site import Boolean, Float, Integer
+from ..arrays import Boolean, Float, Integer
 from .problem import TIE, PlacementProblem, canonical_order
 
 SCALE = 1e4

@@ -21,7 +21,7 @@ import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
 from ..errors import SeipError
-from ..site import Boolean, Float, Integer
+from ..arrays import Boolean, Float, Integer
 from .instance import Instance
 from .problem import TIE
 

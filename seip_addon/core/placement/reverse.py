@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import SeipError
 from ..progress import Progress
-from ..site import Integer
+from ..arrays import Integer
 from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .exact import prove, solve

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..progress import Progress
-from ..site import Integer
+from ..arrays import Integer
 from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .instance import SLACK, Instance
