@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from xml.etree.ElementTree import Element, SubElement, indent, tostring  # noqa: S405  # it writes, nothing is parsed
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from scenes.alignment import Geometry
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from scenes.alignment import Geometry
 
 Value = str | float | int
 
@@ -193,7 +196,8 @@ def opendrive(road_map: Map) -> bytes:
     for junction in road_map.junctions:
         _junction(root, junction)
     indent(root, " ")
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
+    text: str = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def _text(value: Value) -> str:
