@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 from scenes.alignment import Alignment, Piece, Pose, transition_curve
 from scenes.junctions import Arm, connect, equip
@@ -35,23 +36,37 @@ PARKING_PAVEMENT = 4.5  # beside a parking lane 2.2 m of it are given up
 PARKING = 2.2
 
 
+class SideStreet(NamedTuple):
+    """A street off the arterial: where, at which angle to it in degrees, and how far from its middle it begins."""
+
+    id: str
+    name: str
+    junction: str
+    station: float
+    angle: float
+    setback: float
+    length: float
+    height: float
+    lanes: tuple[float, ...]
+    grade: float = 0.0
+
+
+SIDE_STREETS = (
+    SideStreet("11", "Mill Lane North", "100", MILL, 90.0, 14.5, 75.0, 0.0, SIDE_LANES, grade=0.02),
+    SideStreet("12", "Mill Lane South", "100", MILL, -95.0, 14.5, 75.0, 0.0, SIDE_LANES),
+    SideStreet("13", "School Street", "200", SCHOOL, -82.0, 13.5, 80.0, 1.6, SIDE_LANES, grade=-0.01),
+    SideStreet("14", "Station Road North", "300", STATION, 86.0, 15.0, 90.0, 0.9, LANES),
+    SideStreet("15", "Station Road South", "300", STATION, -88.0, 15.0, 90.0, 0.9, LANES, grade=-0.012),
+)
+
+
 def corridor_map() -> Map:
     """Return the map; the first junction's centre is the origin."""
     west = _furnish(_arterial("1", (0.0, MILL - 11.0), (-0.6, 0.0), (None, "100")))
     middle = _furnish(_arterial("2", (MILL + 11.0, SCHOOL - 10.0), (0.0, 1.6), ("100", "200"), parking=-1))
     inner = _furnish(_arterial("3", (SCHOOL + 10.0, STATION - 15.0), (1.6, 0.9), ("200", "300"), parking=1))
     east = _furnish(_arterial("4", (STATION + 15.0, ARTERIAL.length), (0.9, 1.5), ("300", None)))
-    mill_north = _side_street(
-        "11", "Mill Lane North", (MILL, 90.0, 14.5, 75.0), "100", height=0.0, lanes=SIDE_LANES, grade=0.02
-    )
-    mill_south = _side_street("12", "Mill Lane South", (MILL, -95.0, 14.5, 75.0), "100", height=0.0, lanes=SIDE_LANES)
-    school = _side_street(
-        "13", "School Street", (SCHOOL, -82.0, 13.5, 80.0), "200", height=1.6, lanes=SIDE_LANES, grade=-0.01
-    )
-    north = _side_street("14", "Station Road North", (STATION, 86.0, 15.0, 90.0), "300", height=0.9, lanes=LANES)
-    south = _side_street(
-        "15", "Station Road South", (STATION, -88.0, 15.0, 90.0), "300", height=0.9, lanes=LANES, grade=-0.012
-    )
+    mill_north, mill_south, school, north, south = (_side_street(street) for street in SIDE_STREETS)
     junctions = (
         connect(
             "100",
@@ -112,31 +127,21 @@ def _parking_sections(length: float, parking: int, clear: float = 24.0) -> tuple
     return linked((ends, middle, replace(ends, start=length - clear)))
 
 
-def _side_street(  # noqa: PLR0913  # a street has these properties
-    identity: str,
-    name: str,
-    course: tuple[float, float, float, float],
-    junction: str,
-    *,
-    height: float,
-    lanes: tuple[float, ...],
-    grade: float = 0.0,
-) -> Road:
-    """Return a street off the arterial; its course is station, angle to the arterial (degrees), set-back and length."""
-    station, angle, setback, length = course
-    start = ARTERIAL.pose(station).turned(math.radians(angle)).moved(ahead=setback)
-    pavement = 2.5 if lanes == SIDE_LANES else 3.0
-    side = street_side(lanes, pavement)
+def _side_street(street: SideStreet) -> Road:
+    start = ARTERIAL.pose(street.station).turned(math.radians(street.angle)).moved(ahead=street.setback)
+    narrow = street.lanes == SIDE_LANES
+    pavement = 2.5 if narrow else 3.0
+    side = street_side(street.lanes, pavement)
     road = Road(
-        identity,
-        name,
-        Alignment(start, (Piece(length),)).geometries(),
-        (Section(0.0, side, side, "broken" if lanes == SIDE_LANES else "solid"),),
-        climb(grade, height),
-        predecessor=Neighbour("junction", junction),
-        speed=30 if lanes == SIDE_LANES else 50,
+        street.id,
+        street.name,
+        Alignment(start, (Piece(street.length),)).geometries(),
+        (Section(0.0, side, side, "broken" if narrow else "solid"),),
+        climb(street.grade, street.height),
+        predecessor=Neighbour("junction", street.junction),
+        speed=30 if narrow else 50,
     )
-    return _furnish_side_street(equip(road, "start"), sum(lanes), pavement)
+    return _furnish_side_street(equip(road, "start"), sum(street.lanes), pavement)
 
 
 def _furnish(road: Road) -> Road:

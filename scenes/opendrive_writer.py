@@ -75,11 +75,12 @@ class Neighbour:
 
 @dataclass(frozen=True)
 class Corner:
-    """A corner of an outline: (u, v) in the object's axes or (s, t) of the road, and the height there, in metres."""
+    """A corner of an outline in metres: (u, v) in the object's axes or (s, t) of the road, the height, the foot."""
 
     first: float
     second: float
     height: float
+    foot: float = 0.0  # above the object's origin or the road
 
 
 @dataclass(frozen=True)
@@ -297,7 +298,7 @@ def _objects(element: Element, road: Road) -> None:
             if corners:
                 outline = _add(_add(record, "outlines"), "outline", id=0, outer="true", closed="true")
                 for index, corner in enumerate(corners):
-                    place = dict(zip(axes, (corner.first, corner.second, 0.0), strict=True))
+                    place = dict(zip(axes, (corner.first, corner.second, corner.foot), strict=True))
                     _add(outline, tag, id=index, **place, height=corner.height)
 
 

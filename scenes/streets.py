@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from scenes.opendrive_writer import Corner, Cubic, Lane, Repeat, Road, RoadObject, Section, smooth_step
+from scenes.opendrive_writer import Corner, Cubic, Lane, Repeat, Road, RoadObject, Section, smooth_step, value_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -106,23 +106,26 @@ def buildings(road: Road, houses: Sequence[House], *, bent: bool = False) -> Ite
     for side, start in ((1, 1), (-1, 2)):
         row = [house for house in houses if house.side == side]
         for number, house in enumerate(row):
-            yield _building(f"{road.name} {start + 2 * number}", house, bent=bent)
+            yield _building(road, f"{road.name} {start + 2 * number}", house, bent=bent)
 
 
-def _building(name: str, house: House, *, bent: bool) -> RoadObject:
+def _building(road: Road, name: str, house: House, *, bent: bool) -> RoadObject:
     middle, offset = (house.first + house.last) / 2.0, (house.near + house.far) / 2.0
     length, depth = house.last - house.first, house.far - house.near
+    front = (house.first, middle, house.last)
+    # Houses are level, whatever the street does: they stand on the lowest ground beside them.
+    feet = {s: value_at(road.elevation, s) for s in front}
+    floor = min(feet.values())
     building = RoadObject(
         "building", name, middle, house.side * offset, house.height, size={"length": length, "width": depth}
     )
     if bent:
-        front = (house.first, middle, house.last)
-        near = [Corner(s, house.side * house.near, house.height) for s in front]
-        far = [Corner(s, house.side * house.far, house.height) for s in reversed(front)]
+        near = [Corner(s, house.side * house.near, house.height, floor - feet[s]) for s in front]
+        far = [Corner(s, house.side * house.far, house.height, floor - feet[s]) for s in reversed(front)]
         return replace(building, corners_road=(*near, *far))
     u, v = length / 2.0, depth / 2.0
-    corners = ((-u, -v), (u, -v), (u, v), (-u, v))
-    return replace(building, corners_local=tuple(Corner(a, b, house.height) for a, b in corners))
+    corners = tuple(Corner(a, b, house.height) for a, b in ((-u, -v), (u, -v), (u, v), (-u, v)))
+    return replace(building, z_offset=floor - feet[middle], corners_local=corners)
 
 
 def tree_row(name: str, row: Repeat, height: float) -> RoadObject:

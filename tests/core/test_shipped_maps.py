@@ -417,6 +417,14 @@ def test_what_the_corridor_places_is_off_the_carriageway(corridor: Shipped) -> N
             assert carriageway.distance(point) > 0.5, placed.name
 
 
+def test_buildings_are_level(corridor: Shipped) -> None:
+    outlines = [outline for placed in corridor.objects if placed.kind == "building" for outline in placed.outlines]
+    assert len(outlines) >= 50
+    for outline in outlines:
+        assert np.ptp(outline.base[:, 2]) < 1e-6
+        assert np.ptp(outline.height) == 0.0
+
+
 def test_corridor_site_names_junctions_and_a_region_around_them(corridor: Shipped) -> None:
     site = tomllib.loads((SCENES / "corridor.toml").read_text(encoding="utf-8"))
     assert site["map"] == "corridor.xodr"
