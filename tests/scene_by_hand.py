@@ -25,7 +25,9 @@ def make_scene(geometry: SceneGeometry) -> bpy.types.Scene:
     _fill(scene, contract.ROADS, geometry.roads, (0.25, 0.25, 0.27))
     _fill(scene, contract.GROUND, geometry.ground, (0.55, 0.53, 0.5))
     _fill(scene, contract.OCCLUDERS, geometry.occluders, (0.6, 0.55, 0.5))
-    triangles = [np.array(part.exterior.coords)[:3] for part in shapely.get_parts(shapely.delaunay_triangles(geometry.region))]
+    triangles = [
+        np.array(part.exterior.coords)[:3] for part in shapely.get_parts(shapely.delaunay_triangles(geometry.region))
+    ]
     flat = np.array([[(x, y, 0.5) for x, y in triangle] for triangle in triangles])
     collection = contract.find_or_make(scene, contract.REGION)
     collection.objects.link(_object("region", flat, (1.0, 0.0, 0.0)))

@@ -69,8 +69,14 @@ def versions(**more: str) -> dict[str, str]:
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 
-def placement_record(
-    site: Site, deployment: Deployment, placement: Placement, run: Run, *, weighted: bool, greedy: Placement | None = None
+def placement_record(  # noqa: PLR0913 - one thing for each part of the file
+    site: Site,
+    deployment: Deployment,
+    placement: Placement,
+    run: Run,
+    *,
+    weighted: bool,
+    greedy: Placement | None = None,
 ) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
 
@@ -148,7 +154,7 @@ def load_placement_record(path: str | os.PathLike[str]) -> Record:
         There is no such file, or it is no placement of a version that this program knows.
     """
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        record: Record = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
     except ValueError as error:

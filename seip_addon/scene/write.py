@@ -119,8 +119,8 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
 def _hardware(sensor: Sensor, materials: Sequence[bpy.types.Material]) -> bpy.types.Mesh:
     """Return the body and the post or bracket that carries it, in the axes of the sensor's empty."""
     foot = _turned(sensor.foot - sensor.xyz, -sensor.yaw)
-    top = np.array((0.0, 0.0, -BODY_HEIGHT / 2))
-    pieces = [_cylinder(top, top + (0.0, 0.0, BODY_HEIGHT), BODY_RADIUS)]
+    top = np.array((0.0, 0.0, -BODY_HEIGHT / 2))  # of the post; the optical centre is the body's middle
+    pieces = [_cylinder(top, -top, BODY_RADIUS)]
     if not sensor.on_pole:
         pieces.append(_cylinder(foot, top, POST_RADIUS))
     elif math.hypot(*foot[:2]) > SAME_PLACE:
@@ -230,5 +230,5 @@ def _material(name: str, colour: str) -> bpy.types.Material:
 def _linear(colour: str) -> tuple[float, float, float, float]:
     """Return a web colour (sRGB) as Blender's linear RGBA (IEC 61966-2-1)."""
     srgb = [int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
-    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)  # noqa: PLR2004
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)
     return red, green, blue, 1.0
