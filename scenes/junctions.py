@@ -183,9 +183,7 @@ def _movements(arms: Sequence[Arm]) -> Iterator[tuple[Arm, Arm]]:
 def _connecting_road(identity: str, junction: str, first: Arm, last: Arm, *, along_corner: bool) -> Road:
     pairs = _lane_pairs(first, last)
     if along_corner:
-        pairs += tuple(
-            (into, out) for into, out in zip(first.incoming, last.outgoing, strict=True) if into.kind == "sidewalk"
-        )
+        pairs = (*pairs, (first.incoming[-1], last.outgoing[-1]))  # the pavements are the outermost lanes
     start = first.inward.moved(left=-pairs[0][0].edge)
     end = last.inward.turned(math.pi).moved(left=-pairs[0][1].edge)
     geometries = join(start, end)

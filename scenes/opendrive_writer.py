@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from xml.etree.ElementTree import Element, ElementTree, SubElement, indent  # noqa: S405  # it writes, nothing is parsed
+from xml.etree.ElementTree import Element, SubElement, indent, tostring  # noqa: S405  # it writes, nothing is parsed
 
 from scenes.alignment import Geometry
 
@@ -169,22 +169,31 @@ class Junction:
     groups: tuple[SignalGroup, ...]
 
 
-def opendrive(name: str, roads: Sequence[Road], junctions: Sequence[Junction]) -> ElementTree[Element]:
-    """Return the document of a map."""
+@dataclass(frozen=True)
+class Map:
+    """A whole map."""
+
+    name: str
+    roads: tuple[Road, ...]
+    junctions: tuple[Junction, ...]
+
+
+def opendrive(road_map: Map) -> bytes:
+    """Return the file of a map."""
     root = Element("OpenDRIVE")
     # The date is fixed so that the same sources always give the same file.
-    _add(root, "header", revMajor=1, revMinor=6, name=name, version="1.0", date="2025-01-01T00:00:00")
-    for road in roads:
+    _add(root, "header", revMajor=1, revMinor=6, name=road_map.name, version="1.0", date="2025-01-01T00:00:00")
+    for road in road_map.roads:
         _road(root, road)
-    for junction in junctions:
+    for junction in road_map.junctions:
         for group in junction.groups:
             controller = _add(root, "controller", id=group.id, name=group.name)
             for signal in group.signals:
                 _add(controller, "control", signalId=signal, type="0")
-    for junction in junctions:
+    for junction in road_map.junctions:
         _junction(root, junction)
     indent(root, " ")
-    return ElementTree(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
 
 
 def _text(value: Value) -> str:

@@ -149,7 +149,7 @@ def _object(  # noqa: PLR0911  # one return for each kind of object
         )
     if size == 0 or placed.height < LEAST_HEIGHT:
         return ()
-    base = [*_footprint(placed), *foot[:2], foot[2]]
+    base = _footprint(placed) + foot
     height = np.full(len(base), placed.height)
     if kind == "building":
         return building_parts(name, base, height, number)

@@ -38,6 +38,8 @@ GROUPS = {
 
 CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "border", "track")
 LONGEST_STEP = 10.0
+CORNER_NOTCH = 3.0
+"""Notches up to twice this (metres) at the corners of a junction are pavement."""
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
@@ -45,6 +47,8 @@ MARKING_ABOVE = 0.012
 DASH, GAP = 3.0, 6.0
 STOP_LINE_WIDTH = 0.4
 STOP_LINE_SETBACK = 1.0
+GRID = 1e-4
+"""Grid (metres) that plans snap to when they are joined."""
 NARROW = 1.0
 """Lanes narrower than this (metres) are tapers; nothing is painted along them."""
 SEAM = 0.05
@@ -82,9 +86,12 @@ def in_groups(surfaces: Iterable[LaneSurface], groups: Sequence[str]) -> tuple[L
 
 def outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
     """Return the area in plan that lanes cover, with seams and crumbs closed."""
-    covered = shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=1e-4)
-    closed = covered.buffer(SEAM, join_style="mitre").buffer(-SEAM, join_style="mitre")
-    return without_crumbs(closed.simplify(0.01))
+    return without_crumbs(closed(_plan(surfaces), SEAM).simplify(0.01))
+
+
+def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
+    """Return an area in plan with gaps up to twice ``gap`` metres filled."""
+    return area.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
 
 
 def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
@@ -98,30 +105,55 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
     )
 
 
-def group_triangles(surfaces: Sequence[LaneSurface], name: str) -> Float:
-    """Return (n, 3, 3) triangles of one group; in junctions those of other groups give way to driving lanes."""
+def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
+    """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
+
+    The lanes that cross each other in a junction are made one layer: where
+    driving lanes overlap the longest one counts, and other groups give way to
+    driving lanes. Between roads, whose lanes meet edge to edge, nothing is cut.
+    """
     lanes = in_groups(surfaces, [name])
-    pieces = [np.empty((0, 3, 3))]
-    for junction in sorted({lane.junction_id or "" for lane in lanes}):
-        own = [lane for lane in lanes if (lane.junction_id or "") == junction]
-        triangles = np.concatenate([lane.triangles for lane in own])
-        over = [lane for lane in in_groups(surfaces, ["driving"]) if lane.junction_id == junction]
-        if name != "driving" and over:
-            triangles = cut(triangles, outline(over))
-        pieces.append(triangles)
-    return np.concatenate(pieces)
+    pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
+    for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
+        own = [lane for lane in lanes if lane.junction_id == junction]
+        driving = [] if name == "driving" else in_groups(surfaces, ["driving"])
+        covered = _plan([lane for lane in driving if lane.junction_id == junction])
+        for lane in sorted(own, key=lambda lane: -lane.polygon.area):
+            pieces.append(cut(lane.triangles, covered))
+            covered = covered.union(_plan([lane]), grid_size=GRID)
+    beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
+    return cut(np.concatenate(pieces), beyond)
 
 
 def kerb_faces(pavement: Float) -> Float:
     """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3)."""
     if len(pavement) == 0:
         return pavement
-    plan = shapely.union_all(shapely.polygons(pavement[:, :, :2]), grid_size=1e-3)
-    closed = without_crumbs(plan.buffer(SEAM, join_style="mitre").buffer(-SEAM, join_style="mitre").simplify(0.01))
+    plan = without_crumbs(closed(plan_of(pavement), SEAM).simplify(0.01))
     terrain = Terrain(pavement)
-    parts = map(orient, shapely.get_parts(closed))
+    parts = map(orient, shapely.get_parts(plan))
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
     return np.concatenate([_skirt(ring, terrain) for ring in rings])
+
+
+def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
+    """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
+
+    Many maps end the pavements where the junction begins. A notch between the
+    ends of two pavements and the carriageway is filled at the pavements' height.
+    """
+    inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
+    if inside.is_empty or len(pavement) == 0:
+        return np.empty((0, 3, 3))
+    walked = plan_of(pavement)
+    street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
+    notches = closed(street, CORNER_NOTCH).difference(street)
+    corners = [
+        notch
+        for notch in shapely.get_parts(notches)
+        if notch.area > 1.0 and notch.distance(inside) < SEAM and notch.distance(walked) < SEAM
+    ]
+    return Terrain(pavement).drape(shapely.union_all(corners), spacing=LONGEST_STEP)
 
 
 def markings(surfaces: Sequence[LaneSurface]) -> Float:
@@ -193,6 +225,15 @@ def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
     )
 
 
+def plan_of(triangles: Float) -> BaseGeometry:
+    """Return the area in plan of triangles (n, 3, 3), none of them upright."""
+    return shapely.union_all(shapely.polygons(triangles[:, :, :2]), grid_size=GRID)
+
+
+def _plan(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    return shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=GRID)
+
+
 def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
     return dataclasses.replace(surface, left=surface.left - origin, right=surface.right - origin)
 
@@ -261,7 +302,7 @@ def _bar(left: Float, right: Float) -> Float:
     """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
     near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
     corners = [_before_end(right, far), _before_end(right, near), _before_end(left, near), _before_end(left, far)]
-    return [*np.array([corners]), 0, 0, MARKING_ABOVE]
+    return np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
 
 
 def _before_end(path: Float, distance: float) -> Float:

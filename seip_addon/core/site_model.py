@@ -207,7 +207,11 @@ def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry
 def _surface_parts(street: _Street) -> list[Part]:
     groups = {road_surface.group(lane) for lane in street.lanes}
     return [
-        Part(name, street_furniture.from_faces(road_surface.group_triangles(street.lanes, group), material), (role,))
+        Part(
+            name,
+            street_furniture.from_faces(road_surface.group_triangles(street.lanes, group, street.extent), material),
+            (role,),
+        )
         for group, (name, material, role) in SURFACES.items()
         if group in groups
     ]
@@ -215,9 +219,11 @@ def _surface_parts(street: _Street) -> list[Part]:
 
 def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, and notes."""
-    triangles = road_surface.group_triangles(street.lanes, "sidewalk")
+    triangles = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
     if len(triangles) == 0:
         return [_verge_strip(street)], ("the map has no pavements: new posts may stand on a strip of verge",)
+    corners = road_surface.corner_pavements(triangles, street.lanes)
+    triangles = np.concatenate([triangles, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
     kerbs = road_surface.kerb_faces(triangles)
@@ -226,7 +232,10 @@ def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
         Part("Kerbs", _solid(kerbs, "kerb"), (Role.GROUND,)),
     ]
-    return parts, ()
+    notes = (
+        ("the pavements are closed round the corners of junctions, where the map leaves gaps",) if len(corners) else ()
+    )
+    return parts, notes
 
 
 def _verge_strip(street: _Street) -> Part:
@@ -249,6 +258,7 @@ def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
     quads = road_surface.markings(street.lanes)
     if stop_lines:
         quads = np.concatenate([quads, road_surface.stop_lines(street.lanes)])
+    quads = quads[shapely.contains_xy(street.extent, quads[:, :, :2].mean(axis=1))]
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
 
 

@@ -16,6 +16,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,7 +129,7 @@ class VisibilityGrid:
             The file is not there, damaged, or something else.
         """
         try:
-            with np.load(path, allow_pickle=False) as arrays:
+            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
                 header = json.loads(str(arrays["header"]))
                 packed = arrays["packed"]
             known = header["schema"] == SCHEMA and header["version"] == SCHEMA_VERSION

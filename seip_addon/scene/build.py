@@ -13,6 +13,7 @@ from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.site_parts import Role
 from ..core.storage import digest, whole_file
+
 from . import collections
 from .materials import material
 
@@ -97,6 +98,7 @@ def save_blend(path: Path) -> None:
     if path.suffix != ".blend":
         raise SeipError(f"{path} is no name for a Blender file; let it end in .blend")
     with whole_file(path) as temporary:
+        temporary.unlink()  # Blender would keep a backup of a file that is there
         bpy.ops.wm.save_as_mainfile(filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False)
 
 

@@ -62,7 +62,7 @@ def test_control_c_ends_with_130_and_one_line() -> None:
     with subprocess.Popen(  # noqa: S603  # our own interpreter and script
         [sys.executable, "-c", script], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        assert process.stdout.readline() == "ready\n"
+        assert "ready\n" in iter(process.stdout.readline, "")  # Blender 5.2 writes a line of its own before
         process.send_signal(signal.SIGINT)
         _, complaint = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -74,7 +74,7 @@ def test_what_is_no_blend_is_refused_by_name(tmp_path, content) -> None:
     path = tmp_path / "site.blend"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(SeipError, match="site.blend"):
+    with pytest.raises(SeipError, match=r"site\.blend"):
         session.open_blend(path)
 
 

@@ -16,6 +16,8 @@ from ..errors import SeipError
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
+_GREATEST = 1e9  # metres are below this anywhere on Earth in any projection; nothing computed from it overflows
+
 
 @dataclass(frozen=True, eq=False)
 class Node:
@@ -61,14 +63,16 @@ class Node:
         return value.strip()
 
     def number(self, name: str, default: float | None = None) -> float:
-        """Return an attribute as a finite number; without a default it must be there."""
-        text = self.text(name, None if default is None else repr(default))
+        """Return an attribute as a number of earthly size; without a default it must be there."""
+        if default is not None and name not in self.element.attrib:
+            return default
+        text = self.text(name)
         try:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no finite number; correct it in the map")
+        if not abs(value) <= _GREATEST:
+            raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no sensible number; correct the map")
         return value
 
     def length(self, name: str) -> float:

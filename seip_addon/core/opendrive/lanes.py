@@ -13,6 +13,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
+
 from .road_map import Frame, Lane, LaneSection, Road, RoadMap
 from .sampling import sample
 
@@ -94,7 +95,7 @@ def lane_surfaces(
     Raises
     ------
     SeipError
-        The tolerance is not above zero, or profiles of a road run off to infinity.
+        The tolerance is not above zero, or a road cannot be followed within it.
     """
     if not tolerance > 0.0:
         raise SeipError(f"a tolerance of {tolerance:g} m cannot be met; choose one above zero, such as 0.02")
@@ -108,25 +109,17 @@ def lane_surfaces(
     return tuple(surfaces)
 
 
-def ground_elevation(road: Road, point: Float) -> float:
-    """Return the elevation of the road surface below a point, or of its nearer edge beside the road.
-
-    Parameters
-    ----------
-    road : Road
-    point : (2,) float64
-        s and t in metres.
-    """
-    s, t = np.clip(point[:1], 0.0, road.length), point[1:]
-    frame = road.frame(s)
-    place = frame.origin + t[:, None] * frame.left
-    begun = [section for section in road.sections if section.start <= s[0]]
+def ground_elevation(road: Road, s: float, t: float) -> float:
+    """Return the elevation of the road surface at s and t (metres), or of its nearer edge beside the road."""
+    along = np.clip(np.array([s]), 0.0, road.length)
+    frame = road.frame(along)
+    offset = t * frame.left[0]
+    begun = [section for section in road.sections if section.start <= along[0]]
     if not begun or not (begun[-1].left or begun[-1].right):
-        return float(place[0, 2])
-    edges = _edges(road, begun[-1], s).reshape(-1, 2, 3)
+        return float(frame.origin[0, 2] + offset[2])
+    edges = _edges(road, begun[-1], along).reshape(-1, 2, 3)
     across = (edges - frame.origin[0]) @ frame.level_left[0]
-    lateral = float((place - frame.origin)[0] @ frame.level_left[0])
-    # A lane that the point is on is at distance zero; of two that meet there the outer one is a step up to it.
+    lateral = float(offset @ frame.level_left[0])
     beside = np.maximum(np.maximum(across[:, 1] - lateral, lateral - across[:, 0]), 0.0)
     lane = int(np.argmin(beside))
     (left, right), (z_left, z_right) = across[lane], edges[lane, :, 2]
@@ -179,7 +172,7 @@ def _side_edges(
     left_fall, right_fall = np.tan(road.left_crossfall(s)), np.tan(road.right_crossfall(s))
 
     def rise(t: Float) -> Float:
-        return t * np.where(t > 0.0, -left_fall, right_fall)
+        return np.asarray(t * np.where(t > 0.0, -left_fall, right_fall))
 
     point = frame.origin + t[:, None] * frame.left + rise(t)[:, None] * frame.up
     for lane in lanes:

@@ -12,6 +12,7 @@ from shapely import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
+
 from .road_map import Corner, Repeat, Road, RoadMap, RoadObject
 from .sampling import sample
 
@@ -89,7 +90,7 @@ def placed_objects(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tu
     Raises
     ------
     SeipError
-        An object is repeated without end, or stands infinitely far away.
+        An object is repeated too often.
     """
     return tuple(
         placed
@@ -148,25 +149,37 @@ def _in_row(thing: RoadObject, repeat: Repeat, along: float) -> RoadObject:
 
 def _place(road: Road, original: RoadObject, thing: RoadObject) -> PlacedObject:
     """Return an object in map coordinates; ``original`` says where the corners on the road were meant."""
-    s = np.array([thing.s])
-    position = _lifted(road.place(s, np.array([thing.t])), np.array([thing.z_offset]))[0]
-    yaw = float(road.frame(s).heading[0]) + thing.heading
+    position = _point(road, thing.s, thing.t, thing.z_offset)
+    yaw = float(road.frame(np.array([thing.s])).heading[0]) + thing.heading
     turn = _rotation(yaw, thing.pitch, thing.roll)
-    outlines = []
-    for outline in thing.outlines:
-        # Both kinds may be mixed in one outline.
-        base = [_corner(road, corner, original, thing, position, turn) for corner in outline.corners]
-        height = [thing.height if corner.height is None else corner.height for corner in outline.corners]
-        outlines.append(Outline(np.array(base), np.array(height), outline.closed))
-    return _finite(road, _object(road, thing, position, yaw, tuple(outlines)))
 
+    def foot(corner: Corner) -> Float:
+        if not corner.on_road:
+            return np.asarray(position + turn @ np.array([corner.along, corner.aside, corner.up]))
+        s, t = corner.along + thing.s - original.s, corner.aside + thing.t - original.t
+        return _point(road, s, t, corner.up + thing.z_offset - original.z_offset)
 
-def _corner(road: Road, corner: Corner, original: RoadObject, thing: RoadObject, position: Float, turn: Float) -> Float:
-    if not corner.on_road:
-        return np.asarray(position + turn @ np.array([corner.along, corner.aside, corner.up]))
-    s, t = corner.along + thing.s - original.s, corner.aside + thing.t - original.t
-    up = corner.up + thing.z_offset - original.z_offset
-    return _lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0]
+    def height(corner: Corner) -> float:
+        return thing.height if corner.height is None else corner.height
+
+    return PlacedObject(
+        road_id=road.id,
+        id=thing.id,
+        name=thing.name,
+        kind=thing.kind,
+        position=position,
+        yaw=yaw,
+        pitch=thing.pitch,
+        roll=thing.roll,
+        length=thing.length,
+        width=thing.width,
+        height=thing.height,
+        radius=thing.radius,
+        outlines=tuple(
+            Outline(np.array([*map(foot, outline.corners)]), np.array([*map(height, outline.corners)]), outline.closed)
+            for outline in thing.outlines
+        ),
+    )
 
 
 def _strip(road: Road, thing: RoadObject, repeat: Repeat) -> PlacedObject:
@@ -199,28 +212,9 @@ def _strip(road: Road, thing: RoadObject, repeat: Repeat) -> PlacedObject:
     return replace(placed, outlines=(outline,) if len(points) else ())
 
 
-def _object(road: Road, thing: RoadObject, position: Float, yaw: float, outlines: tuple[Outline, ...]) -> PlacedObject:
-    return PlacedObject(
-        road_id=road.id,
-        id=thing.id,
-        name=thing.name,
-        kind=thing.kind,
-        position=position,
-        yaw=yaw,
-        pitch=thing.pitch,
-        roll=thing.roll,
-        length=thing.length,
-        width=thing.width,
-        height=thing.height,
-        radius=thing.radius,
-        outlines=outlines,
-    )
-
-
-def _finite(road: Road, placed: PlacedObject) -> PlacedObject:
-    if not np.isfinite(np.vstack([placed.position, *(outline.base for outline in placed.outlines)])).all():
-        raise SeipError(f"road {road.id}: object {placed.id} stands infinitely far away; correct it in the map")
-    return placed
+def _point(road: Road, s: float, t: float, up: float) -> Float:
+    """Return the point, (3,), some metres straight above a place of the road."""
+    return np.asarray(_lifted(road.place(np.array([s]), np.array([t])), np.array([up]))[0])
 
 
 def _lifted(points: Float, height: Float) -> Float:

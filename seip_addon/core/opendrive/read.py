@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
+
 from .document import Node, read_document
 from .profile import NONE, Profile, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
@@ -176,9 +177,9 @@ def _sections(road: Node, end: float) -> tuple[LaneSection, ...]:
     nodes = sorted(road.children("lanes", "laneSection"), key=lambda node: node.number("s"))
     starts = [max(node.number("s"), 0.0) for node in nodes]
     return tuple(
-        LaneSection(start, stop, _side(node, "left", start), _side(node, "right", start))
+        LaneSection(start, min(stop, end), _side(node, "left", start), _side(node, "right", start))
         for node, start, stop in zip(nodes, starts, [*starts[1:], end], strict=True)
-        if start < stop
+        if start < min(stop, end)
     )
 
 

@@ -199,9 +199,9 @@ class Road:
 
     def may_meet(self, area: BaseGeometry) -> bool:
         """Return False only if no lane of the road can reach an area in plan."""
-        line = self.reference_line
-        starts = MultiPoint(line.start[:, :2])
-        return bool(starts.distance(area) <= float(line.length.max()) + self._reach())
+        starts = MultiPoint(self.reference_line.start[:, :2])
+        # Twice, because crossfall on a superelevated road leads a little further out than t.
+        return bool(starts.distance(area) <= self.reference_line.reach + 2.0 * self._reach())
 
     def _reach(self) -> float:
         """Bound how far any lane lies from the reference line, metres."""

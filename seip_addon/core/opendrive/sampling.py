@@ -50,10 +50,8 @@ def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str)
     begin, end = begin[long_enough], end[long_enough] - _BEFORE
     if not begin.size:
         return np.empty((0, 0, 3))
-    with np.errstate(over="ignore", invalid="ignore"):
-        starts = np.concatenate([begin, _refined(curves, begin, end, tolerance, place)])
-        s = np.unique(np.concatenate([starts, end]))
-        points = curves(s)
+    s = np.unique(np.concatenate([_refined(curves, begin, end, tolerance, place), end]))
+    points = curves(s)
     return points[_distinct(s, points)]
 
 
@@ -64,8 +62,6 @@ def _refined(curves: Curves, begin: Float, end: Float, tolerance: float, place: 
     while begin.size:
         s = begin[:, None] + (end - begin)[:, None] * _QUARTERS
         points = curves(s.ravel()).reshape(*s.shape, -1, 3)
-        if not np.isfinite(points).all():
-            raise SeipError(f"{place} runs off to infinity; correct the coefficients of its profiles in the map")
         chord = points[:, :1] + (points[:, -1:] - points[:, :1]) * _QUARTERS[:, None, None]
         deviation = np.linalg.norm(points - chord, axis=-1).reshape(len(s), -1).max(axis=1, initial=0.0)
         split = (deviation > _MARGIN * tolerance) & (end - begin > _SHORTEST_STEP)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from ..errors import SeipError
 from .lanes import ground_elevation
 from .road_map import Road, RoadMap
 
@@ -59,13 +58,7 @@ class PlacedSignal:
 
 
 def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedSignal, ...]:
-    """Return the signals of a map, those in an area of the plan (map coordinates) if one is given.
-
-    Raises
-    ------
-    SeipError
-        A signal stands infinitely far away.
-    """
+    """Return the signals of a map, those in an area of the plan (map coordinates) if one is given."""
     return tuple(
         signal
         for road in road_map.roads
@@ -78,8 +71,6 @@ def _signals(road: Road) -> Iterator[PlacedSignal]:
     for signal in road.signals:
         s, t = np.array([signal.s]), np.array([signal.t])
         position = road.place(s, t)[0] + np.array([0.0, 0.0, signal.z_offset])
-        if not np.isfinite(position).all():
-            raise SeipError(f"road {road.id}: signal {signal.id} stands infinitely far away; correct it in the map")
         yield PlacedSignal(
             road_id=road.id,
             id=signal.id,
@@ -94,5 +85,5 @@ def _signals(road: Road) -> Iterator[PlacedSignal]:
             s=signal.s,
             t=signal.t,
             z_offset=signal.z_offset,
-            ground=ground_elevation(road, np.array([signal.s, signal.t])),
+            ground=ground_elevation(road, signal.s, signal.t),
         )

@@ -1,0 +1,103 @@
+"""What goes into the extension, and what does not."""
+
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name, parse_wheel_filename
+
+pytest.importorskip("bpy", reason="Blender's extension tool comes with the bpy module")
+
+from headless import build_extension
+
+ROOT = Path(__file__).resolve().parents[2]
+FAKE_WHEEL = "thing-1.0-py3-none-any.whl"
+
+
+@pytest.fixture
+def built(tmp_path, monkeypatch):
+    """The zip for Linux, with an empty wheel in place of the real ones, and a stray file in the checkout."""
+    wheel = tmp_path / FAKE_WHEEL
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("thing-1.0.dist-info/WHEEL", "Wheel-Version: 1.0\n")
+    monkeypatch.setattr(build_extension, "STAGING", tmp_path / "staging")
+    monkeypatch.setattr(build_extension, "fetch_wheels", lambda _platform: [wheel])
+    return build_extension.build("linux-x64", tmp_path / "out")
+
+
+def test_the_checkout_itself_is_a_valid_extension():
+    build_extension.blender_extension("validate", str(ROOT))
+
+
+def test_the_zip_holds_the_add_on_and_nothing_else(built):
+    with zipfile.ZipFile(built) as archive:
+        names = set(archive.namelist())
+    expected = {"blender_manifest.toml", "__init__.py", "LICENSE", f"wheels/{FAKE_WHEEL}"}
+    package = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "seip_addon").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert names == expected | package
+
+
+def test_the_manifest_in_the_zip_lists_platform_and_wheels(built):
+    with zipfile.ZipFile(built) as archive:
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    assert manifest["platforms"] == ["linux-x64"]
+    assert manifest["wheels"] == [f"./wheels/{FAKE_WHEEL}"]
+    kept = build_extension.manifest()
+    assert {key: manifest[key] for key in kept} == kept
+
+
+def test_one_version_stands_in_manifest_and_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert build_extension.manifest()["version"] == project["version"]
+
+
+def test_blender_brings_its_own_numpy():
+    assert not {Requirement(pin).name.lower() for pin in build_extension.pins()} & {"numpy", "bpy"}
+
+
+def test_the_extension_tool_refuses_with_its_own_words(tmp_path):
+    with pytest.raises(SystemExit, match="refused to validate"):
+        build_extension.blender_extension("validate", str(tmp_path))
+
+
+def test_the_root_package_is_lazy():
+    """A checkout of any name can be imported without loading the add-on a second time."""
+    script = (
+        "import importlib.util, sys\n"
+        f"spec = importlib.util.spec_from_file_location('a-b', {str(ROOT / '__init__.py')!r},"
+        f" submodule_search_locations=[{str(ROOT)!r}])\n"
+        "module = importlib.util.module_from_spec(spec); sys.modules['a-b'] = module; spec.loader.exec_module(module)\n"
+        "assert not [name for name in sys.modules if 'seip_addon' in name or name == 'bpy']\n"
+        "module.register(); module.unregister()\n"
+        "assert 'a-b.seip_addon' in sys.modules and 'seip_addon' not in sys.modules\n"
+    )
+    command = [sys.executable, "-c", script]
+    subprocess.run(command, check=True, timeout=120, stdin=subprocess.DEVNULL)  # noqa: S603  # our own script
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", build_extension.WHEEL_TAGS)
+def test_every_pin_has_one_wheel_for_each_python(platform, tmp_path, monkeypatch):
+    if platform != "linux-x64":
+        monkeypatch.setattr(build_extension, "WHEELS", tmp_path)
+    wheels = [parse_wheel_filename(path.name) for path in build_extension.fetch_wheels(platform)]
+    for pin in map(Requirement, build_extension.pins()):
+        for python in build_extension.PYTHONS:
+            tag = python.replace(".", "")
+            fitting = [
+                version
+                for name, version, _, tags in wheels
+                if name == canonicalize_name(pin.name)
+                if {t.interpreter for t in tags} & {"py3", f"cp{tag}"}
+            ]
+            assert len(fitting) == 1, (pin.name, python)
+            assert fitting[0] in pin.specifier
+    assert len({name for name, *_ in wheels}) == len(build_extension.pins())

@@ -1,0 +1,107 @@
+"""Imports point one way, and the core runs where there is no Blender."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "addon_utils", "bpy_extras", "gpu", "bl_ext"}
+
+WITHOUT_BLENDER = """
+import importlib, pkgutil, sys
+
+class NoBlender:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {names}:
+            raise ModuleNotFoundError("the core asked for " + name)
+
+sys.meta_path.insert(0, NoBlender())
+import seip_addon.core as core
+names = [module.name for module in pkgutil.walk_packages(core.__path__, "seip_addon.core.")]
+for name in names:
+    importlib.import_module(name)
+assert not {names} & set(sys.modules)
+print(len(names))
+"""
+
+
+def modules(folder: str) -> list[Path]:
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Full names of what a file imports, wherever in it."""
+    package = path.relative_to(ROOT).parts[:-1]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            stem = ".".join([*base, *([node.module] if node.module else [])])
+            yield from (f"{stem}.{alias.name}" for alias in node.names)
+
+
+def top(name: str) -> str:
+    return name.partition(".")[0]
+
+
+def test_every_module_of_the_core_loads_without_blender():
+    outcome = subprocess.run(  # noqa: S603  # our own interpreter and script
+        [sys.executable, "-c", WITHOUT_BLENDER.format(names=BLENDERS_OWN)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        stdin=subprocess.DEVNULL,
+    )
+    assert outcome.returncode == 0, outcome.stderr
+    assert int(outcome.stdout) == len(modules("seip_addon/core")) - 1  # the package itself is not listed
+
+
+@pytest.mark.parametrize("path", modules("seip_addon/core"), ids=lambda path: path.stem)
+def test_the_core_imports_nothing_above_it(path):
+    names = set(imported(path))
+    above = {name for name in names if name.startswith("seip_addon") and not name.startswith("seip_addon.core")}
+    assert not above
+    assert not {name for name in names if top(name) == "headless"}
+    blenders = {top(name) for name in names} & BLENDERS_OWN
+    # The BVH tree exists in Blender's Python alone; it is imported where such a ray caster is made.
+    assert blenders <= ({"mathutils"} if path.stem == "ray_casting" else set())
+
+
+@pytest.mark.parametrize("path", modules("seip_addon/scene"), ids=lambda path: path.stem)
+def test_the_bridge_imports_neither_commands_nor_operators(path):
+    above = ("headless", "seip_addon.operators", "seip_addon.panels", "seip_addon.properties", "seip_addon.preferences")
+    assert not {name for name in imported(path) if name.startswith(above)}
+
+
+@pytest.mark.parametrize("path", modules("seip_addon"), ids=lambda path: str(path.relative_to(ROOT)))
+def test_the_add_on_never_names_itself(path):
+    """Installed, it is called `bl_ext.user_default.seip.seip_addon`: only relative imports find it."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    absolute = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
+    absolute += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+    assert "seip_addon" not in {top(name) for name in absolute if name}
+
+
+@pytest.mark.parametrize("path", [*modules("seip_addon"), *modules("headless")], ids=lambda p: str(p.relative_to(ROOT)))
+def test_what_is_imported_is_pinned(path):
+    """Torch may be imported by the detector alone; SciPy is for oracles."""
+    own = {"seip_addon", "headless"}
+    ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "pulp", "shapely", "tqdm"}
+    detector = {"torch"} if "detection" in path.parts else set()
+    foreign = {top(name) for name in imported(path)} - set(sys.stdlib_module_names) - own
+    assert foreign <= ours | BLENDERS_OWN | detector
+
+
+def test_an_import_that_points_up_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
+    path = tmp_path / "seip_addon" / "core" / "wrong.py"
+    path.parent.mkdir(parents=True)
+    path.write_text("def f():\n    from ..scene import read\n    from . import site\n    import bpy.types\n")
+    assert set(imported(path)) == {"seip_addon.scene.read", "seip_addon.core.site", "bpy.types"}

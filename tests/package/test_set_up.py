@@ -1,0 +1,118 @@
+"""A system that lacks something is told what, and how to get it, before anything is downloaded."""
+
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from headless import set_up, system_libraries
+
+ROOT = Path(__file__).resolve().parents[2]
+GROUPS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
+PINS = [Requirement(pin) for name in ("extension", "blender", "test", "lint") for pin in GROUPS[name]]
+PINS_HERE = {canonicalize_name(pin.name): pin for pin in PINS if pin.marker is None or pin.marker.evaluate()}
+
+
+@pytest.fixture
+def complete_system(monkeypatch):
+    monkeypatch.setattr(set_up, "missing_libraries", dict)
+    monkeypatch.setattr(set_up.importlib.util, "find_spec", lambda _name: object())
+
+
+@pytest.mark.usefixtures("complete_system")
+@pytest.mark.parametrize("version", [(3, 8, 1), (3, 10, 0), (3, 12, 1), (3, 14, 0), (4, 0, 0)])
+def test_other_pythons_are_refused_in_one_sentence(monkeypatch, version):
+    monkeypatch.setattr(sys, "version_info", version)
+    complaint = set_up.what_is_missing()
+    assert f"Python {version[0]}.{version[1]}," in complaint
+    assert "make PYTHON=python3.13" in complaint
+    assert "\n" not in complaint
+
+
+@pytest.mark.usefixtures("complete_system")
+@pytest.mark.parametrize("version", [(3, 11, 2), (3, 13, 5)])
+def test_supported_pythons_lack_nothing(monkeypatch, version):
+    monkeypatch.setattr(sys, "version_info", version)
+    assert set_up.what_is_missing() is None
+
+
+def test_all_that_is_missing_comes_in_one_line(monkeypatch):
+    monkeypatch.setattr(system_libraries, "_loads", lambda library: library not in {"libXi.so.6", "libEGL.so.1"})
+    monkeypatch.setattr(set_up.importlib.util, "find_spec", lambda _name: None)
+    assert set_up.what_is_missing() == (
+        "this system lacks the module ensurepip, libEGL.so.1, libXi.so.6; "
+        "install with: apt-get install --no-install-recommends python3-venv libegl1 libxi6"
+    )
+
+
+def test_a_library_that_is_not_there_is_noticed(monkeypatch):
+    monkeypatch.setattr(system_libraries, "DEBIAN_PACKAGES", {"libc.so.6": "libc6", "libnowhere.so.7": "libnowhere7"})
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert system_libraries.missing_libraries() == {"libnowhere.so.7": "libnowhere7"}
+
+
+@pytest.mark.usefixtures("complete_system")
+def test_a_finished_environment_is_left_alone(monkeypatch, tmp_path):
+    installed = []
+    monkeypatch.setattr(set_up, "install", installed.append)
+    (tmp_path / "set-up").write_text("another Python's")
+    assert set_up.main([str(tmp_path)]) is None
+    assert set_up.main([str(tmp_path)]) is None
+    assert installed == [tmp_path]
+
+
+@pytest.mark.usefixtures("complete_system")
+def test_a_folder_that_is_no_environment_is_never_cleared(tmp_path):
+    treasure = tmp_path / "treasure.txt"
+    treasure.write_text("mine")
+    with pytest.raises(SystemExit, match="no virtual environment"):
+        set_up.main([str(tmp_path)])
+    assert treasure.read_text() == "mine"
+
+
+def test_a_step_that_fails_ends_the_set_up():
+    with pytest.raises(SystemExit, match="set-up stopped"):
+        set_up.run(sys.executable, "-c", "raise SystemExit(3)")
+
+
+def test_set_up_speaks_old_python():
+    """Syntax that Python 3.8 cannot read would show it a traceback instead of the sentence."""
+    for name in ("set_up.py", "system_libraries.py", "__init__.py"):
+        compile((ROOT / "headless" / name).read_text(encoding="utf-8"), name, "exec", dont_inherit=True)
+        __import__("ast").parse((ROOT / "headless" / name).read_text(encoding="utf-8"), feature_version=(3, 8))
+
+
+def test_every_pin_is_exact_and_stands_once():
+    names = [canonicalize_name(pin.name) for pin in PINS if pin.name not in {"bpy", "numpy"}]
+    assert len(names) == len(set(names))
+    assert all(str(pin.specifier).startswith("==") for pin in PINS)
+    assert "*" not in "".join(str(pin.specifier) for pin in PINS)
+
+
+def test_what_the_pinned_packages_need_is_pinned_too():
+    unpinned = {
+        (name, need.name)
+        for name in PINS_HERE
+        for need in map(Requirement, metadata.requires(name) or [])
+        if need.marker is None or need.marker.evaluate({"extra": ""})
+        if canonicalize_name(need.name) not in PINS_HERE
+    }
+    assert not unpinned
+
+
+def test_the_installed_versions_are_the_pinned_ones():
+    for name, pin in PINS_HERE.items():
+        assert metadata.version(name) in pin.specifier, name
+
+
+def test_make_knows_every_target_of_its_help():
+    text = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout  # noqa: S607
+    targets = [line.split()[1] for line in text.splitlines() if line.startswith("make ") and "=" not in line.split()[1]]
+    assert {"demo", "test", "lint", "scenes", "study", "extension", "clean"} <= set(targets)
+    for target in targets:
+        subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, check=True)  # noqa: S603, S607
