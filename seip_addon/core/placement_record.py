@@ -76,6 +76,7 @@ def placement_record(  # noqa: PLR0913 - one thing for each part of the file
     run: Run,
     *,
     weighted: bool,
+    cheapest: bool = False,
     greedy: Placement | None = None,
 ) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
@@ -90,7 +91,9 @@ def placement_record(  # noqa: PLR0913 - one thing for each part of the file
     run : Run
         What it was made with.
     weighted : bool
-        Whether the objective counted the targets' weights.
+        Whether the targets' weights counted.
+    cheapest : bool
+        Whether the least price for a coverage was sought, not the most coverage.
     greedy : Placement, optional
         The greedy solution of the same problem, to compare with.
 
@@ -112,6 +115,7 @@ def placement_record(  # noqa: PLR0913 - one thing for each part of the file
         },
         "objective": {
             "kind": "weighted" if weighted else "vanilla",
+            "sought": "least price" if cheapest else "most coverage",
             "value": _significant(placement.objective),
             "bound": _significant(placement.bound),
             "gap": _significant(placement.gap),

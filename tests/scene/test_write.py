@@ -151,6 +151,7 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     monkeypatch.setattr("seip_addon.scene.render.WIDTH", 480)
     monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 270)
     write_result(scene, example.site, example.deployment)
+    bpy.context.view_layer.update()
     everything = [bpy.data.objects, bpy.data.meshes, bpy.data.scenes, bpy.data.worlds, bpy.data.cameras]
     everything += [bpy.data.lights, bpy.data.images, bpy.data.collections]
     counts, users, kept = [len(data) for data in everything], fingerprint(scene.objects), settings_of(scene)
