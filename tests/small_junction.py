@@ -51,7 +51,7 @@ def make_example(spacing: float = 2.0, reach: float = 55.0, heights: tuple[float
     geometry = make_geometry(reach)
     site = make_site(geometry, spacing, heights)
     models = load_catalogue()
-    visible = lines_of_sight(site, geometry, models)
+    visible = lines_of_sight(site, models)
     return Example(geometry, site, models, visible, deploy(site, models, visible, greedy(site, visible, 3)))
 
 
@@ -139,7 +139,7 @@ def make_candidates(geometry: SceneGeometry, reach: float, heights: tuple[float,
     )
 
 
-def lines_of_sight(site: Site, geometry: SceneGeometry, models: dict[str, LidarModel]) -> np.ndarray:
+def lines_of_sight(site: Site, models: dict[str, LidarModel]) -> np.ndarray:
     """Return which pose sees which target when obstacles are endless in height and ranges a sixth."""
     trunks = [shapely.box(x - 0.8, y - 0.6, x + 0.8, y + 0.6) for x, y in TREES]
     walls = shapely.union_all([*(shapely.box(a, b, c, d) for a, b, c, d, _ in BUILDINGS), *trunks])

@@ -122,13 +122,11 @@ def deploy(
         _sensor(
             site,
             models,
-            label=f"S{rank + 1}",
-            pose=int(pose),
-            alone=_share(rows[rank]),
-            added=_share(rows[rank] & (before[rank] == 0)),
-            marginal=_share(rows[rank] & (seen_by == 1)),
+            rank,
+            int(pose),
+            (_share(row), _share(row & (before[rank] == 0)), _share(row & (seen_by == 1))),
         )
-        for rank, pose in enumerate(order)
+        for rank, (pose, row) in enumerate(zip(order, rows, strict=True))
     )
     return Deployment(
         sensors=sensors,
@@ -161,12 +159,13 @@ def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Int
 
 
 def _sensor(
-    site: Site, models: Mapping[str, LidarModel], *, label: str, pose: int, alone: float, added: float, marginal: float
+    site: Site, models: Mapping[str, LidarModel], rank: int, pose: int, shares: tuple[float, float, float]
 ) -> Sensor:
+    alone, added, marginal = shares
     candidates = site.candidates
     position = int(candidates.position_of[pose])
     return Sensor(
-        label=label,
+        label=f"S{rank + 1}",
         pose=pose,
         model=models[str(candidates.sensor[pose])],
         position_name=str(candidates.position_name[position]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Float = NDArray[np.float64]
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
-SENSOR_MARK = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
+SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
 MOST_LABELLED = 40
 """More sensors than these get no labels on the picture."""
@@ -64,9 +64,8 @@ def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) 
 def summary(deployment: Deployment) -> str:
     """Return the result in one line."""
     one = len(deployment.sensors) == 1
-    parts = [
-        f"{len(deployment.sensors)} {'sensor sees' if one else 'sensors see'} {percent(deployment.coverage)} of the road"
-    ]
+    sensors = "1 sensor sees" if one else f"{len(deployment.sensors)} sensors see"
+    parts = [f"{sensors} {percent(deployment.coverage)} of the road"]
     if deployment.central is not None:
         parts.append(f"{percent(deployment.central)} of its weighted part")
     parts.append(f"{percent(deployment.seen_twice)} seen twice")
@@ -88,11 +87,10 @@ def _draw_callouts(axes: Axes, points: Float, words: list[str], zorder: float) -
         for label in words
     ]
     point = axes.figure.dpi / 72
-    renderer = axes.figure.canvas.get_renderer()
-    extents = [text.get_window_extent(renderer) for text in texts]
+    extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents]) + 2 * LABEL_PADDING * LABEL_SIZE * point
     anchors = axes.transData.transform(points)
-    bounds = axes.get_window_extent(renderer).extents
+    bounds = axes.get_window_extent().padded(-4.0 * point).extents
     centres = axes.transData.inverted().transform(place_callouts(anchors, sizes, bounds, MARK_RADIUS * point))
     for text, start, end in zip(texts, points, centres, strict=True):
         text.set_position(end)

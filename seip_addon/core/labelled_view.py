@@ -51,10 +51,10 @@ def save_labelled_view(
     anchors : (k, 2) float64
         Where each sensor is on the picture, in shares of its width and height from the lower left.
     """
-    pixels = imread(picture)
+    pixels = imread(str(picture))
     height, width = pixels.shape[0] / DPI, pixels.shape[1] / DPI
     figure = Figure((width, height + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
-    canvas = FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)  # measures text
     page = height + HEAD + FOOT
     view = figure.add_axes((0.0, FOOT / page, 1.0, height / page))
     view.set(xticks=(), yticks=(), facecolor=HAZE)
@@ -65,7 +65,7 @@ def save_labelled_view(
     draw_title(figure, site, deployment, MARGIN)
     _draw_legend(figure, deployment)
     with whole_file(path) as temporary:
-        canvas.print_png(temporary, metadata={"Software": None})
+        figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
 def _draw_legend(figure: Figure, deployment: Deployment) -> None:

@@ -69,13 +69,14 @@ def versions(**more: str) -> dict[str, str]:
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 
-def placement_record(
+def placement_record(  # noqa: PLR0913 - one thing for each part of the file
     site: Site,
     deployment: Deployment,
     placement: Placement,
     run: Run,
     *,
     weighted: bool,
+    cheapest: bool = False,
     greedy: Placement | None = None,
 ) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
@@ -90,7 +91,9 @@ def placement_record(
     run : Run
         What it was made with.
     weighted : bool
-        Whether the objective counted the targets' weights.
+        Whether the targets' weights counted.
+    cheapest : bool
+        Whether the least price for a coverage was sought, not the most coverage.
     greedy : Placement, optional
         The greedy solution of the same problem, to compare with.
 
@@ -112,6 +115,7 @@ def placement_record(
         },
         "objective": {
             "kind": "weighted" if weighted else "vanilla",
+            "sought": "least price" if cheapest else "most coverage",
             "value": _significant(placement.objective),
             "bound": _significant(placement.bound),
             "gap": _significant(placement.gap),
@@ -154,7 +158,7 @@ def load_placement_record(path: str | os.PathLike[str]) -> Record:
         There is no such file, or it is no placement of a version that this program knows.
     """
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        record: Record = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
     except ValueError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -31,17 +31,18 @@ if TYPE_CHECKING:
     from .site import Site
 
     Float = NDArray[np.float64]
+    Style = dict[str, Any]
 
 DPI = 160
 MAP_WIDTH, PANEL_WIDTH, MARGIN, HEAD = 9.6, 3.7, 0.3, 0.95  # inches
 SHORTEST_MAP, TALLEST_MAP = 6.6, 10.5  # inches
 AROUND = 0.06  # of the region's size, shown around it
 
-LAND, PAVEMENT, ROAD, KERB = "#eceee8", "#dad7cf", "#b9bcc0", "#8f949a"
+LAND, GROUND, PAVEMENT, ROAD, KERB = "#f3f4f1", "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
 HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
 WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
-ROWS = 12
-"""More sensors than these are counted, not listed, in the panel."""
+ROW, LINE = 0.42, 0.24  # inches that a sensor and a line of the legend take in the panel
+CRACK = 0.06  # metres
 FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
 
 BACK, SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(9)
@@ -65,7 +66,7 @@ def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: 
     """
     figure = draw_plan(geometry, site, deployment)
     with whole_file(path) as temporary:
-        figure.canvas.print_png(temporary, metadata={"Software": None})
+        figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
 def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Figure:
@@ -74,7 +75,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     width, height = window[2] - window[0], window[3] - window[1]
     map_height = MAP_WIDTH * height / width
     figure = Figure((MAP_WIDTH + PANEL_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
-    FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)  # measures text
     plan = _axes(figure, MARGIN, MARGIN, MAP_WIDTH, map_height)
     plan.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
     shown = shapely.box(*window)
@@ -91,7 +92,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     panel = _axes(figure, MAP_WIDTH + 2 * MARGIN, MARGIN, PANEL_WIDTH, map_height)
     panel.set(xlim=(0.0, PANEL_WIDTH), ylim=(map_height, 0.0), facecolor=PAPER)
     panel.axis("off")
-    _Panel(panel).draw(geometry, site, deployment, norm)
+    _Panel(panel).draw(geometry, site, deployment, norm, map_height)
     return figure
 
 
@@ -117,14 +118,12 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
-    ground = [_footprint(mesh, shown) for mesh in geometry.ground]
-    around = [part for part in ground if part.contains(geometry.region)]  # a plane below everything
-    for part in ground:
-        if part not in around:
-            _draw_area(plan, part, facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.3, zorder=SURFACE)
-    _draw_area(plan, geometry.candidate_areas, facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.3, zorder=SURFACE)
+    for mesh in geometry.ground:
+        _draw_area(plan, _footprint(mesh, shown), facecolor=GROUND, edgecolor="none", zorder=BACK)
+    pavement = shapely.intersection(geometry.candidate_areas, shown)
+    _draw_area(plan, _healed(pavement), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
-    _draw_area(plan, roads, facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+    _draw_area(plan, _healed(roads), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
 
 
 def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
@@ -132,6 +131,11 @@ def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
     flat = shapely.polygons(mesh.triangles[:, :, :2])
     flat = flat[(shapely.area(flat) > FLAT) & shapely.intersects(flat, shown)]
     return shapely.union_all(flat, grid_size=1e-3)
+
+
+def _healed(area: BaseGeometry) -> BaseGeometry:
+    """Close the cracks between surfaces that were modelled one by one."""
+    return area.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre")
 
 
 def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
@@ -170,7 +174,8 @@ def _road_level(site: Site, points: Float) -> Float:
     """Return the height of the road at the target next to each point."""
     targets = site.targets.xyz
     nearest = shapely.STRtree(shapely.points(targets[:, :2])).nearest(shapely.points(points[:, :2]))
-    return targets[nearest, 2]
+    level: Float = targets[nearest, 2]
+    return level
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
@@ -196,7 +201,7 @@ def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> No
         )
 
 
-def _draw_area(plan: Axes, area: BaseGeometry, **style: object) -> None:
+def _draw_area(plan: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw a polygon with its holes, or several."""
     polygons = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty]
     rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
@@ -211,8 +216,8 @@ def _draw_candidates(plan: Axes, site: Site) -> None:
         plan.plot(position[these, 0], position[these, 1], zorder=CANDIDATE, **style)
 
 
-SIDEWALK_MARK = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
-POLE_MARK = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
+SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
+POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
 
 
 def _draw_scale(plan: Axes, width: float) -> None:
@@ -277,26 +282,31 @@ class _Panel:
         self.axes = axes
         self.y = 0.0
 
-    def draw(self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize) -> None:
-        self._sensors(deployment)
+    def draw(
+        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, height: float
+    ) -> None:
+        """Write all parts, with as many sensors as there is room for in the height."""
+        weights = sorted({area.weight for area in geometry.weighted_regions})
+        below = 3.72 + LINE * (3 + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas))
+        self._sensors(deployment, rows=max(1, int((height - below) / ROW)))
         self._targets(site, deployment)
-        self._map(geometry, site)
+        self._map(geometry, site, weights)
         self._heights(heights)
 
-    def _sensors(self, deployment: Deployment) -> None:
+    def _sensors(self, deployment: Deployment, rows: int) -> None:
         self._heading("Sensors")
         markers = markers_of(deployment)
-        for sensor in deployment.sensors[:ROWS]:
+        for sensor in deployment.sensors[:rows]:
             self._mark(marker=markers[sensor.model.key], **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
             self._text(0.34, sensor.label, weight="bold")
             self._text(0.70, f"{_short(sensor.model.name, 28)}, {sensor.height:.3g} m")
             self._text(PANEL_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
-            self.y += 0.18
+            self.y += ROW - LINE
             self._text(0.70, _short(sensor.position_name, 40), color=SOFT_INK, size=8)
-            self.y += 0.24
-        if len(deployment.sensors) > ROWS:
-            self._text(0.34, f"and {len(deployment.sensors) - ROWS} more", color=SOFT_INK)
-            self.y += 0.24
+            self.y += LINE
+        if len(deployment.sensors) > rows:
+            self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
+            self.y += LINE
         self._text(0.0, "Per cent of the road that each sees alone", color=SOFT_INK, size=8)
         self.y += 0.38
 
@@ -307,17 +317,19 @@ class _Panel:
             self._swatch(facecolor=SEEN_COLOURS[times])
             self._text(0.34, SEEN_WORDS[times])
             self._text(PANEL_WIDTH, percent(counts[times] / len(site.targets)), ha="right", weight="bold")
-            self.y += 0.24
+            self.y += LINE
         self._text(0.0, f"{len(site.targets):,} points, {site.targets.spacing:g} m apart", color=SOFT_INK, size=8)
         self.y += 0.38
 
-    def _map(self, geometry: SceneGeometry, site: Site) -> None:
+    def _map(self, geometry: SceneGeometry, site: Site, weights: Iterable[float]) -> None:
         self._heading("Map")
         self._swatch(facecolor="none", edgecolor=INK, linewidth=1.1)
         self._line("region of interest")
-        for area in geometry.weighted_regions:
+        for weight in weights:
+            names = [area.name for area in geometry.weighted_regions if area.weight == weight]
+            words = f"{_short(names[0], 26)} counts" if len(names) == 1 else f"{len(names)} areas that count"
             self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
-            self._line(f"{_short(area.name, 26)}, counts {area.weight:g} times")
+            self._line(f"{words} {weight:g} times")
         for areas, colour, hatch, words in (
             (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
             (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
@@ -337,7 +349,8 @@ class _Panel:
 
     def _heights(self, norm: Normalize) -> None:
         self._heading("Obstacles, height above the road")
-        ramp = np.linspace(norm.vmin, norm.vmax, 128)[None, :]
+        highest = float(norm.vmax or 0.0)
+        ramp = np.linspace(0.0, highest, 128)[None, :]
         self.axes.imshow(
             HEIGHTS(norm(ramp)), extent=(0.0, 2.2, self.y + 0.16, self.y), aspect="auto", interpolation="nearest"
         )
@@ -345,7 +358,7 @@ class _Panel:
         self.y += 0.3
         for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
             unit = " m" if share == 1.0 else ""
-            self._text(2.2 * share, f"{norm.vmax * share:g}{unit}", ha=align, size=8)
+            self._text(2.2 * share, f"{highest * share:g}{unit}", ha=align, size=8)
 
     def _heading(self, words: str) -> None:
         self._text(0.0, words, weight="bold", size=11, y=self.y + 0.04)
@@ -354,16 +367,16 @@ class _Panel:
 
     def _line(self, words: str) -> None:
         self._text(0.34, words)
-        self.y += 0.24
+        self.y += LINE
 
-    def _text(self, x: float, words: str, *, y: float | None = None, **style: object) -> None:
-        style = {"size": 9, "color": INK, "ha": "left", "va": "center", "parse_math": False} | style
-        self.axes.text(x, self.y if y is None else y, words, **style)
+    def _text(self, x: float, words: str, *, y: float | None = None, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        plain: Style = {"size": 9, "color": INK, "ha": "left", "va": "center", "parse_math": False}
+        self.axes.text(x, self.y if y is None else y, words, **plain | style)
 
-    def _swatch(self, **style: object) -> None:
+    def _swatch(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
         self.axes.add_patch(Rectangle((0.02, self.y - 0.07), 0.2, 0.14, **style))
 
-    def _mark(self, **style: object) -> None:
+    def _mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
         self.axes.plot(0.12, self.y, clip_on=False, **style)
 
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Matrix, Vector
+from mathutils import Matrix
 
 from ..core.errors import SeipError
 from ..core.labelled_view import save_labelled_view
+from ..core.viewpoint import Viewpoint, frame
 from . import collections as contract
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES = 16
-AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(48.0)  # of the camera as seen from the region: south-west
+AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(48.0)  # of the camera, seen from the region
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SUN_DIRECTION = (math.radians(38.0), math.radians(-18.0), math.radians(20.0))
@@ -48,7 +48,7 @@ UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 def save_rendered_view(
     path: str | os.PathLike[str], scene: bpy.types.Scene, site: Site, deployment: Deployment
 ) -> None:
-    """Render the scene from an oblique angle in the south-west and label the sensors, as PNG.
+    """Render the scene from an oblique angle in the south and label the sensors, as PNG.
 
     The picture is taken in a scene of its own that shares the objects and is
     removed afterwards, under its own camera, light and settings: the user's
@@ -67,13 +67,13 @@ def save_rendered_view(
     """
     with tempfile.TemporaryDirectory(prefix="seip-") as folder, _stage(scene) as stage:
         raw = Path(folder) / "view.png"
-        camera = _add_camera(stage, site)
+        viewpoint = _add_camera(stage, site)
         _add_light(stage)
         _set_up(stage, raw)
         with _silence():
             bpy.ops.render.render(scene=stage.name, write_still=True)
-        anchors = [_on_picture(stage, camera, sensor.xyz) for sensor in deployment.sensors]
-        save_labelled_view(path, raw, site, deployment, np.array(anchors).reshape(-1, 2))
+        sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
+        save_labelled_view(path, raw, site, deployment, viewpoint.project(sensors))
 
 
 @contextmanager
@@ -122,45 +122,19 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     ]
 
 
-def _add_camera(stage: bpy.types.Scene, site: Site) -> bpy.types.Object:
-    """Add a camera that has the whole region in its picture and make it the scene's."""
+def _add_camera(stage: bpy.types.Scene, site: Site) -> Viewpoint:
+    """Add a camera that has the whole region in its picture, and return where it stands."""
     data = bpy.data.cameras.new("SEIP view")
     data.angle = FIELD_OF_VIEW
+    slope = math.tan(FIELD_OF_VIEW / 2.0)
+    slopes = np.array((slope, slope * HEIGHT / WIDTH))
+    tight = frame(site.targets.xyz, AZIMUTH, ELEVATION, slopes / ROOM)
     camera = bpy.data.objects.new("SEIP view", data)
-    backwards = Vector(
-        (math.cos(ELEVATION) * math.cos(AZIMUTH), math.cos(ELEVATION) * math.sin(AZIMUTH), math.sin(ELEVATION))
-    )
-    turn = backwards.to_track_quat("Z", "Y").to_matrix()
-    place, distance = _viewpoint(np.array(turn), site.targets.xyz)
-    camera.matrix_world = Matrix.Translation(place) @ turn.to_4x4()
-    data.clip_start, data.clip_end = 0.1, 10.0 * distance + 1000.0
+    camera.matrix_world = Matrix.Translation(tight.place) @ Matrix(tight.axes.tolist()).to_4x4()
+    data.clip_end = 2.0 * float(np.linalg.norm(site.targets.xyz - tight.place, axis=1).max())
     stage.collection.objects.link(camera)
     stage.camera = camera
-    return camera
-
-
-def _viewpoint(axes: Float, points: Float) -> tuple[Float, float]:
-    """Return the nearest place from which a camera with these axes sees all points, and its distance from them.
-
-    A point p in camera axes is in the picture when |x| <= a·d and |y| <= b·d,
-    d being its depth; the four bounds give the place directly.
-
-    Parameters
-    ----------
-    axes : (3, 3) float64
-        Right, up and backwards of the camera as columns.
-    points : (n, 3) float64
-    """
-    right, up, back = (points @ axes).T
-    slope = np.array((math.tan(FIELD_OF_VIEW / 2.0), math.tan(FIELD_OF_VIEW / 2.0) * HEIGHT / WIDTH)) / ROOM
-    needed = []
-    centre = []
-    for across, a in zip((right, up), slope, strict=True):
-        high, low = (across + a * back).max(), (-across + a * back).max()
-        needed.append((high + low) / (2.0 * a))
-        centre.append((high - low) / 2.0)
-    depth = max(needed)
-    return axes @ np.array((*centre, depth)), float(depth - back.mean())
+    return Viewpoint(tight.place, tight.axes, slopes)
 
 
 def _add_light(stage: bpy.types.Scene) -> None:
@@ -199,9 +173,3 @@ def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
     stage.cycles.use_adaptive_sampling = False
     stage.cycles.use_denoising = False
     stage.cycles.max_bounces = 3
-
-
-def _on_picture(stage: bpy.types.Scene, camera: bpy.types.Object, point: Float) -> tuple[float, float]:
-    """Return where a point is on the picture, in shares of its width and height from the lower left."""
-    seen = world_to_camera_view(stage, camera, Vector(point))
-    return seen.x, seen.y

@@ -119,8 +119,8 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
 def _hardware(sensor: Sensor, materials: Sequence[bpy.types.Material]) -> bpy.types.Mesh:
     """Return the body and the post or bracket that carries it, in the axes of the sensor's empty."""
     foot = _turned(sensor.foot - sensor.xyz, -sensor.yaw)
-    top = np.array((0.0, 0.0, -BODY_HEIGHT / 2))
-    pieces = [_cylinder(top, top + (0.0, 0.0, BODY_HEIGHT), BODY_RADIUS)]
+    top = np.array((0.0, 0.0, -BODY_HEIGHT / 2))  # of the post; the optical centre is the body's middle
+    pieces = [_cylinder(top, -top, BODY_RADIUS)]
     if not sensor.on_pole:
         pieces.append(_cylinder(foot, top, POST_RADIUS))
     elif math.hypot(*foot[:2]) > SAME_PLACE:
