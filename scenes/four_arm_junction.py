@@ -27,7 +27,7 @@ def junction_map() -> Map:
     return Map("Four-arm signalised junction", (*arms, *connecting), (junction,))
 
 
-def _arm(  # noqa: PLR0913  # an arm has these properties
+def _arm(  # an arm has these properties
     identity: str,
     name: str,
     azimuth: float,

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SeipError
 from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
 from .problem import TIE, PlacementProblem, canonical_order
 
 SCALE = 1e4
