@@ -110,7 +110,9 @@ def main(argv: list[str]) -> None:
         inputs={"visibility": grid.key},
         warnings=warnings,
     )
-    record = placement_record(site, deployment, placement, run, weighted=goal.weighted, greedy=greedy)
+    record = placement_record(
+        site, deployment, placement, run, weighted=goal.weighted, cheapest=goal.coverage is not None, greedy=greedy
+    )
     _write(options, _Outcome(reading.geometry, site, models, grid, placement, deployment), record)
     session.say(_result_lines(deployment, placement, greedy))
     session.say(f"written to {options.output}/")
