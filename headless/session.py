@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from headless.system_libraries import complaint, missing_libraries
 from seip_addon.core.errors import SeipError
+from seip_addon.core.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -61,6 +62,39 @@ def open_blend(path: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
+
+
+def open_scene(path: Path | None) -> None:
+    """Open the named .blend; in Blender without a name stay with the scene that is open.
+
+    Raises
+    ------
+    SeipError
+        There is nothing to open.
+    """
+    if path is not None:
+        open_blend(path)
+    elif not (in_blender() and bpy.data.filepath):
+        raise SeipError("no scene: name a .blend")
+
+
+def check_folder(folder: Path) -> None:
+    """Make a folder for results and see that it can be written, before the work rather than after.
+
+    Raises
+    ------
+    SeipError
+        The folder cannot be made or written.
+    """
+    with whole_file(folder / ".writable") as probe:
+        probe.touch()
+    (folder / ".writable").unlink()
+
+
+def say(text: str) -> None:
+    """Print a line for the person who runs the command, at once."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 def run(main: Callable[[list[str]], None]) -> NoReturn:

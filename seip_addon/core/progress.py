@@ -33,12 +33,22 @@ class Progress:
 
 def finish(steps: Generator[Progress, None, Result], report: Callable[[Progress], object] | None = None) -> Result:
     """Run work to its end, calling ``report`` at each step, and return its result."""
-    ended: list[Result] = []
-
-    def run() -> Generator[Progress, None, None]:
-        ended.append((yield from steps))
-
-    for progress in run():
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            result: Result = stop.value
+            return result
         if report is not None:
             report(progress)
-    return ended[0]
+
+
+def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+    """Run work as one unit of a larger whole: at each step the whole's progress shows, and it can be stopped there."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            result: Result = stop.value
+            return result
+        yield whole

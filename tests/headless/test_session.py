@@ -7,6 +7,8 @@ import pytest
 
 pytest.importorskip("bpy")
 
+from typing import Never
+
 from headless import session
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
@@ -14,7 +16,7 @@ from seip_addon.core.progress import Progress, finish
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_plain_python_passes_on_all_but_the_program_name():
+def test_plain_python_passes_on_all_but_the_program_name() -> None:
     assert session.arguments(["place.py", "site.blend", "--count", "4"]) == ["site.blend", "--count", "4"]
 
 
@@ -26,13 +28,13 @@ def test_plain_python_passes_on_all_but_the_program_name():
         (["blender", "-P", "x.py", "--", "a", "--", "b"], ["a", "--", "b"]),
     ],
 )
-def test_blender_passes_on_what_follows_the_two_dashes(argv, own, monkeypatch):
+def test_blender_passes_on_what_follows_the_two_dashes(argv, own, monkeypatch) -> None:
     monkeypatch.setattr(session, "in_blender", lambda: True)
     assert session.arguments(argv) == own
 
 
-def test_a_mistake_is_one_line_and_status_1(capsys):
-    def main(_argv):
+def test_a_mistake_is_one_line_and_status_1(capsys) -> None:
+    def main(_argv) -> Never:
         raise SeipError("there is no lane here; move the point")
 
     with pytest.raises(SystemExit) as end:
@@ -41,18 +43,18 @@ def test_a_mistake_is_one_line_and_status_1(capsys):
     assert capsys.readouterr().err == "error: there is no lane here; move the point\n"
 
 
-def test_success_is_status_0():
+def test_success_is_status_0() -> None:
     with pytest.raises(SystemExit) as end:
         session.run(lambda _argv: None)
     assert end.value.code == 0
 
 
-def test_a_defect_keeps_its_traceback():
+def test_a_defect_keeps_its_traceback() -> None:
     with pytest.raises(ZeroDivisionError):
         session.run(lambda _argv: 1 / 0)
 
 
-def test_control_c_ends_with_130_and_one_line():
+def test_control_c_ends_with_130_and_one_line() -> None:
     script = (
         "import time\nfrom headless import session\n"
         "def main(argv):\n    print('ready', flush=True)\n    time.sleep(60)\nsession.run(main)\n"
@@ -68,7 +70,7 @@ def test_control_c_ends_with_130_and_one_line():
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no blend"])
-def test_what_is_no_blend_is_refused_by_name(tmp_path, content):
+def test_what_is_no_blend_is_refused_by_name(tmp_path, content) -> None:
     path = tmp_path / "site.blend"
     if content is not None:
         path.write_bytes(content)
@@ -76,7 +78,7 @@ def test_what_is_no_blend_is_refused_by_name(tmp_path, content):
         session.open_blend(path)
 
 
-def test_progress_reaches_the_total_and_restarts(capsys):
+def test_progress_reaches_the_total_and_restarts(capsys) -> None:
     def work():
         for total in (3, 5):
             for done in range(total + 1):

@@ -1,0 +1,82 @@
+"""Build a Blender scene from an OpenDRIVE map.
+
+blender -b --python-exit-code 1 -P headless/build_scene.py -- map.xodr --near -49 -1 --radius 80 -o site.blend
+python -m headless.build_scene map.xodr --junction 53 --site site.toml -o site.blend
+python -m headless.build_scene site.toml -o site.blend
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session
+from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
+from seip_addon.core.progress import finish
+from seip_addon.core.site_description import SiteDescription, read_site_description
+from seip_addon.core.site_model import site_model
+from seip_addon.scene.build import build_scene, save_blend
+
+
+def main(argv: list[str]) -> None:
+    """Read the map and the site description, model the site and save it."""
+    asked = _parser().parse_args(argv)
+    description = _description(asked)
+    if description.map is None:
+        raise SeipError(f'{asked.source} names no map: add map = "file.xodr" to it, or give the map and --site')
+    if asked.output.suffix != ".blend":
+        raise SeipError(f"{asked.output} is no name for a Blender file; let it end in .blend")
+    model = site_model(read_map(description.map), description)
+    with session.progress_bar() as report:
+        finish(build_scene(model, description.map.name), report)
+    save_blend(asked.output)
+    for note in model.notes:
+        sys.stdout.write(f"note: {note}\n")
+    x, y, z = model.origin
+    sys.stdout.write(
+        f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
+        f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})\n"
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="build_scene", description="Build a Blender scene from an OpenDRIVE map.")
+    parser.add_argument("source", type=Path, help="the map (.xodr), or a site description (.toml) that names it")
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument(
+        "--near", type=float, nargs=2, metavar=("X", "Y"), help="middle of the place, map coordinates in metres"
+    )
+    place.add_argument("--junction", metavar="ID", help="id or name of the junction in the middle of the place")
+    parser.add_argument("--radius", type=float, help="radius of the region of interest in metres (80)")
+    parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="BLEND", help="the .blend to write")
+    return parser
+
+
+def _description(asked: argparse.Namespace) -> SiteDescription:
+    """Return the site description, with what the command line says in its place."""
+    if asked.source.suffix.lower() == ".toml":
+        if asked.site is not None:
+            raise SeipError(f"{asked.source} is a site description already; leave --site out")
+        description = read_site_description(asked.source)
+    else:
+        described = SiteDescription() if asked.site is None else read_site_description(asked.site)
+        description = dataclasses.replace(described, map=asked.source)
+    if asked.near is not None or asked.junction is not None:
+        near = None if asked.near is None else (asked.near[0], asked.near[1])
+        description = dataclasses.replace(description, near=near, junction=asked.junction, region=None)
+    if asked.radius is not None:
+        if not 0 < asked.radius < float("inf"):
+            raise SeipError(f"--radius must be above 0 m, not {asked.radius:g}")
+        description = dataclasses.replace(description, radius=asked.radius, region=None)
+    return description
+
+
+if __name__ == "__main__":
+    session.run(main)

@@ -1,0 +1,64 @@
+"""Where to put labels on a picture so that none hides another."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+DIRECTIONS = 16
+REACH = (1.0, 1.6, 2.3, 3.2, 4.4, 6.0)  # how far out a label is tried, in multiples of the nearest
+
+
+def place_callouts(anchors: Float, sizes: Float, bounds: tuple[float, float, float, float], clearance: float) -> Float:
+    """Return the centre of each label's box.
+
+    Labels are set one after the other, each as near to its anchor as it can be
+    without leaving the picture or touching an anchor or an earlier label, and
+    preferably outwards from the middle of all anchors. A label for which there
+    is no room goes to the nearest place inside the picture.
+
+    Parameters
+    ----------
+    anchors : (k, 2) float64
+        The points that the labels belong to.
+    sizes : (k, 2) float64
+        Widths and heights of the labels.
+    bounds : (left, bottom, right, top)
+        Of the picture, in the unit of the anchors.
+    clearance : float
+        To keep between a label and everything else.
+
+    Returns
+    -------
+    (k, 2) float64
+    """
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    taken_low = anchors - clearance
+    taken_high = anchors + clearance
+    centres = np.empty_like(anchors)
+    middle = anchors.mean(axis=0) if len(anchors) else anchors
+    for index, (anchor, size) in enumerate(zip(anchors, sizes, strict=True)):
+        half = size / 2.0
+        tried = _places(anchor, half + 2.0 * clearance, anchor - middle)
+        tried_low, tried_high = tried - half, tried + half
+        inside = np.all((tried_low >= low) & (tried_high <= high), axis=1)
+        apart = np.any(
+            (tried_low[:, None] - clearance >= taken_high) | (tried_high[:, None] + clearance <= taken_low), axis=2
+        ).all(axis=1)
+        good = np.flatnonzero(inside & apart)
+        centre = tried[good[0]] if len(good) else np.clip(tried[0], low + half, high - half)
+        centres[index] = centre
+        taken_low = np.vstack((taken_low, centre - half))
+        taken_high = np.vstack((taken_high, centre + half))
+    return centres
+
+
+def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
+    """Return centres round an anchor, nearest first, and at each distance those outwards first."""
+    start = np.arctan2(outwards[1], outwards[0])
+    turn = np.arange(DIRECTIONS)
+    angle = start + np.pi * 2.0 / DIRECTIONS * ((turn + 1) // 2) * np.where(turn % 2, 1.0, -1.0)
+    round_anchor = np.stack((np.cos(angle), np.sin(angle)), axis=1) * reach
+    return np.concatenate([anchor + factor * round_anchor for factor in REACH])

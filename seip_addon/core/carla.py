@@ -1,0 +1,105 @@
+"""The chosen sensors as CARLA LiDAR actors: blueprint, transform and attributes.
+
+CARLA stands on Unreal's left-handed axes. A town's world coordinates are those
+of its OpenDRIVE map with y negated, so a yaw that is counter-clockwise here is
+clockwise there [1]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
+``upper_fov`` to ``lower_fov``, both included, and
+``points_per_second / rotation_frequency / channels`` steps over a turn [2]_.
+
+.. [1] CARLA documentation, "Coordinates and transformations".
+.. [2] CARLA documentation, "Sensors reference", LIDAR sensor.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .deployment import Deployment, Sensor
+from .lidar import LidarModel
+from .storage import whole_file
+
+BLUEPRINT = "sensor.lidar.ray_cast"
+EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print
+
+
+def carla_spawns(deployment: Deployment, origin: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """Return one description of an actor for each sensor, in the axes of the CARLA town made from the map.
+
+    Parameters
+    ----------
+    deployment : Deployment
+    origin : (3,) float64, metres
+        Map coordinates of the local origin.
+
+    Returns
+    -------
+    list of dict
+        ``blueprint``, ``transform`` in metres and degrees, and ``attributes`` as the text that
+        ``ActorBlueprint.set_attribute`` takes; see docs/formats.md.
+    """
+    return [_spawn(sensor, origin) for sensor in deployment.sensors]
+
+
+def save_carla_spawns(path: str | os.PathLike[str], deployment: Deployment, origin: NDArray[np.float64]) -> None:
+    """Write `carla_spawns` as JSON."""
+    with whole_file(path) as temporary:
+        text = json.dumps(carla_spawns(deployment, origin), indent=2, ensure_ascii=False, allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
+    x, y, z = (round(float(value), 6) for value in sensor.xyz + origin)
+    return {
+        "id": sensor.label,
+        "blueprint": BLUEPRINT,
+        "transform": {
+            "location": {"x": x, "y": -y + 0.0, "z": z},
+            "rotation": {"pitch": 0.0, "yaw": _clockwise_degrees(sensor.yaw), "roll": 0.0},
+        },
+        "attributes": _attributes(sensor),
+        "note": _note(sensor.model),
+    }
+
+
+def _attributes(sensor: Sensor) -> dict[str, str]:
+    model = sensor.model
+    values = {
+        "role_name": sensor.label,
+        "channels": len(model.elevations),
+        "range": model.max_range,
+        "points_per_second": round(model.points_per_second),
+        "rotation_frequency": model.rotation_rate,
+        "upper_fov": math.degrees(model.elevations.max()),
+        "lower_fov": math.degrees(model.elevations.min()),
+        "horizontal_fov": 360.0,
+        "atmosphere_attenuation_rate": model.attenuation,
+        "noise_stddev": model.range_noise_std,
+        "dropoff_general_rate": model.dropoff_general,
+        "dropoff_intensity_limit": model.dropoff_intensity_limit,
+        "dropoff_zero_intensity": model.dropoff_zero_intensity,
+    }
+    return {name: f"{value:.10g}" if isinstance(value, float) else str(value) for name, value in values.items()}
+
+
+def _note(model: LidarModel) -> str:
+    """Say what CARLA cannot express."""
+    descending = np.sort(model.elevations)[::-1]
+    even = np.linspace(descending[0], descending[-1], len(descending))
+    off = math.degrees(np.abs(descending - even).max())
+    if off <= math.degrees(EVEN_WITHIN):
+        return ""
+    return (
+        f"{model.name} spaces its {len(descending)} channels unevenly; CARLA spreads them evenly over the same field "
+        f"of view, so that its beams are up to {off:.1f} degrees off"
+    )
+
+
+def _clockwise_degrees(yaw: float) -> float:
+    """Return CARLA's yaw for ours, -180 <= yaw < 180."""
+    return (round(-math.degrees(yaw), 6) + 180.0) % 360.0 - 180.0 + 0.0

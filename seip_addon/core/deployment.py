@@ -1,0 +1,184 @@
+"""The chosen sensors and what they see: the one thing that every table, file and picture is drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .lidar import LidarModel
+from .site import Site
+
+Float = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Boolean = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """One chosen sensor.
+
+    Parameters
+    ----------
+    label : str
+        ``S1``, ``S2``, … in the order in which each adds the most to those before it.
+    pose : int
+        Index among the site's candidates.
+    model : LidarModel
+        What hangs there.
+    position_name : str
+        Name of the pole, or of the sampled place on the sidewalk.
+    on_pole : bool
+        Whether it hangs at an existing pole.
+    foot : (3,) float64, metres
+        Ground point of the position, local site axes.
+    xyz : (3,) float64, metres
+        Optical centre, local site axes.
+    height : float, metres
+        Height above the ground point.
+    yaw : float, radians
+        Direction of azimuth zero, counter-clockwise from +x.
+    alone : float
+        Share of the targets that it sees.
+    added : float
+        Share of the targets that it sees and no sensor before it does; they add up to the whole coverage.
+    marginal : float
+        Share of the targets that it alone sees: what is lost without it.
+    """
+
+    label: str
+    pose: int
+    model: LidarModel
+    position_name: str
+    on_pole: bool
+    foot: Float
+    xyz: Float
+    height: float
+    yaw: float
+    alone: float
+    added: float
+    marginal: float
+
+
+@dataclass(frozen=True, eq=False)
+class Deployment:
+    """The chosen sensors and what they see together.
+
+    Parameters
+    ----------
+    sensors : tuple of Sensor
+        In the order of their labels.
+    seen_by : (t,) int64
+        How many of the sensors see each target.
+    coverage : float
+        Share of the targets that some sensor sees.
+    seen_twice : float
+        Share of the targets that two sensors or more see.
+    central : float or None
+        Coverage of the targets in weighted regions; None where there are none.
+    weighted : float
+        Share of the targets' weight that is seen.
+    price : float, dollars
+        Of all sensors together.
+    """
+
+    sensors: tuple[Sensor, ...]
+    seen_by: Integer
+    coverage: float
+    seen_twice: float
+    central: float | None
+    weighted: float
+    price: float
+
+
+def deploy(
+    site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer
+) -> Deployment:
+    """Return the chosen poses as sensors, with what they see.
+
+    Parameters
+    ----------
+    site : Site
+    models : mapping of str to LidarModel
+        The sensor types by catalogue key.
+    visible : (c, t) bool
+        Which pose sees which target.
+    chosen : (k,) int
+        Indices of the chosen poses; their order breaks ties between labels.
+
+    Returns
+    -------
+    Deployment
+    """
+    order = _by_added_coverage(visible, chosen)
+    rows = visible[order]
+    seen_by = rows.sum(axis=0, dtype=np.int64)
+    seen = seen_by > 0
+    before = np.cumsum(rows, axis=0) - rows
+    targets = site.targets
+    sensors = tuple(
+        _sensor(
+            site,
+            models,
+            rank,
+            int(pose),
+            (_share(row), _share(row & (before[rank] == 0)), _share(row & (seen_by == 1))),
+        )
+        for rank, (pose, row) in enumerate(zip(order, rows, strict=True))
+    )
+    return Deployment(
+        sensors=sensors,
+        seen_by=seen_by,
+        coverage=_share(seen),
+        seen_twice=_share(seen_by > 1),
+        central=_share(seen[targets.central]) if targets.central.any() else None,
+        weighted=weighted_share(seen, targets.weight),
+        price=float(sum(sensor.model.price for sensor in sensors)),
+    )
+
+
+def weighted_share(seen: Boolean, weight: Float) -> float:
+    """Return the share of the weight that is seen; zero where all weights are zero."""
+    total = float(weight.sum())
+    return float(weight[seen].sum()) / total if total > 0.0 else 0.0
+
+
+def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Integer:
+    """Order the chosen poses so that each adds the most targets to those before it."""
+    left = [int(pose) for pose in chosen]
+    unseen = np.ones(visible.shape[1], dtype=bool)
+    order: list[int] = []
+    while left:
+        best = max(left, key=lambda pose: int((visible[pose] & unseen).sum()))
+        left.remove(best)
+        order.append(best)
+        unseen &= ~visible[best]
+    return np.array(order, dtype=np.int64)
+
+
+def _sensor(
+    site: Site, models: Mapping[str, LidarModel], rank: int, pose: int, shares: tuple[float, float, float]
+) -> Sensor:
+    alone, added, marginal = shares
+    candidates = site.candidates
+    position = int(candidates.position_of[pose])
+    return Sensor(
+        label=f"S{rank + 1}",
+        pose=pose,
+        model=models[str(candidates.sensor[pose])],
+        position_name=str(candidates.position_name[position]),
+        on_pole=bool(candidates.on_pole[position]),
+        foot=candidates.position[position],
+        xyz=candidates.xyz[pose],
+        height=float(candidates.height[pose]),
+        yaw=float(candidates.yaw[pose]),
+        alone=alone,
+        added=added,
+        marginal=marginal,
+    )
+
+
+def _share(these: Boolean) -> float:
+    return float(np.count_nonzero(these)) / len(these)

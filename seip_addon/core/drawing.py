@@ -1,0 +1,97 @@
+"""What the plan and the rendered view have in common: sensors with their labels, and the title."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .callouts import place_callouts
+from .palette import INK, PAPER, SOFT_INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from .deployment import Deployment
+    from .site import Site
+
+    Float = NDArray[np.float64]
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
+SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
+MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
+MOST_LABELLED = 40
+"""More sensors than these get no labels on the picture."""
+
+
+def markers_of(deployment: Deployment) -> dict[str, str]:
+    """Return a marker for each sensor type in use, by catalogue key."""
+    keys = sorted({sensor.model.key for sensor in deployment.sensors})
+    return {key: MARKERS[index % len(MARKERS)] for index, key in enumerate(keys)}
+
+
+def draw_sensors(axes: Axes, deployment: Deployment, points: Float, zorder: float) -> None:
+    """Mark each sensor and write its label, type and height next to it, no label on another.
+
+    Parameters
+    ----------
+    axes : Axes
+        With their final limits.
+    deployment : Deployment
+    points : (k, 2) float64
+        Where each sensor is, in data coordinates.
+    zorder : float
+        Of the marks; labels and their lines lie below.
+    """
+    if 0 < len(points) <= MOST_LABELLED:
+        words = [f"{s.label}  {s.model.key} · {s.height:.3g} m" for s in deployment.sensors]
+        _draw_callouts(axes, points, words, zorder - 0.5)
+    markers = markers_of(deployment)
+    for sensor, point in zip(deployment.sensors, points, strict=True):
+        axes.plot(*point, marker=markers[sensor.model.key], zorder=zorder, **SENSOR_MARK)
+
+
+def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) -> None:
+    """Write the site's name and the result at the head of a page, ``left`` inches from its border."""
+    width, height = figure.get_size_inches()
+    style = {"x": left / width, "ha": "left", "va": "top", "parse_math": False}
+    figure.text(y=1 - 0.20 / height, s=site.name, size=17, weight="bold", color=INK, **style)
+    figure.text(y=1 - 0.55 / height, s=summary(deployment), size=11, color=SOFT_INK, **style)
+
+
+def summary(deployment: Deployment) -> str:
+    """Return the result in one line."""
+    one = len(deployment.sensors) == 1
+    sensors = "1 sensor sees" if one else f"{len(deployment.sensors)} sensors see"
+    parts = [f"{sensors} {percent(deployment.coverage)} of the road"]
+    if deployment.central is not None:
+        parts.append(f"{percent(deployment.central)} of its weighted part")
+    parts.append(f"{percent(deployment.seen_twice)} seen twice")
+    parts.append(f"price ${deployment.price:,.0f}")
+    return "  ·  ".join(parts)
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent; only all of it is 100 %, and only nothing is 0 %."""
+    if 0.0 < share < 0.0005:
+        return "<0.1%"
+    return f"{min(share, 1.0 if share == 1.0 else 0.999):.1%}"
+
+
+def _draw_callouts(axes: Axes, points: Float, words: list[str], zorder: float) -> None:
+    boxed = {"boxstyle": f"round,pad={LABEL_PADDING}", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6}
+    texts = [
+        axes.text(0, 0, label, ha="center", va="center", size=LABEL_SIZE, color=INK, bbox=boxed, zorder=zorder)
+        for label in words
+    ]
+    point = axes.figure.dpi / 72
+    extents = [text.get_window_extent() for text in texts]
+    sizes = np.array([(extent.width, extent.height) for extent in extents]) + 2 * LABEL_PADDING * LABEL_SIZE * point
+    anchors = axes.transData.transform(points)
+    bounds = axes.get_window_extent().padded(-4.0 * point).extents
+    centres = axes.transData.inverted().transform(place_callouts(anchors, sizes, bounds, MARK_RADIUS * point))
+    for text, start, end in zip(texts, points, centres, strict=True):
+        text.set_position(end)
+        axes.plot(*zip(start, end, strict=True), color=INK, linewidth=0.9, zorder=zorder - 0.1)

@@ -1,0 +1,141 @@
+"""What a user asks of a placement, and the problem that it makes of a site."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import SeipError
+from .lidar import LidarModel
+from .placement import Placement, PlacementProblem, cheapest_for_coverage, solve
+from .progress import Progress
+from .site import Candidates, Site
+
+DEFAULT_COUNT = 4
+"""Sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is asked for: the most coverage for N sensors or a budget, or a coverage for the least money.
+
+    Parameters
+    ----------
+    count : int, optional
+        N, the largest number of sensors.
+    budget : float, dollars, optional
+        The largest total price.
+    coverage : float, optional
+        Share (0 to 1] of the weight to be seen at the least price; the reverse problem.
+    weighted : bool
+        Whether targets count by their weight (the weighted problem) or all alike (vanilla).
+    central_weight : float, optional
+        Weight of all targets in weighted regions, in place of the scene's own.
+    min_distance : float, metres
+        Least distance between two sensors.
+    forbidden, mandatory : tuple of str
+        Names of positions that must not, and that must, carry a sensor.
+    """
+
+    count: int | None = None
+    budget: float | None = None
+    coverage: float | None = None
+    weighted: bool = False
+    central_weight: float | None = None
+    min_distance: float = 0.0
+    forbidden: tuple[str, ...] = ()
+    mandatory: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        """Raise SeipError where the goal contradicts itself or cannot be meant."""
+        if self.coverage is not None and not 0 < self.coverage <= 1:
+            raise SeipError(f"the coverage to reach must be a share above 0 and at most 1, not {self.coverage:g}")
+        if self.central_weight is not None and not (np.isfinite(self.central_weight) and self.central_weight > 0):
+            raise SeipError(f"the central weight must be a positive number, not {self.central_weight}")
+        both = sorted(set(self.forbidden) & set(self.mandatory))
+        if both:
+            raise SeipError(f"position {both[0]!r} is both forbidden and mandatory: take it out of one of the two")
+
+
+def target_weights(site: Site, goal: Goal) -> NDArray[np.float64]:
+    """Weight of each target under a goal, (t,) float64."""
+    if not goal.weighted:
+        return np.ones(len(site.targets))
+    if not site.targets.central.any():
+        raise SeipError("the weighted problem needs a weighted region: draw one in SEIP Weighted Regions")
+    if goal.central_weight is None:
+        return site.targets.weight
+    return np.where(site.targets.central, goal.central_weight, 1.0)
+
+
+def placement_problem(
+    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], goal: Goal
+) -> PlacementProblem:
+    """State a goal on a site as a maximal covering location problem.
+
+    Parameters
+    ----------
+    site : Site
+    visible : (c, t) bool
+        The visibility grid.
+    models : mapping of str to LidarModel
+        By catalogue key.
+    goal : Goal
+
+    Returns
+    -------
+    PlacementProblem
+
+    Raises
+    ------
+    SeipError
+        The goal contradicts itself or the site.
+    """
+    goal.check()
+    candidates = site.candidates
+    demanded = np.array([_named(candidates, name) for name in goal.mandatory], dtype=bool)
+    groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
+    forbidden = np.zeros(len(candidates.position), dtype=bool)
+    for name in goal.forbidden:
+        forbidden |= _named(candidates, name)
+    free = goal.count is None and goal.budget is None and goal.coverage is None
+    return PlacementProblem(
+        visible=visible,
+        weights=target_weights(site, goal),
+        prices=np.array([models[key].price for key in candidates.sensor]),
+        positions=candidates.position_of,
+        xyz=candidates.xyz,
+        labels=candidates.sensor,
+        mandatory=groups[:, candidates.position_of],
+        mandatory_names=np.concatenate((candidates.mandatory_name, np.array(goal.mandatory, dtype=np.str_))),
+        forbidden=forbidden[candidates.position_of],
+        count=DEFAULT_COUNT if free else goal.count,
+        budget=goal.budget,
+        min_distance=goal.min_distance,
+    )
+
+
+def reach(
+    problem: PlacementProblem, goal: Goal, *, solver: str = "highs", time_limit: float = 60.0
+) -> Generator[Progress, None, Placement]:
+    """Solve the problem that a goal made: the most coverage, or the least price for a coverage."""
+    if goal.coverage is not None:
+        return (yield from cheapest_for_coverage(problem, goal.coverage, solver=solver, time_limit=time_limit))
+    return (yield from solve(problem, solver=solver, time_limit=time_limit))
+
+
+def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
+    """Positions of that name, (p,) bool."""
+    found = candidates.position_name == name
+    if not found.any():
+        raise SeipError(f"there is no position {name!r}{_close(name, candidates.position_name.tolist())}")
+    return found
+
+
+def _close(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+    return f"; did you mean {' or '.join(map(repr, near))}?" if near else ": candidates.csv lists them all"

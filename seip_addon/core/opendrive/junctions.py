@@ -1,0 +1,73 @@
+"""Junctions: their area, by their id or name, and by where they are."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+import shapely
+from shapely import Point
+from shapely.geometry.base import BaseGeometry
+
+from ..errors import SeipError
+from .lanes import LaneSurface
+from .road_map import Junction, RoadMap
+
+_CRACK = 0.005  # metres
+
+
+def junction_area(surfaces: Iterable[LaneSurface], junction_id: str) -> BaseGeometry:
+    """Return the union of all lanes of a junction in plan, map coordinates; empty if it has none."""
+    lanes = [surface.polygon for surface in surfaces if surface.junction_id == junction_id]
+    # Neighbouring lanes of different roads meet to within rounding: hairline cracks are closed.
+    return shapely.union_all(lanes).buffer(_CRACK, join_style="mitre").buffer(-_CRACK, join_style="mitre")
+
+
+def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name: str) -> Junction:
+    """Return the junction with an id or, failing that, the only one with a name.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+    surfaces : iterable of LaneSurface
+        The lanes of the map; a junction without any is no place to work on.
+    id_or_name : str
+
+    Raises
+    ------
+    SeipError
+        There is no such junction (close ones are named), the name is not
+        unique, or the junction has no lanes.
+    """
+    of_id = [junction for junction in road_map.junctions if junction.id == id_or_name]
+    found = of_id or [junction for junction in road_map.junctions if junction.name == id_or_name]
+    if not found:
+        raise SeipError(f"no junction {id_or_name!r} in map {road_map.name!r}; {_close(road_map, id_or_name)}")
+    if len(found) > 1:
+        ids = ", ".join(junction.id for junction in found)
+        raise SeipError(f"several junctions are called {id_or_name!r}; choose one by its id: {ids}")
+    if not any(surface.junction_id == found[0].id for surface in surfaces):
+        raise SeipError(f"junction {id_or_name!r} has no lanes; choose another junction or a place on the map")
+    return found[0]
+
+
+def nearest_junctions(
+    road_map: RoadMap, surfaces: Iterable[LaneSurface], x: float, y: float, k: int
+) -> tuple[tuple[Junction, float], ...]:
+    """Return the ``k`` junctions nearest to a place in map coordinates, and their distances in metres."""
+    place = Point(x, y)
+    distances: dict[str, float] = {}
+    for surface in surfaces:
+        if surface.junction_id is not None:
+            nearest = distances.get(surface.junction_id, float("inf"))
+            distances[surface.junction_id] = min(nearest, float(surface.polygon.distance(place)))
+    found = [(junction, distances[junction.id]) for junction in road_map.junctions if junction.id in distances]
+    return tuple(sorted(found, key=lambda pair: pair[1])[:k])
+
+
+def _close(road_map: RoadMap, asked: str) -> str:
+    known = [text for junction in road_map.junctions for text in (junction.id, junction.name) if text]
+    if not known:
+        return "the map has no junctions, choose a place by its coordinates"
+    close = difflib.get_close_matches(asked, known, n=5, cutoff=0.4) or known[:5]
+    return f"the closest are {', '.join(dict.fromkeys(close))}"

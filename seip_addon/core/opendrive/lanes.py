@@ -1,0 +1,200 @@
+"""The surfaces of lanes as strips between a left and a right edge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ..errors import SeipError
+from .road_map import Frame, Lane, LaneSection, Road, RoadMap
+from .sampling import sample
+
+Float = NDArray[np.float64]
+
+_SMALLEST_TRIANGLE = 1e-9  # square metres
+
+
+@dataclass(frozen=True, eq=False)
+class LaneSurface:
+    """The surface of a lane over one lane section.
+
+    Parameters
+    ----------
+    road_id : str
+    junction_id : str or None
+        The junction that the road belongs to.
+    section : int
+        Number of the lane section along the road, from 0.
+    lane_id : int
+        Positive to the left of the centre lane, negative to the right.
+    lane_type : str
+        As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
+    left, right : (n, 3) float64, metres
+        Edges in map coordinates, as seen along the reference line.
+    """
+
+    road_id: str
+    junction_id: str | None
+    section: int
+    lane_id: int
+    lane_type: str
+    left: Float
+    right: Float
+
+    @cached_property
+    def triangles(self) -> Float:
+        """The surface as (m, 3, 3) float64 triangles in map coordinates, normals up, none without area."""
+        left, right = self.left, self.right
+        near_right = np.stack([right[:-1], right[1:], left[1:]], axis=1)
+        near_left = np.stack([right[:-1], left[1:], left[:-1]], axis=1)
+        triangles = np.stack([near_right, near_left], axis=1).reshape(-1, 3, 3)
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        # Inside a bend tighter than the lane is far from the reference line a strip turns over.
+        upward = np.where((normals[:, 2] < 0.0)[:, None, None], triangles[:, ::-1], triangles)
+        return np.asarray(upward[np.linalg.norm(normals, axis=1) > 2.0 * _SMALLEST_TRIANGLE])
+
+    @cached_property
+    def polygon(self) -> BaseGeometry:
+        """The surface in plan; several polygons where it narrows to nothing in between."""
+        outline = Polygon(np.concatenate([self.left[:, :2], self.right[::-1, :2]]))
+        if outline.is_valid:
+            return outline
+        faces = shapely.polygons(self.triangles[:, :, :2])
+        return shapely.union_all(faces[shapely.is_valid(faces)])
+
+
+def lane_surfaces(
+    road_map: RoadMap, *, area: BaseGeometry | None = None, tolerance: float = 0.02
+) -> tuple[LaneSurface, ...]:
+    """Return the surfaces of all lanes that have an area.
+
+    Elevation, superelevation, crossfall, level lanes and lane heights are part
+    of them. Lane sections shorter than a micrometre are left out.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+    area : shapely geometry, optional
+        In plan, map coordinates. Only roads that meet it count, and these whole.
+    tolerance : float, metres
+        Greatest distance between a true edge and the straight lines that stand for it.
+
+    Returns
+    -------
+    tuple of LaneSurface
+        In the order of the file, sections along the road, lanes from left to right.
+
+    Raises
+    ------
+    SeipError
+        The tolerance is not above zero, or a road cannot be followed within it.
+    """
+    if not tolerance > 0.0:
+        raise SeipError(f"a tolerance of {tolerance:g} m cannot be met; choose one above zero, such as 0.02")
+    surfaces: list[LaneSurface] = []
+    for road in road_map.roads:
+        if area is not None and not road.may_meet(area):
+            continue
+        own = list(_surfaces(road, tolerance))
+        if area is None or any(surface.polygon.intersects(area) for surface in own):
+            surfaces += own
+    return tuple(surfaces)
+
+
+def ground_elevation(road: Road, s: float, t: float) -> float:
+    """Return the elevation of the road surface at s and t (metres), or of its nearer edge beside the road."""
+    along = np.clip(np.array([s]), 0.0, road.length)
+    frame = road.frame(along)
+    offset = t * frame.left[0]
+    begun = [section for section in road.sections if section.start <= along[0]]
+    if not begun or not (begun[-1].left or begun[-1].right):
+        return float(frame.origin[0, 2] + offset[2])
+    edges = _edges(road, begun[-1], along).reshape(-1, 2, 3)
+    across = (edges - frame.origin[0]) @ frame.level_left[0]
+    lateral = float(offset @ frame.level_left[0])
+    beside = np.maximum(np.maximum(across[:, 1] - lateral, lateral - across[:, 0]), 0.0)
+    lane = int(np.argmin(beside))
+    (left, right), (z_left, z_right) = across[lane], edges[lane, :, 2]
+    return float(np.interp(lateral, [right, left], [z_right, z_left]))
+
+
+def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
+    for number, section in enumerate(road.sections):
+        lanes = (*section.left[::-1], *section.right)
+        if not lanes:
+            continue
+        points = sample(
+            partial(_edges, road, section),
+            _knots(road, section),
+            tolerance,
+            f"road {road.id}, lane section at s={section.start:g}",
+        ).reshape(-1, len(lanes), 2, 3)
+        for index, lane in enumerate(lanes):
+            left, right = points[:, index, 0], points[:, index, 1]
+            surface = LaneSurface(road.id, road.junction_id, number, lane.id, lane.type, left, right)
+            if len(surface.triangles):
+                yield surface
+
+
+def _knots(road: Road, section: LaneSection) -> list[float]:
+    """Return the section's ends and the places between them where some record begins."""
+    lanes = (*section.left, *section.right)
+    profiles = (
+        *(road.elevation, road.superelevation, road.left_crossfall, road.right_crossfall, road.lane_offset),
+        *(of_lane for lane in lanes for of_lane in (lane.width, lane.border, lane.inner_height, lane.outer_height)),
+    )
+    starts = np.concatenate([road.reference_line.s, *(profile.start for profile in profiles)])
+    inside = starts[(starts > section.start) & (starts < section.end)]
+    return [section.start, *inside.tolist(), section.end]
+
+
+def _edges(road: Road, section: LaneSection, s: Float) -> Float:
+    """Return the left and right edge of each lane, lanes from left to right, (k, 2 · lanes, 3) metres."""
+    frame = road.frame(s)
+    left = [edges[::-1] for edges in _side_edges(road, frame, section.left, s, 1.0)][::-1]
+    right = _side_edges(road, frame, section.right, s, -1.0)
+    return np.stack([edge for edges in (*left, *right) for edge in edges], axis=1)
+
+
+def _side_edges(
+    road: Road, frame: Frame, lanes: tuple[Lane, ...], s: Float, side: float
+) -> Iterator[tuple[Float, Float]]:
+    """Yield the inner and outer edge, (k, 3) each, of the lanes of one side from the centre outwards."""
+    centre = t = road.lane_offset(s)
+    left_fall, right_fall = np.tan(road.left_crossfall(s)), np.tan(road.right_crossfall(s))
+
+    def rise(t: Float) -> Float:
+        return np.asarray(t * np.where(t > 0.0, -left_fall, right_fall))
+
+    point = frame.origin + t[:, None] * frame.left + rise(t)[:, None] * frame.up
+    for lane in lanes:
+        width = _width(lane, s, np.abs(t - centre))
+        outer_t = t + side * width
+        if lane.level:
+            step = (side * width)[:, None] * frame.level_left
+        else:
+            step = (outer_t - t)[:, None] * frame.left + (rise(outer_t) - rise(t))[:, None] * frame.up
+        yield _raised(point, lane.inner_height(s)), _raised(point + step, lane.outer_height(s))
+        point, t = point + step, outer_t
+
+
+def _width(lane: Lane, s: Float, inner: Float) -> Float:
+    """Return the width, (k,) metres, of a lane whose inner edge is ``inner`` away from the centre."""
+    if len(lane.width) or not len(lane.border):
+        return np.maximum(lane.width(s), 0.0)
+    # Some exporters give the borders of right lanes as t, some as distances: the side is known anyway.
+    return np.maximum(np.abs(lane.border(s)) - inner, 0.0)
+
+
+def _raised(points: Float, height: Float) -> Float:
+    """Return points lifted straight up, so that a kerb leaves no gap in plan."""
+    raised = points.copy()
+    raised[:, 2] += height
+    return raised

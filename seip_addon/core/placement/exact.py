@@ -1,0 +1,213 @@
+"""The placement that covers most, proven optimal or with a bound."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Integer
+from ..progress import Progress
+from .bounds import Bound, can_reach, lagrangian_bound
+from .clock import Clock
+from .feasibility import starting_choice
+from .greedy import exchange, greedy, greedy_and_exchange, without_idle
+from .instance import SLACK, Instance, make_instance
+from .integer_program import CoverProgram, check_solver
+from .problem import Placement, PlacementProblem, placement
+from .ties import canonical_optimum
+
+KERNEL = 6
+"""Candidates per sensor in the first, small integer program: those with the best scores under the bound."""
+
+KERNEL_SHARE = 0.15
+"""Share of the time left that this first program may take."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """A placement and the smallest proven upper bound on the covered weight."""
+
+    chosen: Integer
+    bound: float
+    optimal: bool
+
+
+def solve(
+    problem: PlacementProblem, *, solver: str = "highs", time_limit: float = 60.0
+) -> Generator[Progress, None, Placement]:
+    """Choose the placement that covers most.
+
+    Among optimal placements the one with fewest sensors is returned, then the
+    cheapest, then the one with the largest doubly covered weight, then the
+    first in the canonical order of candidates: always the same one, however
+    candidates and targets are ordered.
+
+    Reductions that lose nothing come first; a greedy choice improved by
+    exchanges gives an incumbent, a Lagrangian relaxation a bound; candidates
+    that the bound rules out are dropped, and an integer program decides among
+    the rest.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+        After it the best placement found is returned with its bound and gap.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Placement
+
+    Raises
+    ------
+    SeipError
+        The constraints cannot be met together, no candidate sees any target,
+        or the solver is not available.
+    """
+    clock = Clock(time_limit)
+    version = check_solver(solver)
+    instance, factor = make_instance(problem)
+    start = starting_choice(problem, instance, solver)
+    proof = yield from prove(instance, greedy_and_exchange(instance, start), solver, clock)
+    chosen, notes = proof.chosen, []
+    if proof.optimal:
+        chosen, settled = yield from canonical_optimum(instance, without_idle(instance, chosen), solver, clock)
+        if not settled:
+            notes.append("the time was too short to break all ties: another placement may cover as much")
+    else:
+        chosen = without_idle(instance, chosen)
+        notes.append(
+            "the time was too short to prove this placement optimal: the gap says by how much it may fall short"
+        )
+    if problem.count is not None and len(chosen) < problem.count:
+        notes.append(_surplus(problem.count, len(chosen)))
+    original = instance.original[chosen]
+    return placement(
+        problem,
+        original,
+        proof.bound / factor,
+        optimal=proof.optimal,
+        solver=version,
+        seconds=clock.elapsed,
+        notes=tuple(notes),
+    )
+
+
+def solve_greedy(problem: PlacementProblem) -> Placement:
+    """Choose greedily, with a certificate.
+
+    With the number of sensors alone and one pose per position, greedy covers
+    at least 1 - 1/e (63 %) of the optimum (Nemhauser, Wolsey and Fisher
+    1978); with several poses per position at least a half (Fisher, Nemhauser
+    and Wolsey 1978); the better of gain and gain per price, under a budget
+    alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor 1999). The bound of
+    the result is computed from the data and is usually far closer.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+
+    Returns
+    -------
+    Placement
+
+    Raises
+    ------
+    SeipError
+        The constraints cannot be met together, or no candidate sees any target.
+    """
+    clock = Clock(math.inf)
+    instance, factor = make_instance(problem)
+    start = starting_choice(problem, instance, "highs")
+    per_price = [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
+    runs = [greedy(instance, start, per_price=divided) for divided in per_price]
+    chosen = max((choice for choice, _ in runs), key=instance.covered)
+    bound = min(bound for _, bound in runs)
+    optimal = bound <= instance.covered(chosen) + SLACK
+    original = instance.original[chosen]
+    return placement(
+        problem,
+        original,
+        bound / factor,
+        optimal=optimal,
+        solver="greedy",
+        seconds=clock.elapsed,
+        notes=(_guarantee(problem, instance),),
+    )
+
+
+def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Generator[Progress, None, Proof]:
+    """Improve an incumbent and the bound on it until they meet or the time is up."""
+    bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
+    if bound.value > instance.covered(chosen) + SLACK:
+        chosen = max(chosen, _from_relaxation(instance, bound, chosen), key=instance.covered)
+        yield Progress(0, 1, "improving the placement among the best candidates")
+        chosen = _within_kernel(instance, bound, chosen, solver, clock)
+    goal = instance.covered(chosen)
+    if bound.value <= goal + SLACK:
+        return Proof(chosen, goal, optimal=True)
+    keep = can_reach(instance, bound, goal)
+    yield Progress(0, 1, f"proving with {len(keep)} of {len(instance)} candidates")
+    return _decide(instance, keep, bound, chosen, solver, clock)
+
+
+def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Integer:
+    """Return a placement made from the relaxation's own selection, where that meets the constraints."""
+    picked = np.sort(bound.selection.picked)
+    return exchange(instance, picked) if instance.feasible(picked) else chosen
+
+
+def _within_kernel(instance: Instance, bound: Bound, chosen: Integer, solver: str, clock: Clock) -> Integer:
+    """Return the best placement among the candidates of best scores, at least as good as the one given."""
+    size = KERNEL * max(len(chosen), 1)
+    best = np.argsort(-bound.selection.net, kind="stable")[:size]
+    keep = np.union1d(best, chosen)
+    program = CoverProgram(instance.part(keep))
+    outcome = program.maximise(program.covered, solver, KERNEL_SHARE * clock.left)
+    if outcome.chosen is None or instance.covered(keep[outcome.chosen]) <= instance.covered(chosen):
+        return chosen
+    return exchange(instance, keep[outcome.chosen])
+
+
+def _decide(instance: Instance, keep: Integer, bound: Bound, chosen: Integer, solver: str, clock: Clock) -> Proof:
+    """Solve the integer program over the candidates that some optimum may contain."""
+    if clock.left <= 0:
+        return Proof(chosen, bound.value, optimal=False)
+    keep = np.union1d(keep, chosen)
+    program = CoverProgram(instance.part(keep))
+    outcome = program.maximise(program.covered, solver, clock.left)
+    if outcome.chosen is not None and instance.covered(keep[outcome.chosen]) > instance.covered(chosen):
+        chosen = keep[outcome.chosen]
+    value = instance.covered(chosen)
+    proven = value if outcome.finished else max(value, min(bound.value, outcome.bound))
+    return Proof(chosen, proven, optimal=outcome.finished or proven <= value + SLACK)
+
+
+def _surplus(asked: int, used: int) -> str:
+    return f"asked for {asked} sensors, {used} suffice: no further sensor that the constraints allow adds coverage"
+
+
+def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
+    if (
+        len(instance.mandatory)
+        or problem.min_distance > 0
+        or (problem.count is not None and problem.budget is not None)
+    ):
+        return "greedy has no guarantee under these constraints beyond the bound given"
+    if problem.budget is not None:
+        share = "(1 - 1/e)/2 (32 %)" if len(np.unique(instance.clique)) == len(instance) else ""
+        return (
+            f"greedy covers at least {share} of the optimum"
+            if share
+            else ("greedy has no guarantee under a budget with several poses per position beyond the bound given")
+        )
+    share = "1 - 1/e (63 %)" if len(np.unique(instance.clique)) == len(instance) else "one half"
+    return f"greedy covers at least {share} of the optimum"

@@ -1,0 +1,214 @@
+"""The problem in canonical order, reduced to what can matter; every reduction here is exact."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from .problem import TIE, PlacementProblem, canonical_order
+
+SCALE = 1e4
+"""Total weight after scaling: far from the solvers' absolute tolerances (1e-6) on both sides of `SLACK`."""
+
+SLACK = TIE * SCALE
+"""Scaled weights that differ by less count as equal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """What the algorithms see: candidates in canonical order, targets merged.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+        No column is empty and no two are equal.
+    weight : (t,) float64
+        Weights of the merged targets, scaled.
+    price : (c,) float64
+    conflict : (c, c) bool
+        Pairs that exclude each other: same position, or too close. The diagonal is false.
+    mandatory : (g, c) bool
+    original : (c,) int64
+        Index of each candidate in the problem.
+    count : int
+        At most this many sensors.
+    budget : float
+        At most this total price; infinite where there is no budget.
+    """
+
+    visible: Boolean
+    weight: Float
+    price: Float
+    conflict: Boolean
+    mandatory: Boolean
+    original: Integer
+    count: int
+    budget: float
+
+    def __len__(self) -> int:
+        """Return the number of candidates."""
+        return len(self.visible)
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float32]:
+        """``visible`` as numbers, for products."""
+        return self.visible.astype(np.float32)
+
+    @cached_property
+    def total(self) -> float:
+        """Weight that all candidates together cover, scaled."""
+        return math.fsum(self.weight)
+
+    @cached_property
+    def clique(self) -> Integer:
+        """A partition of the candidates into sets of which one at most can be chosen, (c,) int64.
+
+        Without a minimum distance these are the positions.
+        """
+        clique = np.full(len(self), -1)
+        for first in range(len(self)):
+            if clique[first] < 0:
+                members = [first]
+                common = self.conflict[first] & (clique < 0)
+                while common.any():
+                    members.append(int(np.argmax(common)))
+                    common &= self.conflict[members[-1]]
+                clique[members] = first
+        return np.unique(clique, return_inverse=True)[1]
+
+    def covered(self, chosen: Integer) -> float:
+        """Return the scaled weight that the chosen candidates cover."""
+        return math.fsum(self.weight[self.visible[chosen].any(axis=0)])
+
+    def doubly(self, chosen: Integer) -> float:
+        """Return the scaled weight that two or more of the chosen candidates cover."""
+        return math.fsum(self.weight[self.visible[chosen].sum(axis=0) > 1])
+
+    def affordable(self, price: Float | float) -> Boolean | bool:
+        """Return whether a total price is within the budget, but for rounding."""
+        return price <= self.budget * (1 + TIE)
+
+    def feasible(self, chosen: Integer) -> bool:
+        """Return whether the chosen candidates meet every constraint."""
+        return bool(
+            len(chosen) <= self.count
+            and self.affordable(math.fsum(self.price[chosen]))
+            and not self.conflict[np.ix_(chosen, chosen)].any()
+            and self.mandatory[:, chosen].any(axis=1).all()
+        )
+
+    def part(self, keep: Integer) -> Instance:
+        """Return the same instance with only the candidates ``keep``, targets merged anew."""
+        visible, weight = merge_targets(self.visible[keep], self.weight)
+        return replace(
+            self,
+            visible=visible,
+            weight=weight,
+            price=self.price[keep],
+            conflict=self.conflict[np.ix_(keep, keep)],
+            mandatory=self.mandatory[:, keep],
+            original=self.original[keep],
+        )
+
+
+def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
+    """Reduce a problem, and return it with the factor that scaled its weights.
+
+    Raises
+    ------
+    SeipError
+        No candidate sees any target of positive weight.
+    """
+    order = canonical_order(problem)
+    order = order[problem.allowed[order]]
+    visible, weight = merge_targets(problem.visible[order], problem.weights)
+    if len(weight) == 0:
+        raise SeipError(
+            "no candidate sees any target; raise the sensors, widen the tolerance or clear what stands in the way"
+        )
+    factor = SCALE / math.fsum(weight)
+    places = len(np.unique(problem.positions[order]))
+    instance = Instance(
+        visible=visible,
+        weight=weight * factor,
+        price=problem.prices[order],
+        conflict=_conflicts(problem.positions[order], problem.xyz[order], problem.min_distance),
+        mandatory=problem.mandatory_groups[:, order],
+        original=order,
+        count=places if problem.count is None else problem.count,
+        budget=math.inf if problem.budget is None else float(problem.budget),
+    )
+    return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), factor
+
+
+def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
+    """Merge targets that the same candidates see and drop those that none sees.
+
+    The result does not depend on the order of targets, rounding included.
+
+    Parameters
+    ----------
+    visible : (c, t) bool
+    weight : (t,) float64
+
+    Returns
+    -------
+    (c, m) bool, (m,) float64
+        Distinct columns in ascending order, and the summed weight of each.
+    """
+    seen = np.flatnonzero(visible.any(axis=0) & (weight > 0))
+    visible, weight = visible[:, seen], weight[seen]
+    if len(seen) == 0:
+        return visible, weight
+    packed = np.ascontiguousarray(np.packbits(visible, axis=0).T)
+    keys = packed.view(np.dtype((np.void, packed.shape[1])))[:, 0]
+    _, first, group = np.unique(keys, return_index=True, return_inverse=True)
+    by_group = np.lexsort((weight, group))
+    starts = np.searchsorted(group[by_group], np.arange(len(first)))
+    return visible[:, first], np.add.reduceat(weight[by_group], starts)
+
+
+def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
+    conflict = positions[:, None] == positions[None, :]
+    if min_distance > 0:
+        for row, xy in zip(conflict, xyz[:, :2], strict=True):
+            row |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance
+    np.fill_diagonal(conflict, val=False)
+    return conflict
+
+
+def _superfluous(instance: Instance, positions: Integer) -> Boolean:
+    """Mark candidates that no canonical optimum contains.
+
+    A candidate that sees nothing and serves no mandatory group only adds to
+    the number of sensors. A candidate at the same position as another that
+    sees all it sees, is in all its groups, excludes nothing more and is
+    cheaper (or costs the same and comes first) can always give way to it:
+    coverage, number, price, double coverage and order all stay or improve.
+    """
+    superfluous = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
+    excluded = instance.conflict | np.eye(len(instance), dtype=bool)
+    by_position = np.argsort(positions, kind="stable")
+    for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
+        price = instance.price[group]
+        rank = np.lexsort((group, price)).argsort()
+        replaceable = (
+            (rank[None, :] < rank[:, None])
+            & _within(instance.visible[group])
+            & _within(instance.mandatory[:, group].T)
+            & _within(excluded[group]).T
+        )
+        superfluous[group] |= replaceable.any(axis=1)
+    return superfluous
+
+
+def _within(rows: Boolean) -> Boolean:
+    """Return for each pair of rows whether the first is a subset of the second, (k, k) bool."""
+    overlap = rows.astype(np.float32) @ rows.T.astype(np.float32)
+    return overlap == overlap.diagonal()[:, None]

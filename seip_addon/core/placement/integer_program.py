@@ -1,0 +1,275 @@
+"""The integer program in PuLP, and the solvers it can be given to by name."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import os
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pulp
+from pulp.apis.coin_api import pulp_cbc_path
+
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from .instance import Instance
+from .problem import TIE
+
+SOLVERS = ("highs", "cbc", "gurobi")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a solver found.
+
+    Parameters
+    ----------
+    chosen : (k,) int64 or None
+        The best placement found, none where the time was too short or none exists.
+    bound : float
+        No placement has a larger objective; infinite where the solver does not say.
+    finished : bool
+        Whether the solver ran to its end: ``chosen`` is optimal, or nothing is feasible.
+    """
+
+    chosen: Integer | None
+    bound: float
+    finished: bool
+
+
+class CoverProgram:
+    """The integer program of an instance, to which requirements are added stage by stage.
+
+    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z``
+    of each target are continuous: at an optimum they are integral by themselves.
+    ``z`` is right wherever the covered weight is required to be the largest
+    possible.
+
+    Parameters
+    ----------
+    instance : Instance
+    """
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+        self.model = pulp.LpProblem("placement", pulp.LpMaximize)
+        self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
+        self._constrain()
+
+    @cached_property
+    def covered(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+        """The covered weight."""
+        for y, seen in zip(self._y, self._seen, strict=True):
+            self.model += y <= seen
+        return _linear(self._y, self.instance.weight)
+
+    @cached_property
+    def doubly_covered(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+        """The weight covered twice or more; `covered` must be required to be at its maximum."""
+        z = [self.model.add_variable(f"z{j}", 0, 1) for j in range(len(self.instance.weight))]
+        for z_j, y, seen in zip(z, self._y, self._seen, strict=True):
+            self.model += z_j + y <= seen
+        return _linear(z, self.instance.weight)
+
+    @property
+    def number(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+        """The number of sensors."""
+        return _linear(self.x, np.ones(len(self.x)))
+
+    @property
+    def price(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+        """The total price, scaled as `price_scale` says."""
+        return _linear(self.x, self.instance.price * self.price_scale)
+
+    @property
+    def price_scale(self) -> float:
+        """Factor that brings the dearest sensor to 10,000, away from the solvers' absolute tolerances."""
+        dearest = float(self.instance.price.max(initial=0.0))
+        return 1e4 / dearest if dearest > 0 else 1.0
+
+    def number_among(self, candidates: Integer, factors: Float | None = None) -> Any:  # noqa: ANN401 -- as above
+        """Return the (weighted) number of sensors among some candidates."""
+        return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
+
+    def require(self, constraint: Any) -> None:  # noqa: ANN401 -- PuLP's constraints are untyped
+        """Add a constraint for this and all later solves."""
+        self.model += constraint
+
+    def maximise(self, objective: Any, solver: str, seconds: float) -> Outcome:  # noqa: ANN401 -- as above
+        """Solve for the largest objective within a time limit; the last requirement stays."""
+        self.model.setObjective(objective)
+        ends = time.perf_counter() + seconds
+        while True:
+            outcome = self._solve(solver, ends - time.perf_counter())
+            if outcome.chosen is None or self.instance.feasible(outcome.chosen):
+                return outcome
+            # solvers take a budget with a tolerance of their own: forbid what overruns it in exact arithmetic
+            self.require(self.number_among(outcome.chosen) <= len(outcome.chosen) - 1)
+
+    def _solve(self, solver: str, seconds: float) -> Outcome:
+        with _engine(solver, max(seconds, 0.01)) as engine:
+            try:
+                self.model.solve(engine)
+            except pulp.PulpSolverError as error:
+                raise SeipError(
+                    f"the solver {solver} stopped with an error ({error}); choose another solver"
+                ) from error
+        status = self.model.sol_status
+        solved = status in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible)
+        chosen = np.flatnonzero([round(x.value() or 0.0) for x in self.x]) if solved else None
+        finished = status in (pulp.LpSolutionOptimal, pulp.LpSolutionInfeasible)
+        return Outcome(chosen, _bound(self.model, solver), finished)
+
+    @cached_property
+    def _y(self) -> list[Any]:
+        return [self.model.add_variable(f"y{j}", 0, 1) for j in range(len(self.instance.weight))]
+
+    @cached_property
+    def _seen(self) -> list[Any]:
+        return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
+
+    def _constrain(self) -> None:
+        instance = self.instance
+        self.model.setObjective(self.number)
+        if instance.count < len(instance):
+            self.model += self.number <= instance.count
+        if math.isfinite(instance.budget):
+            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE)
+        for group in instance.mandatory:
+            self.model += self.number_among(np.flatnonzero(group)) >= 1
+        for clique in cover_by_cliques(instance.conflict):
+            self.model += self.number_among(clique) <= 1
+
+
+def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
+    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen.
+
+    Cliques bound the linear relaxation more tightly than the pairs they are
+    made of. They are grown greedily, in order, so the result is always the same.
+
+    Parameters
+    ----------
+    conflict : (c, c) bool
+        Symmetric, false on the diagonal.
+
+    Yields
+    ------
+    (k,) int64
+    """
+    left = np.triu(conflict)
+    for first in range(len(conflict)):
+        while left[first].any():
+            clique = [first, int(np.argmax(left[first]))]
+            common = conflict[clique[0]] & conflict[clique[1]]
+            while common.any():
+                # prefer candidates whose conflict with the first is not covered yet
+                uncovered = common & left[first]
+                grown = int(np.argmax(uncovered if uncovered.any() else common))
+                clique.append(grown)
+                common &= conflict[grown]
+            members = np.sort(np.array(clique, np.int64))
+            left[np.ix_(members, members)] = False
+            yield members
+
+
+def check_solver(solver: str) -> str:
+    """Return name and version of a solver, for the record.
+
+    Raises
+    ------
+    SeipError
+        The solver is unknown or cannot run here; those that can are named.
+    """
+    if solver not in SOLVERS:
+        raise SeipError(f"unknown solver {solver!r}; choose among {', '.join(_available())}")
+    if not _AVAILABLE[solver]():
+        raise SeipError(f"the solver {solver} is not available here; choose among {', '.join(_available())}")
+    return f"{_VERSION[solver]()} with PuLP {importlib.metadata.version('pulp')}"
+
+
+def _linear(variables: list[Any], factors: Float) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+    return pulp.LpAffineExpression(list(zip(variables, factors.tolist(), strict=True)))
+
+
+@contextmanager
+def _engine(solver: str, seconds: float) -> Iterator[Any]:
+    """Yield PuLP's interface to a solver, set to prove optimality."""
+    if solver == "highs":
+        yield pulp.HiGHS(msg=False, timeLimit=seconds, gapRel=0.0, threads=1)
+    elif solver == "cbc":
+        with _executable_cbc() as path:
+            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=seconds, gapRel=0.0, threads=1)
+    else:
+        yield pulp.GUROBI(msg=False, timeLimit=seconds, gapRel=0.0, Threads=1)
+
+
+def _bound(model: pulp.LpProblem, solver: str) -> float:
+    """Return the solver's own upper bound on the objective."""
+    if model.sol_status == pulp.LpSolutionOptimal:
+        return float(pulp.value(model.objective))
+    if solver == "highs":
+        return -float(model.solverModel.getInfo().mip_dual_bound)
+    if solver == "gurobi":
+        return float(model.solverModel.ObjBound)
+    return math.inf
+
+
+@contextmanager
+def _executable_cbc() -> Iterator[str]:
+    """Yield a path of PuLP's CBC that can be run.
+
+    Archives that drop permissions leave it without its run bit, and a
+    read-only installation cannot be mended in place; a copy can.
+    """
+    if os.access(pulp_cbc_path, os.X_OK):
+        yield pulp_cbc_path
+        return
+    with tempfile.TemporaryDirectory(prefix="seip-cbc-") as folder:
+        copy = Path(folder) / Path(pulp_cbc_path).name
+        shutil.copyfile(pulp_cbc_path, copy)
+        copy.chmod(stat.S_IRWXU)
+        yield str(copy)
+
+
+def _available() -> list[str]:
+    return [name for name in SOLVERS if _AVAILABLE[name]()]
+
+
+def _has_highs() -> bool:
+    return bool(pulp.HiGHS(msg=False).available())
+
+
+def _has_cbc() -> bool:
+    return os.access(pulp_cbc_path, os.R_OK)
+
+
+def _has_gurobi() -> bool:
+    return "GUROBI" in pulp.listSolvers(onlyAvailable=True)
+
+
+_AVAILABLE: dict[str, Callable[[], bool]] = {"highs": _has_highs, "cbc": _has_cbc, "gurobi": _has_gurobi}
+
+
+def _highs_version() -> str:
+    return f"HiGHS {importlib.metadata.version('highspy')}"
+
+
+def _cbc_version() -> str:
+    return "CBC"
+
+
+def _gurobi_version() -> str:
+    return f"Gurobi {importlib.metadata.version('gurobipy')}"
+
+
+_VERSION: dict[str, Callable[[], str]] = {"highs": _highs_version, "cbc": _cbc_version, "gurobi": _gurobi_version}

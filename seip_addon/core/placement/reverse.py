@@ -1,0 +1,157 @@
+"""The cheapest placement that reaches a coverage: partial set covering."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Integer
+from ..errors import SeipError
+from ..progress import Progress
+from .bounds import can_reach, lagrangian_bound
+from .clock import Clock
+from .exact import prove, solve
+from .feasibility import starting_choice
+from .greedy import greedy, greedy_and_exchange
+from .instance import SLACK, Instance, make_instance
+from .integer_program import CoverProgram, check_solver
+from .problem import TIE, Placement, PlacementProblem, placement
+
+FINISH = 1.0
+"""Seconds that choosing among equally cheap placements may take when the time limit is used up."""
+
+
+def cheapest_for_coverage(
+    problem: PlacementProblem, coverage: float, *, solver: str = "highs", time_limit: float = 60.0
+) -> Generator[Progress, None, Placement]:
+    """Choose the cheapest placement that covers a share of all weight.
+
+    Among the cheapest the one that covers most is returned, and among those
+    the one that `solve` prefers. With equal prices this is the placement of
+    fewest sensors. The result's objective, bound and gap are prices.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its number of sensors and budget limit the placement where they are given.
+    coverage : float
+        Share of the weight of all targets, above 0 and at most 1.
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Placement
+
+    Raises
+    ------
+    SeipError
+        The coverage cannot be reached, with the highest one that can; or as for `solve`.
+    """
+    if not 0 < coverage <= 1:
+        raise SeipError(f"the coverage to reach is {coverage:g}; give a share above 0 and at most 1")
+    clock = Clock(time_limit)
+    check_solver(solver)
+    instance, factor = make_instance(problem)
+    whole = math.fsum(problem.weights) * factor
+    goal = coverage * whole
+    chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
+    cheapest, bound = yield from _cheapest(instance, _pruned(instance, chosen, goal), goal, solver, clock)
+    best = yield from solve(_no_dearer(problem, instance, cheapest), solver=solver, time_limit=max(clock.left, FINISH))
+    reached = best.covered * factor >= goal - SLACK
+    chosen = best.chosen if reached else instance.original[cheapest]
+    return _record(problem, chosen, bound, best, clock)
+
+
+def _reaching(
+    problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
+) -> Generator[Progress, None, Integer]:
+    """Return some placement that reaches the goal."""
+    start = starting_choice(problem, instance, solver)
+    chosen, _ = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - SLACK)
+    if instance.covered(chosen) >= goal - SLACK:
+        return chosen
+    proof = yield from prove(instance, greedy_and_exchange(instance, start), solver, clock)
+    covered = instance.covered(proof.chosen)
+    if covered >= goal - SLACK:
+        return proof.chosen
+    wanted = f"a coverage of {goal / whole:.2%}"
+    if proof.bound < goal - SLACK:
+        raise SeipError(
+            f"{wanted} cannot be reached: no placement covers more than {proof.bound / whole:.2%}; "
+            "ask for less, or allow more or better sensors"
+        )
+    raise SeipError(
+        f"no placement with {wanted} was found in {clock.elapsed:.0f} s: the best one covers {covered / whole:.2%}; "
+        "ask for less or raise the time limit"
+    )
+
+
+def _pruned(instance: Instance, chosen: Integer, goal: float) -> Integer:
+    """Take away sensors, the dearest first, that the goal does not need."""
+    for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
+        rest = chosen[chosen != candidate]
+        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - SLACK:
+            chosen = rest
+    return chosen
+
+
+def _cheapest(
+    instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Integer, float]]:
+    """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
+    price = math.fsum(instance.price[chosen])
+    cheaper = replace(instance, budget=price * (1 - 3 * TIE))
+    if np.ptp(instance.price) == 0:
+        cheaper = replace(instance, count=len(chosen) - 1)
+    if price == 0 or cheaper.count == 0:
+        return chosen, price
+    bound = yield from lagrangian_bound(cheaper, goal, clock)
+    keep = can_reach(cheaper, bound, goal)
+    if bound.value < goal - SLACK or len(keep) == 0:
+        return chosen, price
+    yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
+    program = CoverProgram(cheaper.part(keep))
+    program.require(program.covered >= goal - SLACK)
+    outcome = program.maximise(-1 * program.price, solver, clock.left)
+    if outcome.chosen is not None:
+        chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
+    if outcome.finished:
+        return chosen, price
+    return chosen, min(price, max(-outcome.bound / program.price_scale, float(instance.price.min())))
+
+
+def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
+    """Return the problem of covering most for the price of the cheapest placement."""
+    if np.ptp(instance.price) == 0:
+        return replace(problem, count=len(cheapest))
+    return replace(problem, budget=math.fsum(instance.price[cheapest]))
+
+
+def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
+    record = placement(problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.elapsed, notes=())
+    price = record.price
+    optimal = bound >= price * (1 - 3 * TIE)
+    notes = []
+    if not optimal:
+        notes.append(
+            "the time was too short to prove this placement the cheapest: the gap says how much dearer it may be"
+        )
+    if best.status != "optimal":
+        notes.append("among equally cheap placements another one may cover more")
+    return replace(
+        record,
+        objective=price,
+        bound=price if optimal else bound,
+        gap=0.0 if optimal else (price - bound) / price,
+        status="optimal" if optimal else "feasible",
+        notes=tuple(notes),
+    )

@@ -1,0 +1,234 @@
+"""``placement.json``: a placement with all that it takes to read it, check it and make it again."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .deployment import Deployment, Sensor
+from .errors import SeipError
+from .placement import Placement
+from .site import Site
+from .storage import whole_file
+
+Float = NDArray[np.float64]
+Record = dict[str, Any]
+
+SCHEMA = "seip-placement/1"
+LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
+MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a placement was made with.
+
+    Parameters
+    ----------
+    settings : mapping
+        All that the user could have set, defaults included, by name; values that JSON can hold.
+    created : datetime
+        When, with its time zone.
+    durations : mapping of str to float, seconds
+        How long each step took.
+    versions : mapping of str to str
+        Of the program and what it stands on; see `versions`.
+    inputs : mapping of str to str
+        Digests or names of what went in.
+    seeds : mapping of str to int
+        Of every random number generator.
+    warnings : tuple of str
+        What the user should know before trusting the figures.
+    """
+
+    settings: Mapping[str, object]
+    created: datetime
+    durations: Mapping[str, float]
+    versions: Mapping[str, str]
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    seeds: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def versions(**more: str) -> dict[str, str]:
+    """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``."""
+    program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+    libraries = {name: metadata.version(name) for name in LIBRARIES}
+    return {"seip": program, "python": platform.python_version(), **libraries, **more}
+
+
+def placement_record(  # noqa: PLR0913 - one thing for each part of the file
+    site: Site,
+    deployment: Deployment,
+    placement: Placement,
+    run: Run,
+    *,
+    weighted: bool,
+    cheapest: bool = False,
+    greedy: Placement | None = None,
+) -> Record:
+    """Return a placement as the value that ``placement.json`` holds.
+
+    Parameters
+    ----------
+    site : Site
+    deployment : Deployment
+        What `placement` chose, of the same site.
+    placement : Placement
+        The solution with its bound.
+    run : Run
+        What it was made with.
+    weighted : bool
+        Whether the targets' weights counted.
+    cheapest : bool
+        Whether the least price for a coverage was sought, not the most coverage.
+    greedy : Placement, optional
+        The greedy solution of the same problem, to compare with.
+
+    Returns
+    -------
+    dict
+        Its layout is described in docs/formats.md and docs/placement.schema.json.
+    """
+    return {
+        "schema": SCHEMA,
+        "site": {"name": site.name, "origin_m": _metres(site.origin)},
+        "sensors": [_sensor(sensor, site.origin) for sensor in deployment.sensors],
+        "price_usd": _rounded(deployment.price, 2),
+        "coverage": {
+            "whole": _share(deployment.coverage),
+            "central": None if deployment.central is None else _share(deployment.central),
+            "weighted": _share(deployment.weighted),
+            "seen_twice": _share(deployment.seen_twice),
+        },
+        "objective": {
+            "kind": "weighted" if weighted else "vanilla",
+            "sought": "least price" if cheapest else "most coverage",
+            "value": _significant(placement.objective),
+            "bound": _significant(placement.bound),
+            "gap": _significant(placement.gap),
+            "status": placement.status,
+            "solver": placement.solver,
+        },
+        "greedy": None if greedy is None else _greedy(greedy, placement),
+        "counts": _counts(site),
+        "settings": dict(run.settings),
+        "seeds": dict(run.seeds),
+        "inputs": dict(run.inputs),
+        "notes": list(placement.notes),
+        "warnings": list(run.warnings),
+        "versions": dict(run.versions),
+        "times": {
+            "created": run.created.isoformat(timespec="seconds"),
+            "durations_s": {step: _rounded(seconds, 3) for step, seconds in run.durations.items()},
+        },
+    }
+
+
+def comparable(record: Record) -> Record:
+    """Return the record without what differs from one machine and run to the next: times and versions."""
+    return {key: value for key, value in record.items() if key not in ("times", "versions")}
+
+
+def save_placement_record(path: str | os.PathLike[str], record: Record) -> None:
+    """Write ``placement.json``."""
+    with whole_file(path) as temporary:
+        text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def load_placement_record(path: str | os.PathLike[str]) -> Record:
+    """Read ``placement.json``.
+
+    Raises
+    ------
+    SeipError
+        There is no such file, or it is no placement of a version that this program knows.
+    """
+    try:
+        record: Record = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
+    except ValueError as error:
+        raise SeipError(f"{path} is damaged or no JSON: {error}; place the sensors again") from error
+    schema = record.get("schema") if isinstance(record, dict) else None
+    if schema != SCHEMA:
+        raise SeipError(f"{path} has the schema {schema!r}, not {SCHEMA!r}; place the sensors again with this version")
+    return record
+
+
+def _sensor(sensor: Sensor, origin: Float) -> Record:
+    return {
+        "id": sensor.label,
+        "pose": sensor.pose,
+        "sensor": sensor.model.key,
+        "sensor_name": sensor.model.name,
+        "position": sensor.position_name,
+        "on_pole": sensor.on_pole,
+        "local_m": _metres(sensor.xyz),
+        "map_m": _metres(sensor.xyz + origin),
+        "height_m": _rounded(sensor.height, 6),
+        "yaw_deg": degrees(sensor.yaw),
+        "price_usd": _rounded(sensor.model.price, 2),
+        "coverage_alone": _share(sensor.alone),
+        "coverage_added": _share(sensor.added),
+        "coverage_marginal": _share(sensor.marginal),
+    }
+
+
+def degrees(angle: float) -> float:
+    """Return an angle in degrees, 0 <= angle < 360, to the millionth."""
+    return _rounded(math.degrees(angle), 6) % 360.0
+
+
+def _greedy(greedy: Placement, placement: Placement) -> Record:
+    lost = placement.objective - greedy.objective
+    return {
+        "value": _significant(greedy.objective),
+        "bound": _significant(greedy.bound),
+        "gap_to_placement": _share(lost / placement.objective) if placement.objective > 0.0 else 0.0,
+        "poses": [int(pose) for pose in greedy.chosen],
+        "notes": list(greedy.notes),
+    }
+
+
+def _counts(site: Site) -> Record:
+    candidates = site.candidates
+    return {
+        "targets": len(site.targets),
+        "targets_central": int(np.count_nonzero(site.targets.central)),
+        "positions": len(candidates.position),
+        "positions_on_poles": int(np.count_nonzero(candidates.on_pole)),
+        "poses": len(candidates),
+        "dropped": {reason: int(count) for reason, count in sorted(candidates.dropped.items())},
+    }
+
+
+def _metres(point: Float) -> list[float]:
+    """Round to the micrometre, which hides the last bits in which platforms differ."""
+    return [_rounded(value, 6) for value in point]
+
+
+def _share(value: float) -> float:
+    return _rounded(value, 9)
+
+
+def _rounded(value: float, digits: int) -> float:
+    return round(float(value), digits) + 0.0  # no negative zero
+
+
+def _significant(value: float) -> float | None:
+    """Return twelve significant digits; None for a bound that the solver has not found."""
+    return float(f"{value:.12g}") if math.isfinite(value) else None

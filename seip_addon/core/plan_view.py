@@ -1,0 +1,384 @@
+"""A bird's-eye plan of a placement, as a picture for people who did not make it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path
+
+from .drawing import SENSOR_MARK, draw_sensors, draw_title, markers_of, percent
+from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
+from .storage import whole_file
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from .deployment import Deployment
+    from .scene_geometry import Mesh, SceneGeometry
+    from .site import Site
+
+    Float = NDArray[np.float64]
+    Style = dict[str, Any]
+
+DPI = 160
+MAP_WIDTH, PANEL_WIDTH, MARGIN, HEAD = 9.6, 3.7, 0.3, 0.95  # inches
+SHORTEST_MAP, TALLEST_MAP = 6.6, 10.5  # inches
+AROUND = 0.06  # of the region's size, shown around it
+
+LAND, GROUND, PAVEMENT, ROAD, KERB = "#f3f4f1", "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
+HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
+WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
+ROW, LINE = 0.42, 0.24  # inches that a sensor and a line of the legend take in the panel
+CRACK = 0.06  # metres
+FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
+
+BACK, SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(9)
+
+
+def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment) -> None:
+    """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
+
+    The same arguments give the same bytes.
+
+    Parameters
+    ----------
+    path : path-like
+        The picture to write.
+    geometry : SceneGeometry
+        What the scene holds; drawn in plan.
+    site : Site
+        Targets and candidates made from it.
+    deployment : Deployment
+        The chosen sensors and what they see.
+    """
+    figure = draw_plan(geometry, site, deployment)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})
+
+
+def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Figure:
+    """Return the plan as a figure."""
+    window = _window(site.region)
+    width, height = window[2] - window[0], window[3] - window[1]
+    map_height = MAP_WIDTH * height / width
+    figure = Figure((MAP_WIDTH + PANEL_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
+    FigureCanvasAgg(figure)  # measures text
+    plan = _axes(figure, MARGIN, MARGIN, MAP_WIDTH, map_height)
+    plan.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
+    shown = shapely.box(*window)
+
+    _draw_surfaces(plan, geometry, shown)
+    _draw_targets(plan, site, deployment)
+    norm = _draw_obstacles(plan, geometry.occluders, site, shown)
+    _draw_areas(plan, geometry, site.region)
+    _draw_candidates(plan, site)
+    draw_sensors(plan, deployment, np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2), SENSOR)
+    _draw_scale(plan, width)
+    _draw_north(plan)
+    draw_title(figure, site, deployment, MARGIN)
+    panel = _axes(figure, MAP_WIDTH + 2 * MARGIN, MARGIN, PANEL_WIDTH, map_height)
+    panel.set(xlim=(0.0, PANEL_WIDTH), ylim=(map_height, 0.0), facecolor=PAPER)
+    panel.axis("off")
+    _Panel(panel).draw(geometry, site, deployment, norm, map_height)
+    return figure
+
+
+def _window(region: BaseGeometry) -> tuple[float, float, float, float]:
+    """Return the part of the plane to show: the region with some room, of a shape that fits the page."""
+    left, bottom, right, top = region.bounds
+    around = AROUND * max(right - left, top - bottom)
+    width, height = right - left + 2 * around, top - bottom + 2 * around
+    shape = min(max(height / width, SHORTEST_MAP / MAP_WIDTH), TALLEST_MAP / MAP_WIDTH)
+    width, height = max(width, height / shape), max(height, width * shape)
+    x, y = (left + right) / 2, (bottom + top) / 2
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Return axes without ticks at a place given in inches."""
+    page_width, page_height = figure.get_size_inches()
+    axes = figure.add_axes((left / page_width, bottom / page_height, width / page_width, height / page_height))
+    axes.set(xticks=(), yticks=())
+    for spine in axes.spines.values():
+        spine.set(color=SOFT_INK, linewidth=0.8)
+    return axes
+
+
+def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
+    for mesh in geometry.ground:
+        _draw_area(plan, _footprint(mesh, shown), facecolor=GROUND, edgecolor="none", zorder=BACK)
+    pavement = shapely.intersection(geometry.candidate_areas, shown)
+    _draw_area(plan, _healed(pavement), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
+    roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
+    _draw_area(plan, _healed(roads), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+
+
+def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
+    """Return what a mesh covers in plan, near the part that is shown."""
+    flat = shapely.polygons(mesh.triangles[:, :, :2])
+    flat = flat[(shapely.area(flat) > FLAT) & shapely.intersects(flat, shown)]
+    return shapely.union_all(flat, grid_size=1e-3)
+
+
+def _healed(area: BaseGeometry) -> BaseGeometry:
+    """Close the cracks between surfaces that were modelled one by one."""
+    return area.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre")
+
+
+def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
+    half = site.targets.spacing / 2
+    corners = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
+    colours = np.array(SEEN_COLOURS)[np.minimum(deployment.seen_by, SEEN_TWICE)]
+    squares = site.targets.xyz[:, None, :2] + corners
+    plan.add_collection(
+        PolyCollection(squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET),
+        autolim=False,
+    )
+
+
+def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: BaseGeometry) -> Normalize:
+    """Draw what stands in the way, the higher the darker, and return the scale of heights."""
+    triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
+    flat = shapely.polygons(triangles[:, :, :2])
+    drawn = (shapely.area(flat) > FLAT) & shapely.intersects(flat, shown)
+    triangles, flat = triangles[drawn], flat[drawn]
+    height = triangles[:, :, 2].max(axis=1) - _road_level(site, triangles.mean(axis=1))
+    norm = Normalize(0.0, 5.0 * math.ceil(max(10.0, height.max(initial=0.0)) / 5.0))
+    order = np.argsort(triangles[:, :, 2].max(axis=1), kind="stable")
+    colours = HEIGHTS(norm(height[order]))
+    plan.add_collection(
+        PolyCollection(
+            triangles[order, :, :2], facecolors=colours, edgecolors="none", antialiaseds=False, zorder=OBSTACLE
+        ),
+        autolim=False,
+    )
+    outline = shapely.union_all(flat, grid_size=1e-3)
+    _draw_area(plan, outline, facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    return norm
+
+
+def _road_level(site: Site, points: Float) -> Float:
+    """Return the height of the road at the target next to each point."""
+    targets = site.targets.xyz
+    nearest = shapely.STRtree(shapely.points(targets[:, :2])).nearest(shapely.points(points[:, :2]))
+    level: Float = targets[nearest, 2]
+    return level
+
+
+def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
+    _draw_area(plan, region, facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    for areas, colour, hatch in (
+        (geometry.forbidden_areas, FORBIDDEN, "////"),
+        (geometry.mandatory_areas, MANDATORY, "...."),
+    ):
+        for area in areas:
+            _draw_area(
+                plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER
+            )
+    for area in geometry.weighted_regions:
+        _draw_area(plan, area.polygon, facecolor="none", edgecolor=PAPER, linewidth=2.8, zorder=BORDER)
+        _draw_area(
+            plan,
+            area.polygon,
+            facecolor="none",
+            edgecolor=WEIGHTED,
+            linewidth=1.5,
+            linestyle=(0, (5, 2)),
+            zorder=BORDER,
+        )
+
+
+def _draw_area(plan: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+    """Draw a polygon with its holes, or several."""
+    polygons = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty]
+    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
+    if rings:
+        path = Path.make_compound_path(*(Path(np.asarray(ring.coords)[:, :2], closed=True) for ring in rings))
+        plan.add_patch(PathPatch(path, **style))
+
+
+def _draw_candidates(plan: Axes, site: Site) -> None:
+    position, on_pole = site.candidates.position, site.candidates.on_pole
+    for these, style in ((~on_pole, SIDEWALK_MARK), (on_pole, POLE_MARK)):
+        plan.plot(position[these, 0], position[these, 1], zorder=CANDIDATE, **style)
+
+
+SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
+POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
+
+
+def _draw_scale(plan: Axes, width: float) -> None:
+    """Draw a bar of a round length, about a fifth of the picture."""
+    decade = 10.0 ** math.floor(math.log10(width / 5))
+    length = max(step * decade for step in (1, 2, 5) if step * decade <= width / 5)
+    inch = width / MAP_WIDTH
+    left, bottom = plan.get_xlim()[0] + 0.25 * inch, plan.get_ylim()[0] + 0.25 * inch
+    plan.add_patch(
+        Rectangle(
+            (left - 0.13 * inch, bottom - 0.12 * inch),
+            length + 0.45 * inch,
+            0.52 * inch,
+            facecolor=PAPER,
+            alpha=0.9,
+            edgecolor="none",
+            zorder=TEXT,
+        )
+    )
+    for part in range(4):
+        colour = INK if part % 2 == 0 else PAPER
+        plan.add_patch(
+            Rectangle(
+                (left + part * length / 4, bottom),
+                length / 4,
+                0.08 * inch,
+                facecolor=colour,
+                edgecolor=INK,
+                linewidth=0.7,
+                zorder=TEXT,
+            )
+        )
+    for at, words in ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length:g} m")):
+        plan.text(left + at, bottom + 0.13 * inch, words, ha="center", va="bottom", size=8, color=INK, zorder=TEXT)
+
+
+def _draw_north(plan: Axes) -> None:
+    """Draw an arrow along +y, which is north in map coordinates."""
+    (left, right), (_, top) = plan.get_xlim(), plan.get_ylim()
+    inch = (right - left) / MAP_WIDTH
+    x, y = right - 0.38 * inch, top - 0.82 * inch
+    plan.add_patch(
+        Rectangle(
+            (x - 0.24 * inch, y - 0.1 * inch),
+            0.48 * inch,
+            0.8 * inch,
+            facecolor=PAPER,
+            alpha=0.9,
+            edgecolor="none",
+            zorder=TEXT,
+        )
+    )
+    arrow = np.array([(0.0, 0.42), (0.12, 0.0), (0.0, 0.09), (-0.12, 0.0)]) * inch + (x, y)
+    plan.fill(arrow[:, 0], arrow[:, 1], facecolor=INK, edgecolor="none", zorder=TEXT)
+    plan.text(x, y + 0.46 * inch, "N", ha="center", va="bottom", size=9, weight="bold", color=INK, zorder=TEXT)
+
+
+class _Panel:
+    """The legend, written from top to bottom; lengths in inches."""
+
+    def __init__(self, axes: Axes) -> None:
+        self.axes = axes
+        self.y = 0.0
+
+    def draw(
+        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, height: float
+    ) -> None:
+        """Write all parts, with as many sensors as there is room for in the height."""
+        weights = sorted({area.weight for area in geometry.weighted_regions})
+        below = 3.72 + LINE * (3 + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas))
+        self._sensors(deployment, rows=max(1, int((height - below) / ROW)))
+        self._targets(site, deployment)
+        self._map(geometry, site, weights)
+        self._heights(heights)
+
+    def _sensors(self, deployment: Deployment, rows: int) -> None:
+        self._heading("Sensors")
+        markers = markers_of(deployment)
+        for sensor in deployment.sensors[:rows]:
+            self._mark(marker=markers[sensor.model.key], **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
+            self._text(0.34, sensor.label, weight="bold")
+            self._text(0.70, f"{_short(sensor.model.name, 28)}, {sensor.height:.3g} m")
+            self._text(PANEL_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
+            self.y += ROW - LINE
+            self._text(0.70, _short(sensor.position_name, 40), color=SOFT_INK, size=8)
+            self.y += LINE
+        if len(deployment.sensors) > rows:
+            self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
+            self.y += LINE
+        self._text(0.0, "Per cent of the road that each sees alone", color=SOFT_INK, size=8)
+        self.y += 0.38
+
+    def _targets(self, site: Site, deployment: Deployment) -> None:
+        self._heading("Road")
+        counts = np.bincount(np.minimum(deployment.seen_by, SEEN_TWICE), minlength=SEEN_TWICE + 1)
+        for times in reversed(range(SEEN_TWICE + 1)):
+            self._swatch(facecolor=SEEN_COLOURS[times])
+            self._text(0.34, SEEN_WORDS[times])
+            self._text(PANEL_WIDTH, percent(counts[times] / len(site.targets)), ha="right", weight="bold")
+            self.y += LINE
+        self._text(0.0, f"{len(site.targets):,} points, {site.targets.spacing:g} m apart", color=SOFT_INK, size=8)
+        self.y += 0.38
+
+    def _map(self, geometry: SceneGeometry, site: Site, weights: Iterable[float]) -> None:
+        self._heading("Map")
+        self._swatch(facecolor="none", edgecolor=INK, linewidth=1.1)
+        self._line("region of interest")
+        for weight in weights:
+            names = [area.name for area in geometry.weighted_regions if area.weight == weight]
+            words = f"{_short(names[0], 26)} counts" if len(names) == 1 else f"{len(names)} areas that count"
+            self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
+            self._line(f"{words} {weight:g} times")
+        for areas, colour, hatch, words in (
+            (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
+            (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
+        ):
+            if areas:
+                self._swatch(facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9)
+                self._line(words)
+        on_pole = site.candidates.on_pole
+        for these, mark, words in (
+            (~on_pole, SIDEWALK_MARK, "possible new posts"),
+            (on_pole, POLE_MARK, "existing poles"),
+        ):
+            if these.any():
+                self._mark(**mark | {"markersize": mark["markersize"] * 1.4})
+                self._line(f"{np.count_nonzero(these)} {words}")
+        self.y += 0.14
+
+    def _heights(self, norm: Normalize) -> None:
+        self._heading("Obstacles, height above the road")
+        highest = float(norm.vmax or 0.0)
+        ramp = np.linspace(0.0, highest, 128)[None, :]
+        self.axes.imshow(
+            HEIGHTS(norm(ramp)), extent=(0.0, 2.2, self.y + 0.16, self.y), aspect="auto", interpolation="nearest"
+        )
+        self.axes.set(xlim=(0.0, PANEL_WIDTH), ylim=self.axes.get_ylim())
+        self.y += 0.3
+        for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
+            unit = " m" if share == 1.0 else ""
+            self._text(2.2 * share, f"{highest * share:g}{unit}", ha=align, size=8)
+
+    def _heading(self, words: str) -> None:
+        self._text(0.0, words, weight="bold", size=11, y=self.y + 0.04)
+        self.axes.plot((0.0, PANEL_WIDTH), (self.y + 0.16,) * 2, color=SOFT_INK, linewidth=0.6)
+        self.y += 0.36
+
+    def _line(self, words: str) -> None:
+        self._text(0.34, words)
+        self.y += LINE
+
+    def _text(self, x: float, words: str, *, y: float | None = None, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        plain: Style = {"size": 9, "color": INK, "ha": "left", "va": "center", "parse_math": False}
+        self.axes.text(x, self.y if y is None else y, words, **plain | style)
+
+    def _swatch(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        self.axes.add_patch(Rectangle((0.02, self.y - 0.07), 0.2, 0.14, **style))
+
+    def _mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+        self.axes.plot(0.12, self.y, clip_on=False, **style)
+
+
+def _short(words: str, length: int) -> str:
+    return words if len(words) <= length else f"{words[: length - 1]}…"

@@ -1,0 +1,205 @@
+"""Ray casting against static triangles, behind one interface.
+
+Blender's BVH tree exists within Blender's Python alone and is imported where
+its caster is made. Embree (embreex) is used when it is installed.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import SeipError
+
+Float = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Engine = Literal["auto", "bvh", "embree"]
+
+
+class RayCaster(Protocol):
+    """What casts rays. Both sides of a triangle stop a ray.
+
+    Attributes
+    ----------
+    name : str
+        Of the engine, ``bvh`` or ``embree``.
+    triangles : (n, 3, 3) float64, metres
+        As they were given, so that hits index them.
+    dropped : int
+        How many of them have no area and stop no ray.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the engine."""
+
+    @property
+    def triangles(self) -> Float:
+        """The triangles that hits index."""
+
+    @property
+    def dropped(self) -> int:
+        """How many of the triangles have no area."""
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays from one point.
+
+        Parameters
+        ----------
+        origin : (3,) float64, metres
+        directions : (n, 3) float64
+            Unit vectors.
+        max_range : float, metres
+            What is farther away is not hit.
+
+        Returns
+        -------
+        distance : (n,) float64, metres
+            To the first triangle; infinite on a miss. A ray's result does not
+            depend on the rays that are cast with it.
+        triangle : (n,) int64
+            Its index; -1 on a miss.
+        """
+
+
+def make_ray_caster(triangles: Float, engine: Engine = "auto") -> RayCaster:
+    """Build a ray caster; ``auto`` takes Embree where it is installed, else Blender's BVH tree.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+    engine : {"auto", "bvh", "embree"}
+
+    Raises
+    ------
+    SeipError
+        A coordinate is not finite, or the engine is not there.
+    """
+    if engine == "auto":
+        engine = "embree" if importlib.util.find_spec("embreex") else "bvh"
+    if engine == "embree":
+        return EmbreeRayCaster(triangles)
+    if engine == "bvh":
+        return BvhRayCaster(triangles)
+    raise SeipError(f"no ray-casting engine '{engine}'; choose auto, bvh or embree")
+
+
+class BvhRayCaster:
+    """Casts rays with ``mathutils.bvhtree``.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+    """
+
+    name = "bvh"
+
+    def __init__(self, triangles: Float) -> None:
+        try:
+            from mathutils.bvhtree import BVHTree  # noqa: PLC0415 - exists within Blender's Python alone
+        except ImportError as error:
+            raise SeipError(
+                "the ray-casting engine bvh needs Blender's Python: run within Blender, or import bpy first"
+            ) from error
+        self.triangles = triangles
+        self._index, self._centre, corners = _rebased(triangles)
+        self.dropped = len(triangles) - len(corners)
+        with _no_garbage_collection():  # else it walks the growing lists again and again
+            points = corners.reshape(-1, 3).tolist()
+            faces = np.arange(len(points)).reshape(-1, 3).tolist()
+            self._tree = BVHTree.FromPolygons(points, faces, all_triangles=True)
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays from one point; see `RayCaster.cast`."""
+        start = (origin - self._centre).tolist()
+        ray_cast = self._tree.ray_cast
+        with _no_garbage_collection():
+            hits = [ray_cast(start, direction, max_range)[2:] for direction in directions.tolist()]
+        face = np.array([-1 if hit[0] is None else hit[0] for hit in hits], dtype=np.int64)
+        distance = np.array([np.inf if hit[1] is None else hit[1] for hit in hits], dtype=np.float64)
+        return _result(distance, face, self._index, max_range)
+
+
+class EmbreeRayCaster:
+    """Casts rays with Embree, through embreex.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+    """
+
+    name = "embree"
+
+    def __init__(self, triangles: Float) -> None:
+        try:
+            from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415 - an extra that need not be installed
+            from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415 - as above
+        except ImportError as error:
+            raise SeipError("the ray-casting engine embree is not installed; choose bvh or install embreex") from error
+        self.triangles = triangles
+        self._index, self._centre, corners = _rebased(triangles)
+        self.dropped = len(triangles) - len(corners)
+        self._scene = EmbreeScene(robust=True)  # no leaks along shared edges
+        self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays from one point; see `RayCaster.cast`."""
+        if self._mesh is None or len(directions) == 0:
+            return np.full(len(directions), np.inf), np.full(len(directions), -1, dtype=np.int64)
+        start = np.broadcast_to((origin - self._centre).astype(np.float32), directions.shape)
+        reach = np.full(len(directions), max_range, dtype=np.float32)
+        hits = self._scene.run(np.ascontiguousarray(start), directions.astype(np.float32), dists=reach, output=True)
+        return _result(hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64), self._index, max_range)
+
+
+def _rebased(triangles: Float) -> tuple[Integer, Float, Float]:
+    """Pick the triangles that have an area and move them to their common centre.
+
+    Both engines compute in float32, which is off by metres at map coordinates.
+
+    Returns
+    -------
+    index : (k,) int64
+        Of the picked triangles.
+    centre : (3,) float64, metres
+    corners : (k, 3, 3) float64, metres
+        The picked triangles, less the centre.
+    """
+    if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
+        raise SeipError(f"triangles must be an array of n x 3 corners x 3 coordinates, not {triangles.shape}")
+    broken = np.flatnonzero(~np.isfinite(triangles).all(axis=(1, 2)))
+    if len(broken):
+        raise SeipError(f"{len(broken)} triangles have coordinates that are not finite, the first is {broken[0]}")
+    if len(triangles) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(3), triangles
+    points = triangles.reshape(-1, 3)
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    corners = triangles - centre
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    index = np.flatnonzero(area > 0)
+    return index, centre, corners[index]
+
+
+def _result(distance: Float, face: Integer, index: Integer, max_range: float) -> tuple[Float, Integer]:
+    """Turn an engine's faces into indices of the given triangles, and what lies too far into misses."""
+    hit = (face >= 0) & (distance <= max_range)
+    triangle = np.full(len(face), -1, dtype=np.int64)
+    triangle[hit] = index[face[hit]]
+    return np.where(hit, distance, np.inf), triangle
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()

@@ -1,0 +1,85 @@
+"""Where δ and the grid spacing cannot resolve a sensor's rings, in words.
+
+On a level road h below the sensor the channel of elevation -φ draws a ring of
+radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets
+between them count as unseen although nothing stands before them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .lidar import LidarModel, find_models
+from .site import Site
+from .visibility import VisibilitySettings
+
+Float = NDArray[np.float64]
+
+
+def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:
+    """Say where coverage counts beams rather than view.
+
+    Parameters
+    ----------
+    site : Site
+    models : mapping of str to LidarModel
+        At least those that the candidates name.
+    settings : VisibilitySettings
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each sensor type that is concerned, and one if targets are too far apart for δ.
+    """
+    poses = site.candidates
+    warnings = []
+    for key, model in find_models(models, np.unique(poses.sensor).tolist()).items():
+        of_type = poses.sensor == key
+        reach = min(model.max_range, _farthest(poses.xyz[of_type], site.targets.xyz))
+        heights = np.unique(np.round(poses.height[of_type], 2))
+        limits = [(height, unresolved_from(model, float(height), settings.delta, reach)) for height in heights]
+        beyond = [f"{limit:.0f} m (at {height:g} m height)" for height, limit in limits if limit < reach]
+        if beyond:
+            warnings.append(
+                f"{key}: beyond {', '.join(beyond)} neighbouring rings on a level road are more than "
+                f"2δ = {2 * settings.delta:g} m apart, so coverage there counts beams, not view"
+            )
+    if settings.delta < site.targets.spacing / math.sqrt(2):
+        warnings.append(
+            f"targets are {site.targets.spacing:g} m apart and δ is {settings.delta:g} m: road between them "
+            f"lies within δ of none; take a δ of at least {site.targets.spacing / math.sqrt(2):.2g} m or a finer grid"
+        )
+    return tuple(warnings)
+
+
+def unresolved_from(model: LidarModel, height: float, delta: float, reach: float) -> float:
+    """Return the radius from which some neighbouring returns on a level road are more than 2δ apart.
+
+    Parameters
+    ----------
+    model : LidarModel
+    height : float, metres
+        Of the sensor above the road.
+    delta, reach : float, metres
+        Nothing is looked for beyond ``reach``.
+
+    Returns
+    -------
+    float, metres
+        ``reach`` if all is resolved.
+    """
+    down = np.sort(-model.elevations[model.elevations < 0])[::-1]
+    rings = height / np.tan(down)
+    rings = np.append(rings[rings < reach], reach)
+    wide = np.flatnonzero(np.diff(rings) > 2 * delta)
+    along = delta * model.azimuth_count / math.pi  # radius at which neighbours in a ring are 2δ apart
+    return float(min(rings[wide[0]] if len(wide) else reach, along, reach))
+
+
+def _farthest(poses: Float, targets: Float) -> float:
+    """Largest distance in plan between some pose and some target."""
+    return max(float(np.hypot(*(targets[:, :2] - pose[:2]).T).max()) for pose in poses)

@@ -1,0 +1,310 @@
+"""Lanes of a map as the surfaces of a street: carriageways, pavements, kerbs and lane markings."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
+
+from .terrain import Terrain, cut
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from shapely.geometry.base import BaseGeometry
+
+    from .opendrive import LaneSurface
+
+Float = NDArray[np.float64]
+
+GROUPS = {
+    "driving": "driving", "entry": "driving", "exit": "driving", "onRamp": "driving", "offRamp": "driving",
+    "connectingRamp": "driving", "slipLane": "driving", "bidirectional": "driving", "bus": "driving",
+    "taxi": "driving", "HOV": "driving", "mwyEntry": "driving", "mwyExit": "driving",
+    "shoulder": "shoulder", "stop": "shoulder", "restricted": "shoulder", "roadWorks": "shoulder",
+    "special1": "shoulder", "special2": "shoulder", "special3": "shoulder", "shared": "shoulder",
+    "parking": "parking",
+    "biking": "biking",
+    "border": "border", "curb": "border",
+    "sidewalk": "sidewalk", "walking": "sidewalk",
+    "median": "median",
+    "tram": "track", "rail": "track",
+}  # fmt: skip
+"""Group of each OpenDRIVE lane type (ASAM OpenDRIVE 1.8, table of e_laneType); ``none`` has no surface."""
+
+CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "border", "track")
+LONGEST_STEP = 10.0
+CORNER_NOTCH = 3.0
+"""Notches up to twice this (metres) at the corners of a junction are pavement."""
+KERB_HEIGHT = 0.12
+KERB_DEPTH = 0.35
+MARKING_WIDTH = 0.12
+MARKING_ABOVE = 0.012
+DASH, GAP = 3.0, 6.0
+STOP_LINE_WIDTH = 0.4
+STOP_LINE_SETBACK = 1.0
+GRID = 1e-4
+"""Grid (metres) that plans snap to when they are joined."""
+NARROW = 1.0
+"""Lanes narrower than this (metres) are tapers; nothing is painted along them."""
+SEAM = 0.05
+"""Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
+
+
+def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry) -> tuple[LaneSurface, ...]:
+    """Return the lanes near an area, in local axes, with a row of points at least each ten metres.
+
+    Parameters
+    ----------
+    surfaces : iterable of LaneSurface
+        In map coordinates.
+    origin : (3,) float64, metres
+        Map coordinates of the local origin.
+    area : shapely geometry
+        In local axes. Whole rows are kept: the lanes end a little beyond.
+    """
+    shapely.prepare(area)
+    moved = (_moved(surface, origin) for surface in surfaces if surface.lane_type in GROUPS)
+    near = _with_kerbs([surface for surface in moved if _near(surface, area)])
+    trimmed = (_trimmed(_densified(surface), area) for surface in near)
+    return tuple(surface for surface in trimmed if len(surface.left) > 1)
+
+
+def group(surface: LaneSurface) -> str:
+    """Return the group of a lane's type."""
+    return GROUPS[surface.lane_type]
+
+
+def in_groups(surfaces: Iterable[LaneSurface], groups: Sequence[str]) -> tuple[LaneSurface, ...]:
+    """Return the lanes of some groups."""
+    return tuple(surface for surface in surfaces if group(surface) in groups)
+
+
+def outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the area in plan that lanes cover, with seams and crumbs closed."""
+    return without_crumbs(closed(_plan(surfaces), SEAM).simplify(0.01))
+
+
+def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
+    """Return an area in plan with gaps up to twice ``gap`` metres filled."""
+    return area.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
+
+
+def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
+    """Return the area without parts and holes smaller than ``least`` square metres."""
+    parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and part.area >= least]
+    return shapely.union_all(
+        [
+            shapely.Polygon(part.exterior, [hole for hole in part.interiors if shapely.Polygon(hole).area >= least])
+            for part in parts
+        ]
+    )
+
+
+def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
+    """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
+
+    The lanes that cross each other in a junction are made one layer: where
+    driving lanes overlap the longest one counts, and other groups give way to
+    driving lanes. Between roads, whose lanes meet edge to edge, nothing is cut.
+    """
+    lanes = in_groups(surfaces, [name])
+    pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
+    for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
+        own = [lane for lane in lanes if lane.junction_id == junction]
+        driving = [] if name == "driving" else in_groups(surfaces, ["driving"])
+        covered = _plan([lane for lane in driving if lane.junction_id == junction])
+        for lane in sorted(own, key=lambda lane: -lane.polygon.area):
+            pieces.append(cut(lane.triangles, covered))
+            covered = covered.union(_plan([lane]), grid_size=GRID)
+    beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
+    return cut(np.concatenate(pieces), beyond)
+
+
+def kerb_faces(pavement: Float) -> Float:
+    """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3)."""
+    if len(pavement) == 0:
+        return pavement
+    plan = without_crumbs(closed(plan_of(pavement), SEAM).simplify(0.01))
+    terrain = Terrain(pavement)
+    parts = map(orient, shapely.get_parts(plan))
+    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    return np.concatenate([_skirt(ring, terrain) for ring in rings])
+
+
+def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
+    """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
+
+    Many maps end the pavements where the junction begins. A notch between the
+    ends of two pavements and the carriageway is filled at the pavements' height.
+    """
+    inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
+    if inside.is_empty or len(pavement) == 0:
+        return np.empty((0, 3, 3))
+    walked = plan_of(pavement)
+    street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
+    notches = closed(street, CORNER_NOTCH).difference(street)
+    corners = [
+        notch
+        for notch in shapely.get_parts(notches)
+        if notch.area > 1.0 and notch.distance(inside) < SEAM and notch.distance(walked) < SEAM
+    ]
+    return Terrain(pavement).drape(shapely.union_all(corners), spacing=LONGEST_STEP)
+
+
+def markings(surfaces: Sequence[LaneSurface]) -> Float:
+    """Return (n, 4, 3) quads of lines between and beside the driving lanes outside junctions."""
+    lanes = {(lane.road_id, lane.section, lane.lane_id): lane for lane in surfaces if lane.junction_id is None}
+    quads = [np.empty((0, 4, 3))]
+    for (road, section, number), lane in lanes.items():
+        if group(lane) != "driving":
+            continue
+        away = 1 if number > 0 else -1
+        inner = lanes.get((road, section, number - away if number != away else -away))
+        outer = lanes.get((road, section, number + away))
+        divides = inner is not None and group(inner) == "driving"
+        if number != -1 or not divides:  # the middle line is painted once, by lane 1
+            quads.append(_line(inner_edge(lane), lane, dashed=divides and number != away))
+        if outer is not None and group(outer) in ("shoulder", "biking", "parking", "border"):
+            quads.append(_line(outer_edge(lane), lane, dashed=False))
+    return np.concatenate(quads)
+
+
+def stop_lines(surfaces: Sequence[LaneSurface], *, keep_right: bool = True) -> Float:
+    """Return (n, 4, 3) quads where driving lanes enter a junction."""
+    junctions = [lane.polygon for lane in surfaces if lane.junction_id is not None and group(lane) == "driving"]
+    if not junctions:
+        return np.empty((0, 4, 3))
+    inside = shapely.union_all([shapely.make_valid(polygon) for polygon in junctions]).buffer(0.3)
+    shapely.prepare(inside)
+    quads = [np.empty((0, 4, 3))]
+    for lane in surfaces:
+        if lane.junction_id is None and group(lane) == "driving":
+            forward = (lane.lane_id < 0) == keep_right
+            left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
+            end = (left[-1, :2] + right[-1, :2]) / 2
+            if inside.contains(shapely.Point(end)) and np.hypot(*(left[-1] - right[-1])[:2]) > NARROW:
+                quads.append(_bar(left, right))
+    return np.concatenate(quads)
+
+
+def inner_edge(lane: LaneSurface) -> Float:
+    """Return the edge (n, 3) on the side of the reference line."""
+    return lane.right if lane.lane_id > 0 else lane.left
+
+
+def outer_edge(lane: LaneSurface) -> Float:
+    """Return the edge (n, 3) away from the reference line."""
+    return lane.left if lane.lane_id > 0 else lane.right
+
+
+def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
+    """Return the lanes with pavements raised to kerb height, where the map leaves all pavements flush.
+
+    Maps without lane heights (the towns of CARLA are some) mean pavements
+    that are raised in the street; 0.12 m is the usual upstand of a kerb.
+    """
+    inner_neighbour = {
+        (lane.road_id, lane.section, lane.lane_id + (1 if lane.lane_id > 0 else -1)): lane for lane in surfaces
+    }
+    steps = [0.0]
+    for lane in in_groups(surfaces, ["sidewalk"]):
+        neighbour = inner_neighbour.get((lane.road_id, lane.section, lane.lane_id))
+        if neighbour is not None and len(neighbour.left) == len(lane.left):
+            steps.append(float(np.median(inner_edge(lane)[:, 2] - outer_edge(neighbour)[:, 2])))
+    if max(steps) > KERB_HEIGHT / 4:
+        return tuple(surfaces)
+    up = np.array([0.0, 0.0, KERB_HEIGHT])
+    return tuple(
+        dataclasses.replace(lane, left=lane.left + up, right=lane.right + up) if group(lane) == "sidewalk" else lane
+        for lane in surfaces
+    )
+
+
+def plan_of(triangles: Float) -> BaseGeometry:
+    """Return the area in plan of triangles (n, 3, 3), none of them upright."""
+    return shapely.union_all(shapely.polygons(triangles[:, :, :2]), grid_size=GRID)
+
+
+def _plan(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    return shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=GRID)
+
+
+def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
+    return dataclasses.replace(surface, left=surface.left - origin, right=surface.right - origin)
+
+
+def _near(surface: LaneSurface, area: BaseGeometry) -> bool:
+    points = np.concatenate([surface.left, surface.right])[:, :2]
+    return bool(area.intersects(shapely.box(*points.min(axis=0), *points.max(axis=0))))
+
+
+def _densified(surface: LaneSurface) -> LaneSurface:
+    steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
+    pieces = np.maximum(1, np.ceil(steps / LONGEST_STEP).astype(int))
+    rows = np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))])
+    return dataclasses.replace(surface, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+
+
+def _at_rows(points: Float, rows: Float) -> Float:
+    known = np.arange(len(points))
+    return np.column_stack([np.interp(rows, known, points[:, axis]) for axis in range(3)])
+
+
+def _trimmed(surface: LaneSurface, area: BaseGeometry) -> LaneSurface:
+    left, right = surface.left[:, :2], surface.right[:, :2]
+    corners = np.stack([left[:-1], left[1:], right[1:], right[:-1]], axis=1)
+    hit = np.flatnonzero(shapely.intersects(area, shapely.convex_hull(shapely.multipoints(corners))))
+    rows = slice(hit[0], hit[-1] + 2) if len(hit) else slice(0, 0)
+    return dataclasses.replace(surface, left=surface.left[rows], right=surface.right[rows])
+
+
+def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:
+    """Return upright faces below a ring that has the area at its left; they face right."""
+    plan = np.asarray(ring.coords)[:, :2]
+    height = terrain.height(plan)
+    high, low = np.column_stack([plan, height]), np.column_stack([plan, height - KERB_DEPTH])
+    quads = np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _line(edge: Float, lane: LaneSurface, *, dashed: bool) -> Float:
+    """Return quads of a painted line along a lane's edge, where the lane is no mere taper."""
+    wide = np.hypot(*(lane.left - lane.right)[:, :2].T) > NARROW
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))])
+    if travelled[-1] <= 0 or not wide.all():
+        return np.empty((0, 4, 3))
+    if not dashed:
+        return _ribbon(edge)
+    begins = np.arange(0.0, max(travelled[-1] - DASH, 0.0) + 1e-9, DASH + GAP)
+    dashes = (np.stack([begins, np.minimum(begins + DASH, travelled[-1])], axis=1)).reshape(-1)
+    ends = np.column_stack([np.interp(dashes, travelled, edge[:, axis]) for axis in range(3)]).reshape(-1, 2, 3)
+    return np.concatenate([np.empty((0, 4, 3)), *map(_ribbon, ends)])
+
+
+def _ribbon(path: Float) -> Float:
+    """Return quads of marking width along a path (n, 3)."""
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]  # metres
+    if len(path) < 2:  # two ends
+        return np.empty((0, 4, 3))
+    along = np.gradient(path[:, :2], axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(path))]) * (MARKING_WIDTH / 2)
+    left, right = path + aside + [0, 0, MARKING_ABOVE], path - aside + [0, 0, MARKING_ABOVE]
+    return np.stack([right[:-1], right[1:], left[1:], left[:-1]], axis=1)
+
+
+def _bar(left: Float, right: Float) -> Float:
+    """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
+    near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
+    corners = [_before_end(right, far), _before_end(right, near), _before_end(left, near), _before_end(left, far)]
+    return np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
+
+
+def _before_end(path: Float, distance: float) -> Float:
+    left_over = np.cumsum(np.linalg.norm(np.diff(path[::-1], axis=0), axis=1))
+    return np.array([np.interp(distance, [0.0, *left_over], path[::-1, axis]) for axis in range(3)])

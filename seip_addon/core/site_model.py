@@ -1,0 +1,376 @@
+"""From a map and a site description to the parts of a scene, in local axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from . import road_surface, street_furniture
+from .errors import SeipError
+from .map_furniture import arm_heading, building_parts, object_parts, signal_part, signal_parts, tree_part
+from .opendrive import find_junction, junction_area, lane_surfaces, nearest_junctions, placed_objects, placed_signals
+from .site_description import DEFAULT_WEIGHT
+from .site_parts import Part, Role
+from .terrain import Terrain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from shapely.geometry.base import BaseGeometry
+
+    from .opendrive import LaneSurface, RoadMap
+    from .site_description import Poles, SiteDescription, WeightedRegion
+
+Float = NDArray[np.float64]
+
+MARGIN = 40.0
+"""How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
+CANDIDATE_MARGIN = 15.0
+"""How far outside the region of interest (metres) a new post may stand."""
+VERGE_STRIP = (0.8, 2.3)
+"""Where new posts may stand beside a road without pavements: metres from the carriageway."""
+VERGE_BELOW = 0.03
+VERGE_SPACING = 12.0
+REGION_ABOVE = 0.05
+REGION_SPACING = 10.0
+
+SURFACES = {
+    "driving": ("Driving lanes", "asphalt", Role.ROADS),
+    "shoulder": ("Shoulders", "asphalt shoulder", Role.ROADS),
+    "parking": ("Parking lanes", "asphalt parking", Role.ROADS),
+    "biking": ("Cycle lanes", "asphalt cycle", Role.ROADS),
+    "border": ("Borders", "asphalt shoulder", Role.ROADS),
+    "track": ("Tracks", "asphalt shoulder", Role.ROADS),
+    "median": ("Medians", "median", Role.GROUND),
+}
+"""Name, material and role of the surface of each group of lanes but the pavements."""
+
+
+@dataclass(frozen=True, eq=False)
+class SiteModel:
+    """A site as the parts of a scene.
+
+    Parameters
+    ----------
+    name : str
+    origin : (3,) float64, metres
+        Map coordinates of the local origin, whole metres.
+    geo_reference : str or None
+        Projection of the map, as the map gives it.
+    header_offset : (4,) float64
+        Of the map: x, y, z in metres and heading in radians.
+    parts : tuple of Part
+    region : shapely geometry
+        Region of interest in plan, local axes.
+    notes : tuple of str
+        What was assumed because the map does not say it, a sentence each.
+    """
+
+    name: str
+    origin: Float
+    geo_reference: str | None
+    header_offset: Float
+    parts: tuple[Part, ...]
+    region: BaseGeometry
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Street:
+    """What everything else of a site stands on and leans against, in local axes."""
+
+    lanes: tuple[LaneSurface, ...]
+    region: BaseGeometry
+    extent: BaseGeometry
+    carriageway: BaseGeometry
+    terrain: Terrain
+
+
+def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
+    """Model a place of a map.
+
+    Parameters
+    ----------
+    road_map : RoadMap
+    description : SiteDescription
+        Which place, and what stands there besides what the map has.
+
+    Raises
+    ------
+    SeipError
+        No such junction, no road at the place, or an empty region of interest.
+    """
+    surfaces = lane_surfaces(road_map)
+    centre = _centre(road_map, surfaces, description)
+    region = _region(road_map, surfaces, description, centre)
+    origin = _origin(surfaces, centre)
+    street = _street(surfaces, origin, _shifted(region, -origin))
+    signals = placed_signals(road_map, area=_shifted(street.extent, origin))
+    objects = placed_objects(road_map, area=_shifted(street.extent, origin))
+    furniture = [
+        *object_parts(objects, origin, street.carriageway),
+        *signal_parts(signals, origin, street.carriageway, street.terrain),
+        *_described_parts(description, origin, street),
+    ]
+    pavement, notes = _pavement_parts(street)
+    has_signals = any(Role.POLES in part.roles and part.name.startswith("Signal") for part in furniture)
+    parts = [
+        *_surface_parts(street),
+        *pavement,
+        _verge_part(street),
+        _marking_part(street, stop_lines=has_signals),
+        *furniture,
+        _region_part(street),
+        *_weighted_parts(road_map, surfaces, description, centre, origin, street),
+        *_area_parts(description, origin, street),
+    ]
+    return SiteModel(
+        name=description.name or road_map.name,
+        origin=origin,
+        geo_reference=road_map.geo_reference,
+        header_offset=road_map.header_offset,
+        parts=tuple(part for part in parts if part.solid.faces),
+        region=street.region,
+        notes=notes,
+    )
+
+
+def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription) -> Float:
+    """Return the middle (x, y) of the place in map coordinates."""
+    if description.near is not None:
+        return np.array(description.near)
+    if description.junction is not None:
+        junction = find_junction(road_map, surfaces, description.junction)
+        centre = _junction_driving_area(surfaces, junction.id).centroid
+    elif description.region is not None:
+        centre = description.region.centroid
+    else:
+        raise SeipError(
+            "no place is named: give --near X Y or --junction ID, or near, junction or region in the site file"
+        )
+    return np.array([centre.x, centre.y])
+
+
+def _region(
+    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
+) -> BaseGeometry:
+    """Return the region of interest in map coordinates."""
+    within = description.region or shapely.Point(centre).buffer(description.radius, quad_segs=32)
+    shapely.prepare(within)
+    driving = road_surface.in_groups((lane for lane in surfaces if lane.lane_type in road_surface.GROUPS), ["driving"])
+    shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
+    near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
+    if near:
+        region = road_surface.without_crumbs(road_surface.outline(near).intersection(_shifted(within, -shift)))
+        if not region.is_empty:
+            return _shifted(region, shift)
+    where = (
+        "within the region"
+        if description.region
+        else f"within {description.radius:g} m of ({centre[0]:g}, {centre[1]:g})"
+    )
+    raise SeipError(f"there is no driving lane {where}{_nearest(road_map, surfaces, centre)}")
+
+
+def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) -> str:
+    """Return the junctions next to a place, as the end of a sentence."""
+    names = []
+    for junction, _ in nearest_junctions(road_map, surfaces, *centre, 3):
+        middle = junction_area(surfaces, junction.id).centroid
+        names.append(f"{junction.id} at ({middle.x:.0f}, {middle.y:.0f})")
+    if names:
+        return f"; the nearest junctions are {', '.join(names)}"
+    x_low, y_low, x_high, y_high = shapely.total_bounds([lane.polygon for lane in surfaces])
+    return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
+
+
+def _origin(surfaces: Sequence[LaneSurface], centre: Float) -> Float:
+    """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
+    points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in surfaces])
+    nearest = points[np.argmin(np.hypot(*(points[:, :2] - centre).T))]
+    return np.round([*centre, nearest[2]])
+
+
+def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Street:
+    extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
+    lanes = road_surface.local_strips(surfaces, origin, extent)
+    triangles = np.concatenate([lane.triangles for lane in lanes])
+    carriageway = road_surface.outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
+    shapely.prepare(carriageway)
+    return _Street(lanes, region, extent, carriageway, Terrain(triangles))
+
+
+def _surface_parts(street: _Street) -> list[Part]:
+    groups = {road_surface.group(lane) for lane in street.lanes}
+    return [
+        Part(
+            name,
+            street_furniture.from_faces(road_surface.group_triangles(street.lanes, group, street.extent), material),
+            (role,),
+        )
+        for group, (name, material, role) in SURFACES.items()
+        if group in groups
+    ]
+
+
+def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
+    """Return pavements near the region (where posts may stand), those beyond, their kerbs, and notes."""
+    triangles = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
+    if len(triangles) == 0:
+        return [_verge_strip(street)], ("the map has no pavements: new posts may stand on a strip of verge",)
+    corners = road_surface.corner_pavements(triangles, street.lanes)
+    triangles = np.concatenate([triangles, corners])
+    plan = shapely.polygons(triangles[:, :, :2])
+    near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
+    kerbs = road_surface.kerb_faces(triangles)
+    parts = [
+        Part("Pavements", _solid(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
+        Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
+        Part("Kerbs", _solid(kerbs, "kerb"), (Role.GROUND,)),
+    ]
+    notes = (
+        ("the pavements are closed round the corners of junctions, where the map leaves gaps",) if len(corners) else ()
+    )
+    return parts, notes
+
+
+def _verge_strip(street: _Street) -> Part:
+    inner, outer = VERGE_STRIP
+    strip = street.carriageway.buffer(outer).difference(street.carriageway.buffer(inner))
+    near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
+    triangles = street.terrain.drape(near, spacing=REGION_SPACING)
+    return Part("Verge strip", _solid(triangles, "verge"), (Role.CANDIDATE_AREAS,))
+
+
+def _verge_part(street: _Street) -> Part:
+    """Return the ground beside all lanes, a little below their edges and under their seams."""
+    covered = road_surface.outline(street.lanes).buffer(-road_surface.SEAM, join_style="mitre")
+    beside = road_surface.without_crumbs(street.extent.difference(covered))
+    triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
+    return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
+
+
+def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
+    quads = road_surface.markings(street.lanes)
+    if stop_lines:
+        quads = np.concatenate([quads, road_surface.stop_lines(street.lanes)])
+    quads = quads[shapely.contains_xy(street.extent, quads[:, :, :2].mean(axis=1))]
+    return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
+
+
+def _region_part(street: _Street) -> Part:
+    return Part("Region of interest", _draped(street.region, street), (Role.REGION,))
+
+
+def _weighted_parts(  # the map, the place and its axes
+    road_map: RoadMap,
+    surfaces: Sequence[LaneSurface],
+    description: SiteDescription,
+    centre: Float,
+    origin: Float,
+    street: _Street,
+) -> Iterable[Part]:
+    """Yield the weighted regions; where none is described, the box of the junction next to the middle."""
+    if not description.weighted_regions:
+        nearest = nearest_junctions(road_map, surfaces, *centre, 1)
+        boxes = [(f"Junction {found.id}", _central_box(surfaces, found.id), DEFAULT_WEIGHT) for found, _ in nearest]
+    else:
+        boxes = [
+            (weighted.name, _weighted_area(road_map, surfaces, weighted), weighted.weight)
+            for weighted in description.weighted_regions
+        ]
+    for name, area, weight in boxes:
+        local = _shifted(area, -origin)
+        if local.intersects(street.region):
+            yield Part(name, _draped(local, street), (Role.WEIGHTED_REGIONS,), weight=weight)
+        elif description.weighted_regions:
+            raise SeipError(
+                f"the weighted region {name!r} lies outside the region of interest; move it or widen the region"
+            )
+
+
+def _weighted_area(road_map: RoadMap, surfaces: Sequence[LaneSurface], weighted: WeightedRegion) -> BaseGeometry:
+    if weighted.junction is None:
+        return weighted.polygon
+    return _central_box(surfaces, find_junction(road_map, surfaces, weighted.junction).id)
+
+
+def _central_box(surfaces: Sequence[LaneSurface], junction_id: str) -> BaseGeometry:
+    """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
+    return shapely.minimum_rotated_rectangle(_junction_driving_area(surfaces, junction_id))
+
+
+def _junction_driving_area(surfaces: Sequence[LaneSurface], junction_id: str) -> BaseGeometry:
+    inside = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
+    area = junction_area(inside, junction_id)
+    return junction_area(surfaces, junction_id) if area.is_empty else area
+
+
+def _area_parts(description: SiteDescription, origin: Float, street: _Street) -> list[Part]:
+    kinds = (
+        (description.forbidden_areas, Role.FORBIDDEN_AREAS),
+        (description.mandatory_areas, Role.MANDATORY_AREAS),
+    )
+    return [
+        Part(area.name, _draped(_shifted(area.polygon, -origin), street), (role,))
+        for areas, role in kinds
+        for area in areas
+    ]
+
+
+def _described_parts(description: SiteDescription, origin: Float, street: _Street) -> list[Part]:
+    """Return what the site description adds, standing on the ground."""
+    parts: list[Part] = []
+    for number, building in enumerate(description.buildings, start=1):
+        plan = shapely.get_coordinates(building.outline)[:-1] - origin[:2]
+        base = np.full(len(plan), street.terrain.height(plan).min() + building.base)
+        height = np.full(len(plan), building.height)
+        parts += building_parts(f"Building {number}", np.column_stack([plan, base]), height, number)
+    for number, wall in enumerate(description.walls, start=1):
+        foot = _on_ground(wall.line, origin, street)
+        panels = street_furniture.fence(foot, np.full(len(foot), wall.height), wall.thickness, side="wall")
+        parts.append(Part(f"Wall {number}", panels, (Role.OCCLUDERS,)))
+    trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, origin, street)]
+    parts += [
+        tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number)
+        for number, (foot, row) in enumerate(trees, start=1)
+    ]
+    parts += _poles("Street light", description.street_lights, origin, street)
+    parts += _poles("Signal pole", description.signal_poles, origin, street)
+    return parts
+
+
+def _poles(name: str, rows: Sequence[Poles], origin: Float, street: _Street) -> list[Part]:
+    parts = []
+    feet = [(foot, row) for row in rows for foot in _on_ground(row.positions, origin, street)]
+    for number, (foot, row) in enumerate(feet, start=1):
+        heading = arm_heading(foot[:2], street.carriageway) if row.heading is None else row.heading
+        called = f"{name} {number} of the site file" if name == "Signal pole" else f"{name} {number}"
+        if name == "Signal pole":
+            parts.append(signal_part(called, foot, heading, row.height, row.arm))
+        else:
+            shape = street_furniture.street_light(row.height, row.arm)
+            x, y, z = foot.tolist()
+            parts.append(Part(called, shape, (Role.POLES,), (x, y, z), heading))
+    return parts
+
+
+def _on_ground(plan: Float, origin: Float, street: _Street) -> Float:
+    local = plan - origin[:2]
+    return np.column_stack([local, street.terrain.height(local)])
+
+
+def _draped(area: BaseGeometry, street: _Street) -> street_furniture.Solid:
+    return _solid(street.terrain.drape(area, spacing=REGION_SPACING, above=REGION_ABOVE), "outline")
+
+
+def _solid(faces: Float, material: str) -> street_furniture.Solid:
+    return street_furniture.from_faces(faces, material)
+
+
+def _shifted(area: BaseGeometry, by: Float) -> BaseGeometry:
+    return shapely.transform(area, lambda xy: xy + by[:2])

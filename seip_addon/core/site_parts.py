@@ -1,0 +1,57 @@
+"""The parts that a modelled site is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .street_furniture import Solid
+
+Float = NDArray[np.float64]
+
+
+class Role(Enum):
+    """What a part means to the placement: its collection in the scene contract."""
+
+    REGION = "region of interest"
+    ROADS = "roads"
+    GROUND = "ground"
+    OCCLUDERS = "occluders"
+    POLES = "poles"
+    CANDIDATE_AREAS = "candidate areas"
+    WEIGHTED_REGIONS = "weighted regions"
+    FORBIDDEN_AREAS = "forbidden areas"
+    MANDATORY_AREAS = "mandatory areas"
+    DRESSING = "dressing"
+    """Looks alone: no ray ends on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One object of the scene.
+
+    Parameters
+    ----------
+    name : str
+    solid : Solid
+        Its shape; parts may share one.
+    roles : tuple of Role
+    foot : (3,) float64, metres
+        Where the shape's origin stands, local axes.
+    yaw : float, radians
+        How the shape is turned about the vertical, counter-clockwise.
+    weight : float or None
+        Of a weighted region.
+    """
+
+    name: str
+    solid: Solid
+    roles: tuple[Role, ...]
+    foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
+    weight: float | None = None

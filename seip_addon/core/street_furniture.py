@@ -1,0 +1,267 @@
+"""Procedural street furniture as plain arrays: few faces, true outlines.
+
+Every solid stands with its foot in the origin and z up; what has an arm
+reaches along +x. Sizes are in metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+POST_SIDES = 6
+TRUNK_SIDES = 6
+STOREY = 3.2
+BAY = 3.4
+WINDOW_PROUD = 0.03
+"""How far window panes stand before the wall, so that they are drawn before it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Faces with a material each.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64, metres
+    faces : tuple of tuple of int
+        Corners of each face, counter-clockwise seen from outside.
+    materials : tuple of str
+        Material of each face, a key of `scene.materials.COLOURS`.
+    """
+
+    vertices: Float
+    faces: tuple[tuple[int, ...], ...]
+    materials: tuple[str, ...]
+
+
+def join(*solids: Solid) -> Solid:
+    """Return one solid of many."""
+    offsets = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
+    faces = [
+        tuple(corner + int(offset) for corner in face)
+        for solid, offset in zip(solids, offsets, strict=False)
+        for face in solid.faces
+    ]
+    vertices = np.concatenate([solid.vertices for solid in solids]) if solids else np.empty((0, 3))
+    return Solid(vertices, tuple(faces), tuple(name for solid in solids for name in solid.materials))
+
+
+def from_faces(faces_xyz: Float, material: str) -> Solid:
+    """Return (n, k, 3) triangles or quads as one solid with shared corners."""
+    corners = faces_xyz.shape[1]
+    vertices, index = np.unique(faces_xyz.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = tuple(map(tuple, index.reshape(-1, corners).tolist()))
+    return Solid(vertices, faces, (material,) * len(faces))
+
+
+def prism(outline: Float, base: float, top: float, *, side: str, cap: str | None = None) -> Solid:
+    """Return the upright block above a simple outline.
+
+    Parameters
+    ----------
+    outline : (k, 2) float64, metres
+        Corners in plan, in any sense of turn, not closed.
+    base, top : float, metres
+        Lower and upper height.
+    side, cap : str
+        Materials of the sides and of the upper face; without ``cap`` that of the sides.
+    """
+    count = len(outline)
+    floor = np.column_stack([outline, np.full(count, base)])
+    return block(floor, np.full(count, top - base), side=side, cap=cap)
+
+
+def block(base: Float, height: Float, *, side: str, cap: str | None = None) -> Solid:
+    """Return the solid between an outline (k, 3) and the same outline raised by (k,) metres."""
+    turned = _signed_area(base) < 0
+    ring, tall = (base[::-1], height[::-1]) if turned else (base, height)
+    count = len(ring)
+    upper = ring + tall[:, None] * [0, 0, 1]
+    sides = [(i, (i + 1) % count, count + (i + 1) % count, count + i) for i in range(count)]
+    faces = (*sides, tuple(range(count, 2 * count)), tuple(reversed(range(count))))
+    return Solid(np.concatenate([ring, upper]), faces, (*([side] * count), cap or side, side))
+
+
+def fence(base: Float, height: Float, thickness: float, *, side: str) -> Solid:
+    """Return upright panels of a thickness along a path (k, 3), raised by (k,) metres."""
+    panels = []
+    for i in range(len(base) - 1):
+        along = base[i + 1, :2] - base[i, :2]
+        length = float(np.hypot(*along))
+        if length > 0:
+            aside = np.array([-along[1], along[0], 0.0]) / length * thickness / 2
+            corners = np.array([base[i] - aside, base[i + 1] - aside, base[i + 1] + aside, base[i] + aside])
+            panels.append(block(corners, height[[i, i + 1, i + 1, i]], side=side))
+    return join(*panels)
+
+
+def windows(outline: Float, base: float, height: float) -> Solid:
+    """Return the panes of a block: one in each bay of each storey, wide ones on the ground floor."""
+    ring = outline[::-1] if _signed_area(outline) < 0 else outline
+    storeys = max(1, int(height / STOREY))
+    panes = [
+        _panes(start, stop, base + storey * STOREY, shop=storey == 0)
+        for start, stop in zip(ring, np.roll(ring, -1, axis=0), strict=True)
+        for storey in range(storeys)
+        if height - storey * STOREY > 0.9 * STOREY
+    ]
+    quads = np.concatenate([np.empty((0, 4, 3)), *panes])
+    faces = tuple(map(tuple, np.arange(4 * len(quads)).reshape(-1, 4).tolist()))
+    return Solid(quads.reshape(-1, 3), faces, ("glass",) * len(quads))
+
+
+def street_light(height: float, arm: float) -> Solid:
+    """Return a street light: a tapering post, an arm and a flat luminaire."""
+    post = _tube([[0, 0, 0], [0, 0, height]], [0.09, 0.05], "steel")
+    if arm <= 0:
+        return join(post, _box([0, 0, height + 0.1], [0.45, 0.45, 0.2], "luminaire"))
+    reach = _tube([[0, 0, height - 0.05], [arm, 0, height + 0.1]], [0.04, 0.03], "steel", sides=4)
+    return join(post, reach, _box([arm + 0.2, 0, height + 0.08], [0.7, 0.28, 0.12], "luminaire"))
+
+
+def signal_pole(height: float, arm: float, *, faces_left: bool = True) -> Solid:
+    """Return a signal pole: a post with a head at eye level and, on a mast arm, one above the lane.
+
+    Parameters
+    ----------
+    height, arm : float, metres
+        Without an arm the post carries the low head alone.
+    faces_left : bool
+        Whether the lamps face +y, the left of the arm: the near side of the
+        junction where traffic keeps to the right. Else they face -y.
+    """
+    shaft = _tube([[0, 0, 0], [0, 0, height]], [0.11, 0.08], "steel")
+    low = _signal_head([0, 0.26, min(2.6, height - 0.5)])
+    if arm <= 0:
+        pole = join(shaft, low)
+    else:
+        reach = _tube([[0, 0, height - 0.25], [arm, 0, height - 0.1]], [0.07, 0.04], "steel", sides=4)
+        pole = join(shaft, low, reach, _signal_head([max(arm - 0.3, 0.3), 0.2, height - 0.45]))
+    return pole if faces_left else _mirrored(pole)
+
+
+def post(height: float, radius: float) -> Solid:
+    """Return a plain post."""
+    return _tube([[0, 0, 0], [0, 0, height]], [radius, radius], "steel")
+
+
+def tree(height: float, crown_diameter: float, variant: int) -> Solid:
+    """Return a tree: a trunk and an uneven crown.
+
+    Parameters
+    ----------
+    height, crown_diameter : float, metres
+    variant : int
+        Seed of the crown's shape, so that neighbours differ.
+    """
+    crown_height = min(0.68 * height, 1.35 * crown_diameter)
+    middle = height - crown_height / 2
+    trunk = _tube([[0, 0, 0], [0, 0, middle]], [0.025 * height, 0.012 * height], "bark", sides=TRUNK_SIDES)
+    random = np.random.default_rng(variant)
+    directions, faces = _icosphere()
+    bumps = 1.0 - 0.22 * random.random(len(directions))
+    half = np.array([crown_diameter, crown_diameter, crown_height]) / 2
+    shape = directions * bumps[:, None]
+    shape /= np.abs(shape).max(axis=0)  # the crown is as wide and as high as asked for
+    crown = Solid(shape * half + [0, 0, middle], faces, ("leaves",) * len(faces))
+    return join(trunk, crown)
+
+
+def _signed_area(outline: Float) -> float:
+    x, y = (outline[:, :2] - outline[0, :2]).T
+    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2
+
+
+def _panes(start: Float, stop: Float, floor: float, *, shop: bool) -> Float:
+    """Return (n, 4, 3) panes of one storey of one side, seen from outside counter-clockwise."""
+    along = stop - start
+    length = float(np.hypot(*along))
+    bays = int(length / BAY)
+    if bays == 0:
+        return np.empty((0, 4, 3))
+    along = along / length
+    outwards = np.array([along[1], -along[0]])
+    wide, sill, head = (0.82 * length / bays, 0.3, 2.7) if shop else (1.5, 0.95, 2.45)
+    middles = (np.arange(bays) + 0.5) * length / bays
+    low = start + outwards * WINDOW_PROUD + (middles - wide / 2)[:, None] * along
+    high = low + wide * along
+    corners = np.stack([low, high, high, low], axis=1)
+    heights = np.broadcast_to(floor + np.array([sill, sill, head, head]), (bays, 4))
+    return np.concatenate([corners, heights[..., None]], axis=2)
+
+
+def _tube(path: list[list[float]], radii: list[float], material: str, *, sides: int = POST_SIDES) -> Solid:
+    """Return a straight tapering tube between two points, closed at the far end."""
+    start, stop = np.asarray(path, dtype=np.float64)
+    axis = (stop - start) / np.linalg.norm(stop - start)
+    helper = np.array([0.0, 1.0, 0.0])
+    across = np.cross(helper, axis) / np.linalg.norm(np.cross(helper, axis))
+    second = np.cross(axis, across)
+    angle = np.arange(sides) * (2 * np.pi / sides)
+    circle = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * second
+    vertices = np.concatenate([start + radii[0] * circle, stop + radii[1] * circle])
+    around = [(i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides)]
+    faces = (*around, tuple(range(sides, 2 * sides)))
+    return Solid(vertices, faces, (material,) * len(faces))
+
+
+def _box(middle: list[float], size: list[float], material: str) -> Solid:
+    x, y, z = middle
+    dx, dy, dz = np.asarray(size) / 2
+    outline = np.array([[x - dx, y - dy], [x + dx, y - dy], [x + dx, y + dy], [x - dx, y + dy]])
+    return prism(outline, z - dz, z + dz, side=material)
+
+
+def _signal_head(middle: list[float]) -> Solid:
+    """Return a head of three lamps that face +y."""
+    x, y, z = middle
+    lamps = [_lamp(x, y + 0.13, z + offset, colour) for offset, colour in ((0.3, "red"), (0, "amber"), (-0.3, "green"))]
+    return join(_box(middle, [0.34, 0.24, 1.0], "signal housing"), *lamps)
+
+
+def _lamp(x: float, y: float, z: float, colour: str) -> Solid:
+    r = 0.11
+    vertices = np.array([[x + r, y, z - r], [x - r, y, z - r], [x - r, y, z + r], [x + r, y, z + r]])
+    return Solid(vertices, ((0, 1, 2, 3),), (f"{colour} lamp",))
+
+
+def _mirrored(solid: Solid) -> Solid:
+    """Return the solid with left and right of the arm exchanged."""
+    return Solid(solid.vertices * [1, -1, 1], tuple(face[::-1] for face in solid.faces), solid.materials)
+
+
+def _icosphere() -> tuple[Float, tuple[tuple[int, ...], ...]]:
+    """Return the unit icosahedron with each face cut in four: 42 vertices, 80 faces."""
+    golden = (1 + 5**0.5) / 2
+    corners = [
+        [-1, golden, 0], [1, golden, 0], [-1, -golden, 0], [1, -golden, 0],
+        [0, -1, golden], [0, 1, golden], [0, -1, -golden], [0, 1, -golden],
+        [golden, 0, -1], [golden, 0, 1], [-golden, 0, -1], [-golden, 0, 1],
+    ]  # fmt: skip
+    twenty = [
+        (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11),
+        (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8),
+        (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9),
+        (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1),
+    ]  # fmt: skip
+    points = [np.array(corner, dtype=np.float64) for corner in corners]
+    middles: dict[tuple[int, int], int] = {}
+
+    def middle(a: int, b: int) -> int:
+        key = (min(a, b), max(a, b))
+        if key not in middles:
+            middles[key] = len(points)
+            points.append(points[a] + points[b])
+        return middles[key]
+
+    faces: list[tuple[int, ...]] = []
+    for a, b, c in twenty:
+        ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+        faces += [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+    directions = np.array(points)
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True), tuple(faces)

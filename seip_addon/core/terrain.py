@@ -1,0 +1,111 @@
+"""The height of the ground: looked up on triangles, and areas in plan laid on them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+Float = NDArray[np.float64]
+
+LEAST_AREA = 1e-6
+"""Triangles smaller than this in plan (m²) carry nothing and are left out."""
+
+
+class Terrain:
+    """Heights on a set of triangles that overlap at most slightly in plan.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        None of them upright.
+    """
+
+    def __init__(self, triangles: Float) -> None:
+        self._triangles = triangles[_plan_area(triangles) > LEAST_AREA]
+        self._plan = shapely.polygons(self._triangles[:, :, :2])
+        self._tree = shapely.STRtree(self._plan)
+
+    def height(self, xy: Float) -> Float:
+        """Return the height below or above points in plan.
+
+        Parameters
+        ----------
+        xy : (n, 2) float64, metres
+
+        Returns
+        -------
+        (n,) float64, metres
+            Beside all triangles: the height at the nearest point of one.
+        """
+        points = shapely.points(xy)
+        nearest = self._tree.nearest(points)
+        on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
+        return plane_height(self._triangles[nearest], on_triangle)
+
+    def drape(self, area: BaseGeometry, *, spacing: float, above: float = 0.0) -> Float:
+        """Return an area in plan as triangles that lie on the terrain at their corners.
+
+        Parameters
+        ----------
+        area : shapely geometry
+        spacing : float, metres
+            Longest edge along the area's outline.
+        above : float, metres
+            Height over the terrain.
+
+        Returns
+        -------
+        (n, 3, 3) float64, metres
+            Normals up.
+        """
+        plan = triangulate(shapely.segmentize(area, spacing))
+        corners = plan.reshape(-1, 2)
+        if len(corners) == 0:
+            return np.empty((0, 3, 3))
+        return np.column_stack([corners, self.height(corners) + above]).reshape(-1, 3, 3)
+
+
+def triangulate(area: BaseGeometry) -> Float:
+    """Return (n, 3, 2) counter-clockwise triangles that fill an area in plan, with no corners of their own."""
+    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
+    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    edges = corners[:, 1:] - corners[:, :1]
+    turn = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    corners[turn < 0] = corners[turn < 0, ::-1]
+    return corners[np.abs(turn) > 2 * LEAST_AREA]
+
+
+def cut(triangles: Float, away: BaseGeometry) -> Float:
+    """Return (n, 3, 3) triangles without what lies in an area in plan."""
+    if len(triangles) == 0:
+        return triangles
+    plan = shapely.polygons(triangles[:, :, :2])
+    shapely.prepare(away)
+    touched = shapely.intersects(away, plan)
+    rests = shapely.difference(plan[touched], away)
+    pieces = [triangles[~touched]]
+    for triangle, rest in zip(triangles[touched], rests, strict=True):
+        if rest.area > LEAST_AREA:
+            corners = triangulate(rest)
+            flat = corners.reshape(-1, 2)
+            height = plane_height(np.broadcast_to(triangle, (len(flat), 3, 3)), flat)
+            pieces.append(np.column_stack([flat, height]).reshape(-1, 3, 3))
+    return np.concatenate(pieces)
+
+
+def plane_height(triangles: Float, xy: Float) -> Float:
+    """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    offset = xy - triangles[:, 0, :2]
+    return triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
+
+
+def _plan_area(triangles: Float) -> Float:
+    edges = triangles[:, 1:, :2] - triangles[:, :1, :2]
+    return np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2

@@ -1,0 +1,54 @@
+"""Sober materials for a street: one colour each, for renders and for the viewport."""
+
+from __future__ import annotations
+
+import bpy
+
+PREFIX = "SEIP "
+
+COLOURS = {
+    "asphalt": (0.085, 0.087, 0.090),
+    "asphalt shoulder": (0.125, 0.125, 0.125),
+    "asphalt parking": (0.155, 0.150, 0.145),
+    "asphalt cycle": (0.230, 0.090, 0.070),
+    "median": (0.300, 0.310, 0.270),
+    "pavement": (0.420, 0.410, 0.390),
+    "kerb": (0.560, 0.550, 0.530),
+    "verge": (0.250, 0.300, 0.180),
+    "marking": (0.850, 0.850, 0.840),
+    "wall": (0.480, 0.460, 0.430),
+    "facade brick": (0.420, 0.235, 0.180),
+    "facade plaster": (0.680, 0.640, 0.570),
+    "facade sand": (0.590, 0.500, 0.370),
+    "facade grey": (0.500, 0.505, 0.510),
+    "roof": (0.240, 0.235, 0.235),
+    "glass": (0.070, 0.105, 0.135),
+    "steel": (0.270, 0.285, 0.295),
+    "luminaire": (0.780, 0.780, 0.740),
+    "signal housing": (0.030, 0.030, 0.030),
+    "red lamp": (0.750, 0.040, 0.030),
+    "amber lamp": (0.300, 0.170, 0.020),
+    "green lamp": (0.020, 0.190, 0.090),
+    "bark": (0.160, 0.110, 0.075),
+    "leaves": (0.105, 0.210, 0.065),
+    "outline": (0.100, 0.450, 0.900),
+}
+"""Linear RGB of each material that the solids of `core.street_furniture` name."""
+
+ROUGHNESS = {"glass": 0.15, "steel": 0.4}
+
+
+def material(name: str) -> bpy.types.Material:
+    """Return the material of that name, made where the file has none yet."""
+    existing = bpy.data.materials.get(PREFIX + name)
+    if existing is not None:
+        return existing
+    made = bpy.data.materials.new(PREFIX + name)
+    colour = (*COLOURS[name], 1.0)
+    made.diffuse_color = colour
+    made.roughness = ROUGHNESS.get(name, 0.9)
+    made.use_nodes = True
+    surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    surface.inputs["Base Color"].default_value = colour
+    surface.inputs["Roughness"].default_value = made.roughness
+    return made

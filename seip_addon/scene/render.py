@@ -1,0 +1,175 @@
+"""A rendered view of the scene with the sensors and their coverage."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.errors import SeipError
+from ..core.labelled_view import save_labelled_view
+from ..core.viewpoint import Viewpoint, frame
+from . import collections as contract
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from ..core.deployment import Deployment
+    from ..core.site import Site
+
+    Float = NDArray[np.float64]
+
+WIDTH, HEIGHT = 1440, 810  # pixels
+SAMPLES = 16
+AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(48.0)  # of the camera, seen from the region
+FIELD_OF_VIEW = math.radians(35.0)  # across the picture
+ROOM = 1.04  # around the region
+SUN_DIRECTION = (math.radians(38.0), math.radians(-18.0), math.radians(20.0))
+AREAS = {
+    contract.REGION,
+    contract.CANDIDATE_AREAS,
+    contract.WEIGHTED_REGIONS,
+    contract.FORBIDDEN_AREAS,
+    contract.MANDATORY_AREAS,
+}
+UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
+
+
+def save_rendered_view(
+    path: str | os.PathLike[str], scene: bpy.types.Scene, site: Site, deployment: Deployment
+) -> None:
+    """Render the scene from an oblique angle in the south and label the sensors, as PNG.
+
+    The picture is taken in a scene of its own that shares the objects and is
+    removed afterwards, under its own camera, light and settings: the user's
+    scene is not touched and every scene is lit alike. Cycles renders on the
+    processor, because the other engines end the process where there is no OpenGL.
+
+    Parameters
+    ----------
+    path : path-like
+        The picture to write.
+    scene : bpy.types.Scene
+        Holds the result of `write_result`.
+    site : Site
+    deployment : Deployment
+        The chosen sensors and what they see.
+    """
+    with tempfile.TemporaryDirectory(prefix="seip-") as folder, _stage(scene) as stage:
+        raw = Path(folder) / "view.png"
+        viewpoint = _add_camera(stage, site)
+        _add_light(stage)
+        _set_up(stage, raw)
+        with _silence():
+            bpy.ops.render.render(scene=stage.name, write_still=True)
+        sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
+        save_labelled_view(path, raw, site, deployment, viewpoint.project(sensors))
+
+
+@contextmanager
+def _stage(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
+    """Yield a scene with everything of ``scene`` that renders, and remove it with all that was added to it."""
+    shared = _rendered_objects(scene)
+    images = set(bpy.data.images)
+    stage = bpy.data.scenes.new("SEIP view")
+    try:
+        for thing in shared:
+            stage.collection.objects.link(thing)
+        yield stage
+    finally:
+        own = [thing for thing in stage.collection.objects if thing not in shared]
+        world = [stage.world] if stage.world else []
+        bpy.data.scenes.remove(stage)
+        bpy.data.batch_remove([*own, *(thing.data for thing in own), *world, *(set(bpy.data.images) - images)])
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep Blender's lines about each step of a render from standard output, where results are printed."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    try:
+        with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the objects of the scene that renders show, without lights, cameras and areas in plan."""
+    found: dict[str, bpy.types.Object] = {}
+    layers = [scene.view_layers[0].layer_collection]
+    while layers:
+        layer = layers.pop()
+        if layer.exclude or layer.collection.hide_render or layer.collection.name in AREAS:
+            continue
+        layers.extend(layer.children)
+        found |= {thing.name_full: thing for thing in layer.collection.objects}
+    return [
+        found[name] for name in sorted(found) if found[name].type not in UNSEEN_TYPES and not found[name].hide_render
+    ]
+
+
+def _add_camera(stage: bpy.types.Scene, site: Site) -> Viewpoint:
+    """Add a camera that has the whole region in its picture, and return where it stands."""
+    data = bpy.data.cameras.new("SEIP view")
+    data.angle = FIELD_OF_VIEW
+    slope = math.tan(FIELD_OF_VIEW / 2.0)
+    slopes = np.array((slope, slope * HEIGHT / WIDTH))
+    tight = frame(site.targets.xyz, AZIMUTH, ELEVATION, slopes / ROOM)
+    camera = bpy.data.objects.new("SEIP view", data)
+    camera.matrix_world = Matrix.Translation(tight.place) @ Matrix(tight.axes.tolist()).to_4x4()
+    data.clip_end = 2.0 * float(np.linalg.norm(site.targets.xyz - tight.place, axis=1).max())
+    stage.collection.objects.link(camera)
+    stage.camera = camera
+    return Viewpoint(tight.place, tight.axes, slopes)
+
+
+def _add_light(stage: bpy.types.Scene) -> None:
+    sun = bpy.data.lights.new("SEIP view", "SUN")
+    sun.energy = 2.3
+    sun.angle = math.radians(3.0)
+    lamp = bpy.data.objects.new("SEIP view sun", sun)
+    lamp.rotation_euler = SUN_DIRECTION
+    stage.collection.objects.link(lamp)
+    world = bpy.data.worlds.new("SEIP view")
+    if world.node_tree is None:
+        world.use_nodes = True
+    nodes = world.node_tree.nodes
+    nodes.clear()
+    sky = nodes.new("ShaderNodeBackground")
+    sky.inputs["Color"].default_value = (0.80, 0.88, 1.0, 1.0)
+    sky.inputs["Strength"].default_value = 0.42
+    world.node_tree.links.new(sky.outputs["Background"], nodes.new("ShaderNodeOutputWorld").inputs["Surface"])
+    stage.world = world
+
+
+def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
+    if not hasattr(stage, "cycles"):
+        raise SeipError("this Blender has no Cycles, which renders the view; enable it in Preferences, Add-ons")
+    render = stage.render
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
+    render.filepath = str(raw)
+    render.image_settings.file_format = "PNG"
+    render.image_settings.color_mode = "RGBA"
+    render.film_transparent = True
+    stage.view_settings.view_transform = "Standard"
+    stage.cycles.device = "CPU"
+    stage.cycles.samples = SAMPLES
+    stage.cycles.seed = 0
+    stage.cycles.use_adaptive_sampling = False
+    stage.cycles.use_denoising = False
+    stage.cycles.max_bounces = 3

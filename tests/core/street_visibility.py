@@ -1,0 +1,94 @@
+"""Synthetic street visibility: junctions, wedges behind buildings, ranges. For tests and measurements."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seip_addon.core.placement import PlacementProblem
+
+
+def street_problem(
+    positions: int, targets: int, seed: int = 0, heights: int = 3, blocks: int = 3, **limits: object
+) -> PlacementProblem:
+    """Return candidates at kerbs and targets on the roads of a street grid with built-up blocks between."""
+    rng = np.random.default_rng(seed)
+    pitch, width = 100.0, 18.0
+    extent = blocks * pitch
+    points = _on_roads(rng, targets, extent, pitch, width * 0.4)
+    posts = _on_kerbs(rng, positions, extent, pitch, width * 0.5)
+    buildings = _buildings(rng, blocks, pitch, width)
+    trees = np.column_stack(
+        [_on_kerbs(rng, 12 * blocks * blocks, extent, pitch, width * 0.5), rng.uniform(0.8, 2.5, 12 * blocks * blocks)]
+    )
+    distance = np.hypot(*(posts[:, None] - points[None]).transpose(2, 0, 1))
+    hidden = _behind_boxes(posts, points, buildings) | _behind_discs(posts, points, trees)
+    visible, xyz = [], []
+    for level in range(heights):
+        height = 3.5 + 2.25 * level
+        reach = rng.normal(60.0 + 12.0 * level, 4.0, positions)[:, None]
+        blind = 0.35 * height / 0.27
+        # rings of the lower channels thin out with range: some cells fall between them
+        between = rng.random(distance.shape) < 0.25 * (distance / reach) ** 2
+        visible.append((distance < reach) & (distance > blind) & ~hidden & ~between)
+        xyz.append(np.column_stack([posts, np.full(positions, height)]))
+    return PlacementProblem(
+        visible=np.concatenate(visible),
+        weights=np.ones(targets),
+        prices=np.full(positions * heights, 6000.0),
+        positions=np.tile(np.arange(positions), heights),
+        xyz=np.concatenate(xyz),
+        labels=np.full(positions * heights, "type1"),
+        **limits,  # type: ignore[arg-type]
+    )
+
+
+def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> np.ndarray:
+    along = rng.uniform(0, extent, number)
+    across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + rng.uniform(-half, half, number)
+    flip = rng.random(number) < 0.5
+    return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
+
+
+def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> np.ndarray:
+    along = rng.uniform(0, extent, number)
+    side = rng.choice([-1.0, 1.0], number) * offset
+    across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + side
+    flip = rng.random(number) < 0.5
+    return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
+
+
+def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> np.ndarray:
+    boxes = []
+    for i in range(blocks + 1):
+        for j in range(blocks + 1):
+            low = np.array([i, j]) * pitch - pitch / 2 + width / 2 + rng.uniform(3, 10, 2)
+            high = np.array([i, j]) * pitch + pitch / 2 - width / 2 - rng.uniform(3, 10, 2)
+            boxes.append(np.concatenate([low, high]))
+    return np.array(boxes)
+
+
+def _behind_boxes(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    hidden = np.zeros((len(posts), len(points)), bool)
+    for row, post in zip(hidden, posts, strict=True):
+        step = points - post
+        step = np.where(np.abs(step) < 1e-9, 1e-9, step)
+        for box in boxes:
+            first, second = (box[:2] - post) / step, (box[2:] - post) / step
+            enter = np.minimum(first, second).max(axis=1)
+            leave = np.maximum(first, second).min(axis=1)
+            row |= (enter < leave) & (leave > 0) & (enter < 1)
+    return hidden
+
+
+def _behind_discs(posts: np.ndarray, points: np.ndarray, discs: np.ndarray) -> np.ndarray:
+    hidden = np.zeros((len(posts), len(points)), bool)
+    for row, post in zip(hidden, posts, strict=True):
+        step = points - post
+        length = (step**2).sum(axis=1)
+        for x, y, radius in discs:
+            centre = np.array([x, y]) - post
+            if np.hypot(*centre) < radius + 0.5:
+                continue
+            share = np.clip(step @ centre / length, 0, 1)
+            row |= np.hypot(*(share[:, None] * step - centre).T) < radius
+    return hidden

@@ -1,0 +1,46 @@
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.callouts import place_callouts
+
+BOUNDS = (0.0, 0.0, 1000.0, 800.0)
+CLEARANCE = 8.0
+
+
+def overlap(low_a, high_a, low_b, high_b):
+    return bool(np.all((low_a < high_b) & (low_b < high_a)))
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10_000), st.integers(1, 12))
+def test_with_room_no_label_hides_an_anchor_or_another_label_or_leaves_the_picture(seed, count):
+    random = np.random.default_rng(seed)
+    anchors = random.uniform((100, 100), (900, 700), (count, 2))
+    sizes = random.uniform((60, 15), (100, 25), (count, 2))
+    centres = place_callouts(anchors, sizes, BOUNDS, CLEARANCE)
+    low, high = centres - sizes / 2, centres + sizes / 2
+    assert np.all((low >= (0, 0)) & (high <= (1000, 800)))
+    for i in range(count):
+        for anchor in anchors:
+            assert not overlap(low[i], high[i], anchor, anchor)
+        for j in range(i):
+            assert not overlap(low[i], high[i], low[j], high[j])
+
+
+def test_without_room_labels_stay_in_the_picture():
+    anchors = np.full((40, 2), 50.0)
+    sizes = np.full((40, 2), 60.0)
+    centres = place_callouts(anchors, sizes, (0.0, 0.0, 100.0, 100.0), CLEARANCE)
+    assert np.all((centres >= 30) & (centres <= 70))
+
+
+def test_a_label_goes_outwards():
+    anchors = np.array([(300.0, 400.0), (700.0, 400.0)])
+    centres = place_callouts(anchors, np.full((2, 2), 40.0), BOUNDS, CLEARANCE)
+    assert centres[0, 0] < 300
+    assert centres[1, 0] > 700
+
+
+def test_nothing_to_label():
+    assert place_callouts(np.empty((0, 2)), np.empty((0, 2)), BOUNDS, CLEARANCE).shape == (0, 2)

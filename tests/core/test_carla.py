@@ -1,0 +1,81 @@
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seip_addon.core.carla import carla_spawns, save_carla_spawns
+from seip_addon.core.lidar import load_catalogue
+from tests.small_junction import make_example
+
+
+@pytest.fixture(scope="module")
+def example():
+    return make_example()
+
+
+def test_location_is_the_map_position_with_y_negated(example):
+    for spawn, sensor in zip(
+        carla_spawns(example.deployment, example.site.origin), example.deployment.sensors, strict=True
+    ):
+        there = spawn["transform"]["location"]
+        x, y, z = sensor.xyz + example.site.origin
+        assert (there["x"], there["y"], there["z"]) == pytest.approx((x, -y, z), abs=1e-6)
+
+
+@pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 1.0, math.pi / 2, math.pi, 4.0])
+def test_the_sensor_faces_the_same_way_in_left_handed_axes(example, yaw):
+    sensor = replace(example.deployment.sensors[0], yaw=yaw)
+    spawn = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]
+    turn = math.radians(spawn["transform"]["rotation"]["yaw"])
+    # Unreal turns +x towards +y, and its y is our -y.
+    assert (math.cos(turn), -math.sin(turn)) == pytest.approx((math.cos(yaw), math.sin(yaw)), abs=1e-7)
+    assert -180 <= spawn["transform"]["rotation"]["yaw"] < 180
+
+
+def test_attributes_are_text_that_set_attribute_takes(example):
+    sensor = replace(example.deployment.sensors[0], model=load_catalogue()["type2"])
+    spawn = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]
+    assert spawn["blueprint"] == "sensor.lidar.ray_cast"
+    assert spawn["note"] == ""
+    assert spawn["attributes"] == {
+        "role_name": "S1",
+        "channels": "32",
+        "range": "200",
+        "points_per_second": "1200000",
+        "rotation_frequency": "5",
+        "upper_fov": "15",
+        "lower_fov": "-25",
+        "horizontal_fov": "360",
+        "atmosphere_attenuation_rate": "0.004",
+        "noise_stddev": "0.03",
+        "dropoff_general_rate": "0.35",
+        "dropoff_intensity_limit": "0.8",
+        "dropoff_zero_intensity": "0.4",
+    }
+
+
+def test_uneven_beams_are_named_with_how_far_off_they_are(example):
+    model = replace(
+        load_catalogue()["type1"], elevations=np.radians([15.0, 1.0, 0.0, -15.0]), azimuth_offsets=np.zeros(4)
+    )
+    sensor = replace(example.deployment.sensors[0], model=model)
+    note = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["note"]
+    assert "unevenly" in note
+    assert "5.0 degrees" in note  # 0 and 1 where even spacing has -5 and 5
+
+
+def test_every_shipped_model_has_a_field_of_view_that_holds_its_beams(example):
+    for model in load_catalogue().values():
+        sensor = replace(example.deployment.sensors[0], model=model)
+        attributes = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["attributes"]
+        low, high = float(attributes["lower_fov"]), float(attributes["upper_fov"])
+        assert low < high
+        assert np.all((np.degrees(model.elevations) > low - 1e-6) & (np.degrees(model.elevations) < high + 1e-6))
+
+
+def test_the_file_holds_the_list(example, tmp_path):
+    path = tmp_path / "carla_spawn.json"
+    save_carla_spawns(path, example.deployment, example.site.origin)
+    assert json.loads(path.read_text(encoding="utf-8")) == carla_spawns(example.deployment, example.site.origin)

@@ -1,0 +1,217 @@
+"""Catalogue, beam patterns and the disturbance of returns."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import (
+    BeamPattern,
+    LidarModel,
+    beam_directions,
+    find_models,
+    load_catalogue,
+    measured_returns,
+    return_intensity,
+)
+
+CATALOGUE = load_catalogue()
+
+GOOD = {
+    "name": '"Mine"',
+    "manufacturer": '"Me"',
+    "source": '"My datasheet"',
+    "channels": "4",
+    "field_of_view_deg": "[-10.0, 2.0]",
+    "range_m": "[0.5, 50.0]",
+    "points_per_second": "40_000",
+    "rotation_rate_hz": "10",
+    "price_usd": "[1000, 3000]",
+}
+
+
+def write_model(path: Path, **changes: str | None) -> Path:
+    entries = {key: value for key, value in (GOOD | changes).items() if value is not None}
+    path.write_text("[mine]\n" + "".join(f"{key} = {value}\n" for key, value in entries.items()), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("key", "channels", "low", "high", "reach", "points", "price"),
+    [
+        ("type1", 16, -15, 15, 100, 300e3, (4e3, 8e3)),
+        ("type2", 32, -25, 15, 200, 1.2e6, (10e3, 20e3)),
+        ("type3", 128, -25, 15, 300, 4.8e6, (70e3, 90e3)),
+    ],
+)
+def test_the_studys_types_have_the_studys_figures(
+    key: str, channels: int, low: float, high: float, reach: float, points: float, price: tuple[float, float]
+) -> None:
+    model = CATALOGUE[key]
+    assert (model.channels, model.max_range, model.price_range) == (channels, reach, price)
+    assert np.degrees([model.elevations.min(), model.elevations.max()]) == pytest.approx([low, high])
+    assert model.channels * model.azimuth_count * 5 == points
+    assert model.rotation_rate == 5
+    assert model.range_noise_std == 0.03
+    assert model.price == sum(price) / 2
+
+
+def test_the_catalogue_holds_real_sensors_with_uneven_tables() -> None:
+    real = [model for model in CATALOGUE.values() if model.manufacturer != "generic"]
+    assert len(real) >= 6
+    gaps = {model.key: np.diff(np.sort(model.elevations)) for model in real}
+    assert {key for key, gap in gaps.items() if gap.max() > 2 * gap.min()} >= {"vlp32c", "vls128", "pandar64"}
+    assert all(len(np.unique(model.elevations)) == model.channels and model.source for model in real)
+
+
+@pytest.mark.parametrize("key", sorted(CATALOGUE))
+def test_points_per_second_follow_from_channels_and_steps(key: str) -> None:
+    model = CATALOGUE[key]
+    points = model.channels * model.azimuth_count * model.rotation_rate
+    assert points == pytest.approx(model.points_per_second, rel=0.51 / model.azimuth_count)
+
+
+@pytest.mark.parametrize("key", ["type1", "vls128"])
+def test_directions_are_unit_vectors_at_the_published_angles(key: str) -> None:
+    model = CATALOGUE[key]
+    yaw = 0.3
+    rays = beam_directions(model, yaw)
+    assert rays.shape == (model.channels, model.azimuth_count, 3)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=2), 1, atol=1e-15)
+    np.testing.assert_allclose(np.arcsin(rays[:, 0, 2]), model.elevations, atol=1e-14)
+    step = 2 * math.pi / model.azimuth_count
+    azimuth = np.arctan2(rays[:, :, 1], rays[:, :, 0])
+    expected = yaw + model.azimuth_offsets[:, None] + step * np.arange(model.azimuth_count)
+    np.testing.assert_allclose(np.exp(1j * azimuth), np.exp(1j * expected), atol=1e-13)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.floats(-10, 10))
+def test_a_rays_direction_does_not_depend_on_its_company(seed: int, count: int, yaw: float) -> None:
+    model = CATALOGUE["vls128"]
+    rays = np.random.default_rng(seed).integers(0, model.channels * model.azimuth_count, count)
+    whole = BeamPattern(model, yaw).directions(np.arange(model.channels * model.azimuth_count))
+    assert (BeamPattern(model, yaw).directions(rays) == whole[rays]).all()
+
+
+def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
+    catalogue = load_catalogue([write_model(tmp_path / "mine.toml")])
+    assert list(catalogue) == [*CATALOGUE, "mine"]
+    mine = catalogue["mine"]
+    assert np.degrees(mine.elevations) == pytest.approx([2, -2, -6, -10])
+    assert (mine.azimuth_count, mine.min_range, mine.price) == (1000, 0.5, 2000)
+    (tmp_path / "own.toml").write_text((tmp_path / "mine.toml").read_text().replace("[mine]", "[type1]"))
+    assert load_catalogue([tmp_path / "own.toml"])["type1"].name == "Mine"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"price_usd": None}, "lacks price_usd"),
+        ({"channels": None}, "lacks channels"),
+        ({"chanels": "4"}, "chanels"),
+        ({"channels": "1"}, "channels"),
+        ({"channels": "4.5"}, "channels"),
+        ({"channels": "true"}, "channels"),
+        ({"field_of_view_deg": "[2.0, -10.0]"}, "increasing"),
+        ({"field_of_view_deg": "[-10.0]"}, "2 numbers"),
+        ({"field_of_view_deg": "[nan, 2.0]"}, "increasing"),
+        ({"field_of_view_deg": "[-90.0, 2.0]"}, "elevations"),
+        ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[]"}, "channel"),
+        ({"channels": None, "field_of_view_deg": None, "elevations_deg": "[1.0, nan]"}, "elevations"),
+        ({"channels": None, "field_of_view_deg": None, "elevations_deg": '["up"]'}, "numbers"),
+        ({"elevations_deg": "[1.0]"}, "channels, field_of_view_deg"),
+        ({"azimuth_offsets_deg": "[1.0]"}, "offset"),
+        ({"azimuth_offsets_deg": "[1.0, 2.0, inf, 4.0]"}, "offset"),
+        ({"range_m": "[50.0, 50.0]"}, "range"),
+        ({"range_m": "[-1.0, 50.0]"}, "range"),
+        ({"range_m": "[0.0, inf]"}, "range"),
+        ({"points_per_second": "0"}, "points per second"),
+        ({"points_per_second": "nan"}, "points per second"),
+        ({"rotation_rate_hz": "-5"}, "rotation"),
+        ({"rotation_rate_hz": '"fast"'}, "rotation_rate_hz"),
+        ({"price_usd": "[3000, 1000]"}, "price"),
+        ({"price_usd": "[0, 1000]"}, "price"),
+        ({"range_noise_std_m": "-0.1"}, "noise"),
+        ({"attenuation_per_m": "nan"}, "attenuation"),
+        ({"dropoff_general_rate": "1.5"}, "drop-off"),
+        ({"dropoff_zero_intensity": "-1"}, "drop-off"),
+        ({"dropoff_intensity_limit": "0"}, "drop-off"),
+    ],
+)
+def test_each_fault_of_a_model_has_its_sentence(tmp_path: Path, changes: dict[str, str | None], words: str) -> None:
+    path = write_model(tmp_path / "mine.toml", **changes)
+    with pytest.raises(SeipError, match=words) as caught:
+        load_catalogue([path])
+    assert "'mine'" in str(caught.value)
+    assert "mine.toml" in str(caught.value)
+
+
+def test_files_that_are_no_catalogue(tmp_path: Path) -> None:
+    with pytest.raises(SeipError, match="cannot read"):
+        load_catalogue([tmp_path / "absent.toml"])
+    (tmp_path / "bad.toml").write_text("[mine")
+    with pytest.raises(SeipError, match="not valid TOML"):
+        load_catalogue([tmp_path / "bad.toml"])
+    (tmp_path / "flat.toml").write_text("mine = 1")
+    with pytest.raises(SeipError, match="no table"):
+        load_catalogue([tmp_path / "flat.toml"])
+
+
+def test_an_unknown_sensor_names_close_ones() -> None:
+    assert list(find_models(CATALOGUE, ["type2", "vlp16"])) == ["type2", "vlp16"]
+    with pytest.raises(SeipError, match="vlp16"):
+        find_models(CATALOGUE, ["vlp-16"])
+    with pytest.raises(SeipError, match="type1"):
+        find_models(CATALOGUE, ["zzzzzz"])
+
+
+def test_intensity_falls_with_range_and_incidence() -> None:
+    model = CATALOGUE["type1"]
+    intensity = return_intensity(model, np.array([0.0, 100.0, 50.0, np.inf]), np.array([1.0, 1.0, -0.5, 1.0]))
+    np.testing.assert_allclose(intensity, [1, math.exp(-0.4), 0.5 * math.exp(-0.2), 0])
+    assert return_intensity(model, np.zeros(1), np.ones(1), reflectivity=0.1)[0] == pytest.approx(0.1)
+
+
+def sensor(**changes: float) -> LidarModel:
+    return LidarModel(
+        key="test",
+        name="Test",
+        manufacturer="Test",
+        source="Test",
+        elevations=np.array([0.0, -0.1]),
+        min_range=1.0,
+        max_range=100.0,
+        points_per_second=2000.0,
+        rotation_rate=10.0,
+        price_range=(1.0, 2.0),
+        **changes,
+    )
+
+
+def test_noise_and_drop_off_have_their_rates() -> None:
+    model = sensor(dropoff_general=0.25, dropoff_zero_intensity=0.4, dropoff_intensity_limit=0.8, range_noise_std=0.05)
+    count = 200_000
+    intensity = np.repeat([0.9, 0.4, 0.0], count)
+    measured = measured_returns(model, np.full(3 * count, 50.0), intensity, np.random.default_rng(1))
+    kept = np.isfinite(measured).reshape(3, count).mean(axis=1)
+    np.testing.assert_allclose(kept, 0.75 * np.array([1.0, 0.8, 0.6]), atol=0.005)
+    noise = measured[np.isfinite(measured)] - 50
+    assert abs(noise.mean()) < 1e-3
+    assert noise.std() == pytest.approx(0.05, rel=0.02)
+
+
+def test_measured_returns_follow_the_seed_and_leave_misses() -> None:
+    model = sensor()
+    distance = np.array([np.inf, 0.5, 50.0, 101.0, 20.0])
+    first, again = (measured_returns(model, distance, np.ones(5), np.random.default_rng(7)) for _ in range(2))
+    assert (first == again).all()
+    assert np.isinf(first[[0, 1, 3]]).all()
+    assert np.isfinite(first[[2, 4]]).all()
+    other = measured_returns(model, np.array([9.0, 9.0, 50.0, 9.0, 20.0]), np.ones(5), np.random.default_rng(7))
+    assert (other[[2, 4]] == first[[2, 4]]).all()

@@ -1,0 +1,134 @@
+import json
+import math
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement_record import (
+    Run,
+    comparable,
+    degrees,
+    load_placement_record,
+    placement_record,
+    save_placement_record,
+    versions,
+)
+from tests.json_schema import violations
+from tests.small_junction import Example, make_example
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class Solution:
+    chosen: np.ndarray
+    objective: float
+    bound: float
+    gap: float
+    status: str = "feasible"
+    solver: str = "highs 1.15.1"
+    notes: tuple[str, ...] = ("asked for 4, 3 suffice",)
+
+
+@pytest.fixture(scope="module")
+def example() -> Example:
+    return make_example()
+
+
+@pytest.fixture
+def run() -> Run:
+    return Run(
+        settings={"delta_m": 1.0, "heights_m": (3.5, 5.4), "budget_usd": None},
+        created=datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
+        durations={"visibility": 12.3456789},
+        versions=versions(blender="4.5.15"),
+        inputs={"visibility": "ab" * 32},
+        warnings=("rings are wide apart",),
+    )
+
+
+def make_record(example, run, **changes):
+    values = {"chosen": np.array([s.pose for s in example.deployment.sensors]), "objective": 512.0, "bound": 530.5}
+    solution = Solution(**{**values, "gap": 18.5 / 512.0, **changes})
+    greedy = Solution(np.array([1, 2, 3]), objective=500.0, bound=531.0, gap=0.05)
+    return placement_record(example.site, example.deployment, solution, run, weighted=False, greedy=greedy)
+
+
+def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
+    record = make_record(example, run)
+    save_placement_record(tmp_path / "placement.json", record)
+    loaded = load_placement_record(tmp_path / "placement.json")
+    assert violations(loaded, SCHEMA) == []
+    assert loaded["objective"]["value"] == 512.0
+    assert loaded["greedy"]["gap_to_placement"] == pytest.approx(12 / 512)
+    assert loaded["settings"]["heights_m"] == [3.5, 5.4]
+
+
+def test_every_required_part_is_missed_when_it_is_absent(example, run):
+    record = json.loads(json.dumps(make_record(example, run)))
+    for part in SCHEMA["required"]:
+        assert violations({key: value for key, value in record.items() if key != part}, SCHEMA)
+    assert violations({**record, "more": 1}, SCHEMA)
+
+
+def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(example, run):
+    record = make_record(example, run)
+    for entry, sensor in zip(record["sensors"], example.deployment.sensors, strict=True):
+        assert np.allclose(np.subtract(entry["map_m"], entry["local_m"]), example.site.origin, atol=2e-6, rtol=0)
+        assert entry["local_m"] == pytest.approx(sensor.xyz.tolist(), abs=1e-6)
+        assert (
+            entry["position"] == example.site.candidates.position_name[example.site.candidates.position_of[sensor.pose]]
+        )
+
+
+def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):
+    later = Run(**{**vars(run), "created": datetime(2027, 1, 1, tzinfo=UTC), "durations": {"visibility": 99.0}})
+    first, second = make_record(example, run), make_record(example, later)
+    assert first != second
+    assert comparable(first) == comparable(second)
+    for name in ("a.json", "b.json"):
+        save_placement_record(tmp_path / name, first)
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
+    record = make_record(example, run, bound=math.inf, gap=math.inf)
+    save_placement_record(tmp_path / "placement.json", record)
+    assert record["objective"]["bound"] is None
+    assert violations(record, SCHEMA) == []
+
+
+def test_angles_are_written_from_zero_to_below_a_full_turn():
+    assert degrees(-math.pi / 2) == 270.0
+    assert degrees(2 * math.pi - 1e-12) == 0.0
+    assert degrees(-1e-12) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("{", "damaged"),
+        ('{"schema": "seip-placement/0"}', "seip-placement/0"),
+        ("[1]", "None"),
+    ],
+)
+def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
+    path = tmp_path / "placement.json"
+    path.write_text(content)
+    with pytest.raises(SeipError, match=says):
+        load_placement_record(path)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SeipError, match="nothing.json"):
+        load_placement_record(tmp_path / "nothing.json")
+
+
+def test_versions_name_the_program_and_its_libraries():
+    found = versions(blender="5.2.0")
+    assert list(found) == ["seip", "python", "numpy", "shapely", "pulp", "highspy", "blender"]
+    assert found["numpy"] == np.__version__

@@ -1,0 +1,96 @@
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
+
+from seip_addon.core.deployment import deploy
+from seip_addon.core.drawing import markers_of, percent, summary
+from seip_addon.core.palette import SEEN_COLOURS
+from seip_addon.core.plan_view import draw_plan, save_plan_view
+from tests.small_junction import make_example
+
+
+@pytest.fixture(scope="module")
+def example():
+    return make_example()
+
+
+def pixel_at(figure, xy):
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())
+    column, row = figure.axes[0].transData.transform(xy)
+    return pixels[pixels.shape[0] - 1 - int(row), int(column), :3] / 255
+
+
+def test_every_target_is_painted_by_how_many_sensors_see_it(example):
+    """Where no marker, label or line lies on it, the picture has the class's colour at the target."""
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())[::-1, :, :3] / 255
+    where = figure.axes[0].transData.transform(example.site.targets.xyz[:, :2]).astype(int)
+    painted = pixels[where[:, 1], where[:, 0]]
+    wanted = np.array([to_rgb(SEEN_COLOURS[min(n, 2)]) for n in example.deployment.seen_by])
+    right = np.abs(painted - wanted).max(axis=1) < 0.02
+    assert right.mean() > 0.93
+    assert len(set(np.minimum(example.deployment.seen_by, 2))) == 3
+
+
+def test_buildings_are_darker_the_higher_they_are(example):
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    low, high = pixel_at(figure, (-20, 38)), pixel_at(figure, (38, 28))  # 9 m and 24 m
+    assert high.mean() < low.mean() - 0.1
+
+
+def test_the_same_placement_gives_the_same_bytes_whatever_the_users_style(example, tmp_path):
+    save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
+    save_plan_view(tmp_path / "b.png", example.geometry, example.site, example.deployment)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert b"Software" not in (tmp_path / "a.png").read_bytes()[:200]
+    assert imread(tmp_path / "a.png").shape[1] > 1500
+
+
+def test_no_global_state_of_matplotlib_is_touched(example, tmp_path):
+    before = dict(mpl.rcParams)
+    save_plan_view(tmp_path / "a.png", example.geometry, example.site, example.deployment)
+    assert dict(mpl.rcParams) == before
+
+
+def test_labels_of_sensors_do_not_touch_each_other(example):
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    figure.canvas.draw()
+    labels = [text.get_window_extent() for text in figure.axes[0].texts if " · " in text.get_text()]
+    assert len(labels) == 3
+    assert not any(a.overlaps(b) for i, a in enumerate(labels) for b in labels[:i])
+
+
+@pytest.mark.parametrize("count", [0, 1, 16, 45])
+def test_any_number_of_sensors_can_be_drawn(example, tmp_path, count):
+    deployment = deploy(example.site, example.models, example.visible, np.arange(0, 2 * count, 2))
+    save_plan_view(tmp_path / "plan.png", example.geometry, example.site, deployment)
+    figure = draw_plan(example.geometry, example.site, deployment)
+    panel = figure.axes[1]
+    assert all(panel.get_ylim()[1] <= text.get_position()[1] <= panel.get_ylim()[0] for text in panel.texts)
+
+
+def test_names_are_taken_as_they_are(example, tmp_path):
+    site = type(example.site)(**{**vars(example.site), "name": "Corner of $1 and $2_x"})
+    save_plan_view(tmp_path / "plan.png", example.geometry, site, example.deployment)
+
+
+def test_each_type_has_its_marker(example):
+    types = {sensor.model.key for sensor in example.deployment.sensors}
+    markers = markers_of(example.deployment)
+    assert set(markers) == types
+    assert len(set(markers.values())) == len(types)
+
+
+def test_only_all_is_a_hundred_per_cent_and_only_nothing_none():
+    shares = (0.0, 0.0001, 0.5, 0.9999, 1.0)
+    assert [percent(share) for share in shares] == ["0.0%", "<0.1%", "50.0%", "99.9%", "100.0%"]
+
+
+def test_the_summary_says_what_was_placed(example):
+    words = summary(example.deployment)
+    assert words.startswith("3 sensors see ")
+    assert f"${sum(sensor.model.price for sensor in example.deployment.sensors):,.0f}" in words

@@ -1,0 +1,367 @@
+"""The visibility grid against a full scan, against plain float64 arithmetic, and under moves of the scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
+from float64_rays import nearest_return
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from shapely import box
+from synthetic_junction import junction_site, make_candidates, prism, rectangle
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import LidarModel, load_catalogue
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.ray_casting import Engine, make_ray_caster
+from seip_addon.core.ring_resolution import resolution_warnings
+from seip_addon.core.site import Site, Targets
+from seip_addon.core.visibility import (
+    VisibilityGrid,
+    VisibilitySettings,
+    compute_visibility,
+    full_scan_visibility,
+    visibility_key,
+)
+
+Float = NDArray[np.float64]
+
+
+def small_model(key: str, channels: int = 12, steps: int = 90, **changes: float) -> LidarModel:
+    """A sensor small enough for brute force, with uneven elevations and azimuth offsets."""
+    place = np.linspace(0, 1, channels)
+    values = {"min_range": 0.5, "max_range": 40.0} | changes
+    return LidarModel(
+        key=key,
+        name=key,
+        manufacturer="test",
+        source="test",
+        elevations=np.radians(6 - 60 * place**1.3),
+        points_per_second=10.0 * channels * steps,
+        rotation_rate=10.0,
+        price_range=(1.0, 2.0),
+        azimuth_offsets=0.05 * np.sin(9 * place),
+        **values,
+    )
+
+
+MODELS = {"coarse": small_model("coarse", 6, 40), "fine": small_model("fine", 16, 120)}
+
+
+def random_site(seed: int, poses: int = 3) -> Site:
+    """A sloping patch of road with boxes on it, targets on the road, sensors above."""
+    random = np.random.default_rng(seed)
+    slope = random.normal(0, 0.03, 2)
+    road = rectangle((-15, -15), (15, 15), step=10.0)
+    road[:, :, 2] = road[:, :, :2] @ slope
+    boxes = [
+        prism(tuple(random.uniform(-12, 12, 2)), random.uniform(0.2, 3), random.uniform(1, 6), sides=4)
+        for _ in range(random.integers(0, 5))
+    ]
+    target = random.uniform(-14, 14, (60, 3))
+    target[:, 2] = target[:, :2] @ slope
+    xyz = random.uniform((-14, -14, 2.5), (14, 14, 8), (poses, 3))
+    return Site(
+        name="random",
+        origin=np.zeros(3),
+        region=box(-15, -15, 15, 15),
+        targets=Targets(target, np.ones(60), np.zeros(60, dtype=bool), 1.0),
+        candidates=make_candidates(
+            xyz, random.choice(list(MODELS), poses), xyz[:, 2], random.uniform(-math.pi, math.pi, poses)
+        ),
+        triangles=np.concatenate([road, *boxes]),
+    )
+
+
+def grid_of(site: Site, settings: VisibilitySettings, engine: Engine = ANY) -> VisibilityGrid:
+    return finish(compute_visibility(site, MODELS, settings, make_ray_caster(site.triangles, engine)))
+
+
+def nearest_returns(site: Site) -> Float:
+    """Distance of each target's nearest return at each pose, (c, t)."""
+    poses = site.candidates
+    return np.array(
+        [
+            nearest_return(xyz, yaw, MODELS[key], site.triangles, site.targets.xyz)
+            for xyz, yaw, key in zip(poses.xyz, poses.yaw, poses.sensor.tolist(), strict=True)
+        ]
+    )
+
+
+@each_engine
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2, 0.6]))
+def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: float, min_intensity: float) -> None:
+    site, settings = random_site(seed), VisibilitySettings(delta, min_intensity)
+    caster = make_ray_caster(site.triangles, engine)
+    lazy = finish(compute_visibility(site, MODELS, settings, caster))
+    full = finish(full_scan_visibility(site, MODELS, settings, caster))
+    assert (lazy.packed == full.packed).all()
+    assert lazy.key == full.key
+    assert lazy.parameters["rays_cast"] <= full.parameters["rays_cast"] == full.parameters["rays_of_full_scan"]
+
+
+@each_engine
+@pytest.mark.parametrize("key", ["type1", "type3", "vls128"])
+def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
+    models = load_catalogue()
+    site = junction_site(positions=1, sensors=[key], heights=[5.4])
+    caster = make_ray_caster(site.triangles, engine)
+    lazy = finish(compute_visibility(site, models, VisibilitySettings(), caster))
+    full = finish(full_scan_visibility(site, models, VisibilitySettings(), caster))
+    assert (lazy.packed == full.packed).all()
+    assert 0.02 < lazy.visible.mean() < 0.98
+    assert lazy.parameters["rays_cast"] < 0.25 * full.parameters["rays_cast"]
+
+
+@each_engine
+def test_same_as_plain_arithmetic_but_for_borderline_targets(engine: Engine) -> None:
+    borderline = seen = total = 0
+    for seed in range(40):
+        site, settings = random_site(seed), VisibilitySettings(0.6)
+        distance = nearest_returns(site)
+        decided = np.abs(distance - settings.delta) >= 1e-3
+        visible = grid_of(site, settings, engine).visible
+        assert (visible == (distance < settings.delta))[decided].all()
+        borderline += (~decided).sum()
+        seen += visible.sum()
+        total += decided.size
+    assert borderline < 0.005 * total
+    assert 0.1 * total < seen < 0.9 * total
+
+
+def decided_site(seed: int, delta: float) -> Site:
+    """A random site without the targets that some pose's nearest return passes δ by a millimetre or less."""
+    site = random_site(seed)
+    decided = (np.abs(nearest_returns(site) - delta) >= 1e-3).all(axis=0)
+    xyz = site.targets.xyz[decided]
+    return replace(site, targets=Targets(xyz, np.ones(len(xyz)), np.zeros(len(xyz), dtype=bool), 1.0))
+
+
+def moved(site: Site, shift: Float, turn: float) -> Site:
+    """Turn scene, targets, poses and beams about the z axis, then shift them."""
+    rotation = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+    poses = site.candidates
+    return replace(
+        site,
+        targets=replace(site.targets, xyz=site.targets.xyz @ rotation.T + shift),
+        candidates=make_candidates(poses.xyz @ rotation.T + shift, poses.sensor, poses.height, poses.yaw + turn),
+        triangles=site.triangles @ rotation.T + shift,
+    )
+
+
+@each_engine
+@hypothesis_settings(max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), turn=st.floats(-7, 7))
+def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: float) -> None:
+    settings = VisibilitySettings(0.6)
+    site = decided_site(seed, settings.delta)
+    expected = grid_of(site, settings, engine).visible
+    far = moved(site, np.array([5e6, -3e6, 250.0]), 0.0)
+    assert (grid_of(far, settings, engine).visible == expected).all()
+    turned = moved(site, np.zeros(3), turn)
+    assert (grid_of(turned, settings, engine).visible == expected).all()
+
+
+@each_engine
+@given(seed=st.integers(0, 2**32 - 1))
+@hypothesis_settings(max_examples=30)
+def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
+    settings = VisibilitySettings(0.6)
+    site = decided_site(seed, settings.delta)
+    expected = grid_of(site, settings, engine).visible
+    random = np.random.default_rng(seed)
+    order, pose_order = random.permutation(len(site.targets)), random.permutation(len(site.candidates))
+    poses = site.candidates
+    shuffled = replace(
+        site,
+        targets=replace(site.targets, xyz=site.targets.xyz[order]),
+        candidates=make_candidates(
+            poses.xyz[pose_order], poses.sensor[pose_order], poses.height[pose_order], poses.yaw[pose_order]
+        ),
+        triangles=random.permutation(site.triangles, axis=0),
+    )
+    assert (grid_of(shuffled, settings, engine).visible == expected[np.ix_(pose_order, order)]).all()
+
+
+def one_sensor_site(*walls: Float) -> Site:
+    """A sensor 5 m above the middle of a level road, targets along the x axis."""
+    x = np.arange(-14.0, 15.0)
+    return Site(
+        name="one",
+        origin=np.zeros(3),
+        region=box(-15, -15, 15, 15),
+        targets=Targets(np.column_stack([x, 0 * x, 0 * x]), np.ones(29), np.zeros(29, dtype=bool), 1.0),
+        candidates=make_candidates(np.array([[0.0, 0.0, 5.0]]), ["fine"], np.array([5.0])),
+        triangles=np.concatenate([rectangle((-15, -15), (15, 15)), *walls]),
+    )
+
+
+@needs_any
+def test_a_wall_hides_what_lies_behind_it() -> None:
+    open_site = one_sensor_site()
+    x = open_site.targets.xyz[:, 0]
+    wall = np.array([[[4.0, -9, 0], [4, 9, 0], [4, 9, 9]], [[4.0, -9, 0], [4, 9, 9], [4, -9, 9]]])
+    free = grid_of(open_site, VisibilitySettings(0.9)).visible[0]
+    behind_wall = grid_of(one_sensor_site(wall), VisibilitySettings(0.9)).visible[0]
+    assert free[x > 5].any()
+    assert not behind_wall[x > 5].any()
+    assert (behind_wall == free)[x < 3].all()
+
+
+@needs_any
+def test_range_limits_returns() -> None:
+    site = one_sensor_site()
+    x = np.abs(site.targets.xyz[:, 0])
+    caster = make_ray_caster(site.triangles, ANY)
+    models = {"fine": small_model("fine", 64, 360, min_range=7.0, max_range=10.0)}
+    visible = finish(compute_visibility(site, models, VisibilitySettings(0.6), caster)).visible[0]
+    slant = np.hypot(x, 5.0)
+    assert not visible[(slant < 6.3) | (slant > 10.7)].any()
+    assert visible[(slant > 7.1) & (slant < 9.9)].all()
+
+
+@needs_any
+def test_weak_returns_do_not_count() -> None:
+    site = one_sensor_site()
+    x = np.abs(site.targets.xyz[:, 0])
+    models = {"fine": small_model("fine", 64, 360)}
+    caster = make_ray_caster(site.triangles, ANY)
+    everything, strong = (
+        finish(compute_visibility(site, models, VisibilitySettings(0.6, least), caster)).visible[0]
+        for least in (0.0, 0.5)
+    )
+    # cos θ · exp(−a r) at the target: 0.5 is reached about 8.5 m from the foot
+    strength = 5 / np.hypot(x, 5) * np.exp(-0.004 * np.hypot(x, 5))
+    assert everything[x > 9].any()
+    assert not strong[strength < 0.46].any()
+    assert (strong == everything)[strength > 0.54].all()
+
+
+@needs_any
+def test_progress_counts_poses() -> None:
+    site = random_site(1)
+    seen: list[Progress] = []
+    steps = compute_visibility(site, MODELS, VisibilitySettings(), make_ray_caster(site.triangles, ANY))
+    finish(steps, seen.append)
+    assert [step.done for step in seen] == [0, 1, 2, 3]
+    assert {step.total for step in seen} == {3}
+
+
+@pytest.mark.parametrize(
+    ("delta", "min_intensity"), [(0, 0), (-1, 0), (math.nan, 0), (math.inf, 0), (1, -0.1), (1, 1.1), (1, math.nan)]
+)
+def test_settings_that_mean_nothing(delta: float, min_intensity: float) -> None:
+    with pytest.raises(SeipError):
+        VisibilitySettings(delta, min_intensity)
+
+
+@needs_any
+def test_sites_that_mean_nothing() -> None:
+    site = random_site(1)
+    caster = make_ray_caster(site.triangles, ANY)
+
+    def compute(changed: Site) -> VisibilityGrid:
+        return finish(compute_visibility(changed, MODELS, VisibilitySettings(), caster))
+
+    nowhere = make_candidates(np.zeros((0, 3)), [], np.zeros(0))
+    with pytest.raises(SeipError, match="no candidate"):
+        compute(replace(site, candidates=nowhere))
+    with pytest.raises(SeipError, match="no target"):
+        compute(replace(site, targets=Targets(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool), 1.0)))
+    with pytest.raises(SeipError, match="target are not finite"):
+        compute(replace(site, targets=replace(site.targets, xyz=site.targets.xyz * np.nan)))
+    with pytest.raises(SeipError, match="did you mean"):
+        compute(replace(site, candidates=make_candidates(np.zeros((1, 3)), ["finest"], np.zeros(1))))
+
+
+def test_a_grid_answers_for_chosen_poses() -> None:
+    visible = np.array([[1, 0, 1, 0, 0, 0, 0, 0, 1], [1, 1, 0, 0, 0, 0, 0, 0, 0]], dtype=bool)
+    grid = VisibilityGrid(np.packbits(visible, axis=1), (2, 9), "key", {})
+    assert (grid.visible == visible).all()
+    assert grid.times_seen(np.array([0, 1])).tolist() == [2, 1, 1, 0, 0, 0, 0, 0, 1]
+    assert grid.coverage(np.array([0])) == pytest.approx(3 / 9)
+    assert grid.coverage(np.array([0, 1])) == pytest.approx(4 / 9)
+    assert grid.coverage(np.array([], dtype=np.int64)) == 0
+    assert grid.coverage(np.array([1]), weight=np.array([3.0, 1, 1, 1, 1, 1, 1, 1, 1])) == pytest.approx(4 / 11)
+
+
+@needs_any
+def test_a_grid_comes_back_from_its_file_and_the_file_is_the_same_each_time(tmp_path: Path) -> None:
+    grid = grid_of(random_site(2), VisibilitySettings())
+    for name in ("a.npz", "b.npz"):
+        grid.save(tmp_path / name)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    back = VisibilityGrid.load(tmp_path / "a.npz")
+    assert (back.packed == grid.packed).all()
+    assert (back.shape, back.key, back.parameters) == (grid.shape, grid.key, grid.parameters)
+
+
+@needs_any
+def test_files_that_are_no_grid(tmp_path: Path) -> None:
+    grid_of(random_site(2), VisibilitySettings()).save(tmp_path / "good.npz")
+    whole = (tmp_path / "good.npz").read_bytes()
+    bad = tmp_path / "bad.npz"
+    with pytest.raises(SeipError, match="no visibility grid"):
+        VisibilityGrid.load(tmp_path / "absent.npz")
+    for content in (b"", b"hello", whole[: len(whole) // 2], whole[:200] + b"\0" * 40 + whole[240:]):
+        bad.write_bytes(content)
+        with pytest.raises(SeipError, match="delete it"):
+            VisibilityGrid.load(bad)
+    np.savez(bad, other=np.zeros(3))
+    with pytest.raises(SeipError, match="delete it"):
+        VisibilityGrid.load(bad)
+    header = '{"schema": "seip.visibility", "version": 99, "key": "", "shape": [1, 8], "parameters": {}}'
+    np.savez(bad, packed=np.zeros((1, 1), dtype=np.uint8), header=np.array(header))
+    with pytest.raises(SeipError, match="of this version"):
+        VisibilityGrid.load(bad)
+    np.save(tmp_path / "bad.npy", np.zeros(3))
+    with pytest.raises(SeipError, match="delete it"):
+        VisibilityGrid.load(tmp_path / "bad.npy")
+
+
+@needs_bvh
+@needs_embree
+def test_the_key_follows_from_what_the_grid_follows_from() -> None:
+    site, settings = random_site(3), VisibilitySettings()
+    caster = make_ray_caster(site.triangles, "bvh")
+    key = visibility_key(site, MODELS, settings, caster)
+    same = replace(site, name="other name", triangles=site.triangles.copy())
+    renamed = {name: replace(model, name="Other", price_range=(5.0, 6.0)) for name, model in MODELS.items()}
+    assert visibility_key(same, renamed, VisibilitySettings(1.0), caster) == key
+    poses = site.candidates
+    nudged = site.triangles + np.array([0, 0, 1e-9])
+    longer = {name: replace(model, max_range=41.0) for name, model in MODELS.items()}
+    others = [
+        visibility_key(replace(site, triangles=nudged), MODELS, settings, caster),
+        visibility_key(
+            replace(site, targets=replace(site.targets, xyz=site.targets.xyz + 1e-9)), MODELS, settings, caster
+        ),
+        visibility_key(replace(site, candidates=replace(poses, yaw=poses.yaw + 1e-9)), MODELS, settings, caster),
+        visibility_key(site, longer, settings, caster),
+        visibility_key(site, MODELS, VisibilitySettings(1.1), caster),
+        visibility_key(site, MODELS, VisibilitySettings(1.0, 0.1), caster),
+        visibility_key(site, MODELS, settings, make_ray_caster(site.triangles, "embree")),
+    ]
+    assert len({key, *others}) == 1 + len(others)
+
+
+def test_warnings_name_the_radius_from_which_rings_are_too_far_apart() -> None:
+    models = load_catalogue()
+    site = junction_site(positions=8, sensors=["type1"], heights=[8.0])
+    (warning,) = resolution_warnings(site, models, VisibilitySettings(1.0))
+    # rings of 8 m / tan 15°, tan 13°, …: 29.86, 34.65, 41.16 m; the first two are 4.8 m apart
+    assert "type1: beyond 30 m (at 8 m height)" in warning
+    assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
+
+
+def test_warnings_say_when_targets_are_too_far_apart_for_delta() -> None:
+    site = junction_site(positions=8, sensors=["type3"], heights=[8.0], spacing=2.0)
+    warnings = resolution_warnings(site, load_catalogue(), VisibilitySettings(1.0))
+    assert any("targets are 2 m apart and δ is 1 m" in warning for warning in warnings)

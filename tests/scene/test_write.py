@@ -1,0 +1,165 @@
+import hashlib
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.core.deployment import deploy
+from seip_addon.scene import collections as contract
+from seip_addon.scene.render import save_rendered_view
+from seip_addon.scene.write import clear_result, write_result
+from tests.scene_by_hand import make_scene
+from tests.small_junction import make_example
+
+
+@pytest.fixture(scope="module")
+def example():
+    return make_example()
+
+
+@pytest.fixture
+def scene(example):
+    return make_scene(example.geometry)
+
+
+def empties(scene):
+    things = contract.find(scene, contract.SENSORS).objects
+    return sorted((thing for thing in things if thing.type == "EMPTY"), key=lambda thing: thing["seip_label"])
+
+
+def coverage(scene):
+    (thing,) = contract.find(scene, contract.COVERAGE).objects
+    return thing
+
+
+def fingerprint(objects):
+    """Digest of all meshes, transforms, properties and settings that a user would miss."""
+    state = hashlib.sha256()
+    for thing in sorted(objects, key=lambda thing: thing.name):
+        vertices = np.array([v.co for v in thing.data.vertices]) if thing.type == "MESH" else np.zeros(0)
+        state.update(repr((thing.name, thing.type, [list(r) for r in thing.matrix_world], vertices.tolist())).encode())
+        state.update(repr((sorted(thing.keys()), thing.hide_render, [c.name for c in thing.users_collection])).encode())
+        state.update(repr([slot.material.name for slot in thing.material_slots]).encode())
+    return state.hexdigest()
+
+
+def settings_of(scene):
+    render = scene.render
+    kept = (render.engine, render.resolution_x, render.filepath, render.film_transparent, scene.camera, scene.world)
+    return (*kept, scene.view_settings.view_transform, scene.cycles.samples, scene.frame_current)
+
+
+def test_sensors_are_empties_with_their_pose_and_properties(example, scene):
+    write_result(scene, example.site, example.deployment)
+    bpy.context.view_layer.update()
+    for empty, sensor in zip(empties(scene), example.deployment.sensors, strict=True):
+        matrix = np.array(empty.matrix_world)
+        assert np.allclose(matrix[:3, 3], sensor.xyz, atol=1e-4)
+        assert np.allclose(matrix[:2, 0], (np.cos(sensor.yaw), np.sin(sensor.yaw)), atol=1e-6)
+        assert empty["seip_sensor"] == sensor.model.key
+        assert empty["seip_height"] == sensor.height
+        assert empty["seip_position"] == sensor.position_name
+        assert empty["seip_coverage"] == sensor.alone
+        assert empty["seip_price"] == sensor.model.price
+        assert empty["seip_range"] == sensor.model.max_range
+        assert empty["seip_yaw_deg"] == pytest.approx(np.degrees(sensor.yaw))
+
+
+def test_posts_stand_on_the_ground_and_brackets_reach_the_pole(example, scene):
+    write_result(scene, example.site, example.deployment)
+    bpy.context.view_layer.update()
+    kinds = set()
+    for empty, sensor in zip(empties(scene), example.deployment.sensors, strict=True):
+        (body,) = empty.children
+        corners = np.array([body.matrix_world @ v.co for v in body.data.vertices])
+        kinds.add(sensor.on_pole)
+        if sensor.on_pole:
+            reach = np.hypot(*(corners[:, :2] - sensor.foot[:2]).T).min()
+            assert reach < 0.05
+            assert corners[:, 2].min() > sensor.xyz[2] - 0.3
+        else:
+            assert corners[:, 2].min() == pytest.approx(sensor.foot[2], abs=1e-4)
+    assert kinds == {True, False}
+
+
+def test_coverage_has_one_square_per_target_with_how_often_it_is_seen(example, scene):
+    write_result(scene, example.site, example.deployment)
+    mesh = coverage(scene).data
+    assert len(mesh.polygons) == len(example.site.targets)
+    seen = np.empty(len(mesh.polygons), np.int32)
+    mesh.attributes["seip_seen"].data.foreach_get("value", seen)
+    assert np.array_equal(seen, example.deployment.seen_by)
+    middles = np.array([polygon.center for polygon in mesh.polygons])
+    assert np.allclose(middles, example.site.targets.xyz + (0, 0, 0.03), atol=1e-4)
+    classes = np.array([polygon.material_index for polygon in mesh.polygons])
+    assert np.array_equal(classes, np.minimum(seen, 2))
+    assert mesh.color_attributes.active_color_name == "seip_colour"
+    assert all(polygon.normal.z > 0.99 for polygon in mesh.polygons)
+    colours = {tuple(material.diffuse_color) for material in mesh.materials}
+    assert len(colours) == 3
+
+
+def test_squares_follow_a_slope(example, scene):
+    targets = example.site.targets
+    slope = targets.xyz.copy()
+    slope[:, 2] = 0.1 * slope[:, 0]
+    site = type(example.site)(**{**vars(example.site), "targets": type(targets)(**{**vars(targets), "xyz": slope})})
+    write_result(scene, site, example.deployment)
+    corners = np.array([v.co for v in coverage(scene).data.vertices])
+    inner = np.abs(corners[:, 0]) < 50
+    assert np.allclose(corners[inner, 2], 0.1 * corners[inner, 0] + 0.03, atol=0.11)
+    assert np.median(np.abs(corners[inner, 2] - 0.1 * corners[inner, 0] - 0.03)) < 1e-4
+
+
+def test_the_users_objects_are_left_alone(example, scene):
+    extra = bpy.data.objects.new("a note of mine", None)
+    contract.find_or_make(scene, contract.SENSORS).objects.link(extra)
+    users = list(scene.objects)
+    before = fingerprint(users)
+    write_result(scene, example.site, example.deployment)
+    write_result(scene, example.site, example.deployment)
+    assert fingerprint(users) == before
+
+
+def test_a_second_result_replaces_the_first(example, scene):
+    def counts():
+        return [len(data) for data in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.collections)]
+
+    write_result(scene, example.site, example.deployment)
+    first, names = counts(), sorted(thing.name for thing in bpy.data.objects)
+    write_result(scene, example.site, example.deployment)
+    assert counts() == first
+    assert sorted(thing.name for thing in bpy.data.objects) == names
+    write_result(scene, example.site, deploy(example.site, example.models, example.visible, [5]))
+    assert len(empties(scene)) == 1
+    clear_result(scene)
+    assert not contract.find(scene, contract.SENSORS).objects
+
+
+def test_the_result_survives_saving_and_opening(example, scene, tmp_path):
+    write_result(scene, example.site, example.deployment)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "placed.blend"), check_existing=False)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "placed.blend"))
+    scene = bpy.context.scene
+    assert [empty["seip_label"] for empty in empties(scene)] == ["S1", "S2", "S3"]
+    assert coverage(scene)["seip_coverage"] == example.deployment.coverage
+    assert len(coverage(scene).data.attributes["seip_seen"].data) == len(example.site.targets)
+
+
+def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 480)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 270)
+    write_result(scene, example.site, example.deployment)
+    bpy.context.view_layer.update()
+    everything = [bpy.data.objects, bpy.data.meshes, bpy.data.scenes, bpy.data.worlds, bpy.data.cameras]
+    everything += [bpy.data.lights, bpy.data.images, bpy.data.collections]
+    counts, users, kept = [len(data) for data in everything], fingerprint(scene.objects), settings_of(scene)
+    for name in ("a.png", "b.png"):
+        save_rendered_view(tmp_path / name, scene, example.site, example.deployment)
+    assert [len(data) for data in everything] == counts
+    assert fingerprint(scene.objects) == users
+    assert settings_of(scene) == kept
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
+    assert "Fra:" not in capfd.readouterr().out
