@@ -178,7 +178,7 @@ def _sections(road: Node, end: float) -> tuple[LaneSection, ...]:
     starts = [max(node.number("s"), 0.0) for node in nodes]
     return tuple(
         LaneSection(start, min(stop, end), _side(node, "left", start), _side(node, "right", start))
-        for node, start, stop in zip(nodes, starts, [*starts[1:], end], strict=True)
+        for node, start, stop in zip(nodes, starts, [*starts, end][1:], strict=True)
         if start < min(stop, end)
     )
 
