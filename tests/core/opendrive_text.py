@@ -11,7 +11,10 @@ def lane(number, width=3.5, kind="driving", inside="", level="false"):
 
 def section(*lanes, s=0.0):
     """A lane section of lanes made by `lane`, told apart by the sign of their id."""
-    sides = {"left": [text for text in lanes if 'id="-' not in text], "right": [text for text in lanes if 'id="-' in text]}
+    sides = {
+        "left": [text for text in lanes if 'id="-' not in text],
+        "right": [text for text in lanes if 'id="-' in text],
+    }
     inner = "".join(f"<{side}>{''.join(texts)}</{side}>" for side, texts in sides.items() if texts)
     return f'<laneSection s="{s}">{inner}</laneSection>'
 

@@ -51,8 +51,8 @@ def test_a_clothoid_is_the_integral_of_its_heading(first, last, length):
         return s * (first + s * rate / 2)
 
     expected = [
-        quad(lambda s: function(heading(s)), 0, length, epsabs=1e-11, epsrel=0, limit=500)[0]
-        for function in (math.cos, math.sin)
+        quad(lambda s, of=of: of(heading(s)), 0, length, epsabs=1e-11, epsrel=0, limit=500)[0]
+        for of in (math.cos, math.sin)
     ]
     np.testing.assert_allclose(at(Clothoid(first, rate), length)[:2], expected, atol=1e-9)
 

@@ -1,6 +1,7 @@
 """Lane surfaces of small roads against exact figures and laws that hold for every road."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def test_lanes_are_ordered_from_left_to_right_and_share_their_edges(folder):
     lanes = section(lane(2, 2.0, "sidewalk"), lane(1), lane(-1), lane(-2, 1.0, "shoulder"))
     found = surfaces(folder, road(geometry('<arc curvature="0.02"/>'), lanes))
     assert [surface.lane_id for surface in found] == [2, 1, -1, -2]
-    for outer, inner in zip(found, found[1:], strict=False):
+    for outer, inner in pairwise(found):
         np.testing.assert_array_equal(outer.right, inner.left)
 
 
@@ -148,6 +149,23 @@ def test_crossfall_falls_outwards(folder, side, falls):
     np.testing.assert_allclose(right.right[:, 2], -3 * math.tan(0.05) * falls[1])
 
 
+def test_a_shape_is_blended_between_its_stations(folder):
+    def crown(s, height):
+        return (
+            f'<shape s="{s}" t="-4" a="0" b="{height / 4}" c="0" d="0"/>'
+            f'<shape s="{s}" t="0" a="{height}" b="{-height / 4}" c="0" d="0"/>'
+        )
+
+    lanes = section(lane(1, 4.0), lane(-1, 2.0))
+    left, right = surfaces(folder, road(sections=lanes, lateral=crown(80, 0.6) + crown(20, 0.2)))
+    s = left.left[:, 0]
+    height = np.interp(s, [20, 80], [0.2, 0.6])
+    np.testing.assert_allclose(left.left[:, 2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(left.right[:, 2], height, atol=1e-9)
+    np.testing.assert_allclose(right.right[:, 2], height / 2, atol=1e-9)
+    assert {20, 80} <= set(np.round(s, 6))
+
+
 def test_a_level_lane_keeps_the_height_of_its_inner_edge(folder):
     lateral = '<superelevation s="0" a="-0.1" b="0" c="0" d="0"/><crossfall s="0" a="0.02" b="0" c="0" d="0"/>'
     lanes = section(lane(-1, 3.0), lane(-2, 2.0, "sidewalk", level="true"))
@@ -249,7 +267,9 @@ def test_the_area_of_a_junction_is_the_union_of_its_lanes(folder):
 def test_the_ground_is_the_surface_below_or_the_nearer_edge(folder):
     kerb = '<height sOffset="0" inner="0.12" outer="0.12"/>'
     lanes = section(lane(1, 3.0), lane(-1, 3.0), lane(-2, 2.0, "sidewalk", kerb))
-    tilted = road(sections=lanes, lateral='<superelevation s="0" a="0.05" b="0" c="0" d="0"/>', elevation=lift(1.0, 0.1))
+    tilted = road(
+        sections=lanes, lateral='<superelevation s="0" a="0.05" b="0" c="0" d="0"/>', elevation=lift(1.0, 0.1)
+    )
     (read,) = read_text(folder, document(tilted)).roads
     fall = math.sin(0.05) * math.cos(math.atan(0.1))
     assert ground_elevation(read, 30.0, 0.0) == pytest.approx(4.0)

@@ -119,7 +119,10 @@ def test_another_reader_finds_the_same_areas(name):
     path = map_file(name)
     # It samples each lane section at steps of its resolution and loses what is left at the end, hence the fine one.
     lanes = (
-        (lane.type, shapely.make_valid(shapely.Polygon(np.vstack([lane.boundary_line, lane.lane_reference_line[::-1]]))))
+        (
+            lane.type,
+            shapely.make_valid(shapely.Polygon(np.vstack([lane.boundary_line, lane.lane_reference_line[::-1]]))),
+        )
         for road in network.RoadNetwork(str(path), resolution=0.02).get_roads()
         for section in road.lane_sections
         for lane in section.lanes

@@ -39,9 +39,8 @@ def test_superelevation_tilts_the_t_axis(tmp_path):
 
 @pytest.mark.parametrize("wrap", ["{}", "<outlines>{}</outlines>"])
 def test_local_corners_turn_with_the_object(tmp_path, wrap):
-    outline = (
-        '<outline closed="false"><cornerLocal u="2" v="0" z="-0.5" height="3"/><cornerLocal u="0" v="1" z="0"/></outline>'
-    )
+    corners = '<cornerLocal u="2" v="0" z="-0.5" height="3"/><cornerLocal u="0" v="1" z="0"/>'
+    outline = f'<outline closed="false">{corners}</outline>'
     text = f'<object id="1" s="10" t="4" zOffset="1" hdg="{math.pi / 2}" height="9">{wrap.format(outline)}</object>'
     (thing,) = objects(tmp_path, text)
     (found,) = thing.outlines
@@ -166,3 +165,23 @@ def test_signals_have_a_place_a_direction_and_the_ground_below(tmp_path):
     np.testing.assert_allclose(lamp.position, [*(30 * ahead + 2 * left), 12])
     assert (lamp.yaw, lamp.ground, lamp.dynamic) == pytest.approx((0.5 + math.pi, 8.0, False))
     assert placed_signals(road_map, area=shapely.Point(lamp.position[:2]).buffer(1))[0].id == "2"
+
+
+def test_a_signal_stands_where_its_post_is_said_to_be(tmp_path):
+    here = (
+        '<signal id="1" s="50" t="0" orientation="-"><positionRoad roadId="2" s="10" t="-4" zOffset="1" hOffset="0.1"/>'
+        '</signal><signal id="2" s="50" t="1"><positionInertial x="7" y="8" z="9" hdg="0.5"/></signal>'
+    )
+    roads = road(signals=here, elevation=UPHILL), road(geometry(y=100.0), number="2")
+    on_other, on_map = placed_signals(read_text(tmp_path, document(*roads)))
+    assert (on_other.road_id, on_other.s, on_other.t, on_other.z_offset) == ("2", 10, -4, 1)
+    np.testing.assert_allclose(on_other.position, [10, 96, 1], atol=1e-12)
+    assert (on_other.yaw, on_other.ground) == pytest.approx((math.pi + 0.1, 0))
+    assert on_map.position.tolist() == [7, 8, 9]
+    assert (on_map.yaw, on_map.ground) == pytest.approx((0.5, 10))
+
+
+def test_a_signal_on_a_road_that_is_not_there_is_named(tmp_path):
+    text = '<signal id="5" s="50" t="0"><positionRoad roadId="33" s="0" t="0"/></signal>'
+    with pytest.raises(SeipError, match="road 1: signal 5 stands on road 33, which is not there"):
+        placed_signals(read_text(tmp_path, document(road(signals=text))))

@@ -51,8 +51,6 @@ def test_sections_and_geometries_may_come_in_any_order(tmp_path):
     assert second.polygon.area == pytest.approx(250)
 
 
-
-
 BROKEN = {
     "curvature": (road(geometry('<arc curvature="nan"/>')), "road 1: curvature='nan' of <arc> is no sensible number"),
     "infinite": (road(geometry(x=float("inf"))), "road 1: x='inf' of <geometry> is no sensible number"),

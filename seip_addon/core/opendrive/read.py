@@ -17,18 +17,20 @@ from numpy.typing import NDArray
 from seip_addon.core.errors import SeipError
 
 from .document import Node, read_document
-from .profile import NONE, Profile, profile
+from .profile import NONE, Profile, Shape, profile, shape
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
     Junction,
     Lane,
     LaneSection,
+    MapPlace,
     ObjectOutline,
     Repeat,
     Road,
     RoadMap,
     RoadObject,
+    RoadPlace,
     RoadSignal,
 )
 
@@ -93,6 +95,7 @@ def _road(node: Node) -> Road:
         superelevation=_profile(node, "lateralProfile", "superelevation"),
         left_crossfall=_crossfall(node, "left"),
         right_crossfall=_crossfall(node, "right"),
+        shape=_shape(node),
         lane_offset=_profile(node, "lanes", "laneOffset"),
         sections=_sections(node, line.end),
         objects=tuple(
@@ -167,6 +170,11 @@ def _profile(road: Node, *path: str) -> Profile:
 def _crossfall(road: Node, side: str) -> Profile:
     nodes = road.children("lateralProfile", "crossfall")
     return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
+
+
+def _shape(road: Node) -> Shape:
+    nodes = road.children("lateralProfile", "shape")
+    return shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
 
 
 def _cubic(node: Node) -> tuple[float, float, float, float]:
@@ -299,4 +307,19 @@ def _signal(node: Node) -> RoadSignal:
         heading=turned + node.number("hOffset", 0.0),
         height=node.number("height", 0.0),
         width=node.number("width", 0.0),
+        place=_signal_place(node, turned),
     )
+
+
+def _signal_place(signal: Node, turned: float) -> RoadPlace | MapPlace | None:
+    if node := signal.child("positionInertial"):
+        return MapPlace(node.number("x"), node.number("y"), node.number("z"), node.number("hdg", 0.0))
+    if node := signal.child("positionRoad"):
+        return RoadPlace(
+            node.text("roadId"),
+            node.number("s"),
+            node.number("t"),
+            node.number("zOffset", 0.0),
+            turned + node.number("hOffset", 0.0),
+        )
+    return None
