@@ -98,7 +98,7 @@ def signal_parts(
             continue
         foot, heading, arm = _pole_for(signal.position[:2] - origin[:2], signal.yaw, carriageway)
         if all(np.hypot(*(foot - other[0])) > SAME_POLE for other in poles):
-            faces_left = math.sin(signal.yaw - heading) >= 0
+            faces_left = math.sin(signal.yaw + math.pi - heading) >= 0  # the lamps look against the traffic
             poles.append((foot, heading, arm, faces_left))
     return tuple(
         signal_part(f"Signal pole {number}", _on(foot, terrain), heading, SIGNAL_POLE_HEIGHT, arm, faces_left=left)
@@ -114,7 +114,7 @@ def signal_part(  # noqa: PLR0913  # a pole has these properties
     return Part(name, shape, (Role.POLES,), _xyz(foot), heading)
 
 
-def _pole_for(xy: Float, facing: float, carriageway: BaseGeometry) -> tuple[Float, float, float]:
+def _pole_for(xy: Float, travel: float, carriageway: BaseGeometry) -> tuple[Float, float, float]:
     """Return foot, heading and length of the arm of the pole of a signal."""
     point = shapely.Point(xy)
     if carriageway.contains(point):
@@ -124,7 +124,7 @@ def _pole_for(xy: Float, facing: float, carriageway: BaseGeometry) -> tuple[Floa
         foot = edge + KERB_CLEARANCE * outwards
         return foot, math.atan2(*-outwards[::-1]), round(max(reach + KERB_CLEARANCE, 1.0), 1)
     towards = arm_heading(xy, carriageway)
-    across = facing + math.pi / 2  # the arm is square to the direction that the lamps face
+    across = travel + math.pi / 2  # the arm is square to the traffic
     heading = across if math.cos(across - towards) >= 0 else across + math.pi
     return xy, heading, MAST_ARM
 

@@ -43,8 +43,8 @@ SURFACES = {
     "shoulder": ("Shoulders", "asphalt shoulder", Role.ROADS),
     "parking": ("Parking lanes", "asphalt parking", Role.ROADS),
     "biking": ("Cycle lanes", "asphalt cycle", Role.ROADS),
-    "border": ("Borders", "asphalt shoulder", Role.ROADS),
     "track": ("Tracks", "asphalt shoulder", Role.ROADS),
+    "border": ("Borders", "verge", Role.GROUND),
     "median": ("Medians", "median", Role.GROUND),
 }
 """Name, material and role of the surface of each group of lanes but the pavements."""

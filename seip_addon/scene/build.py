@@ -45,7 +45,7 @@ OUTLINES = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDA
 
 STEP = 50
 CAMERA_AZIMUTH = math.radians(-125.0)
-CAMERA_ELEVATION = math.radians(38.0)
+CAMERA_ELEVATION = math.radians(48.0)
 LENS = 40.0
 SUN_ELEVATION, SUN_AZIMUTH = math.radians(48.0), math.radians(-60.0)
 SKY = (0.62, 0.70, 0.80, 1.0)
@@ -169,7 +169,7 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     camera.lens = LENS
     camera.clip_end = 5000.0
     thing = bpy.data.objects.new("Overview", camera)
-    distance = 0.85 * radius / math.tan(camera.angle / 2)
+    distance = 0.9 * radius / math.tan(camera.angle / 2)
     direction = Vector(
         (
             math.cos(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),
