@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from .opendrive import LaneSurface
 from .terrain import Terrain, cut
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from shapely.geometry.base import BaseGeometry
-
-    from .opendrive import LaneSurface
 
 Float = NDArray[np.float64]
 
@@ -294,8 +289,8 @@ def _dashes(path: Float) -> list[Float]:
 
 def _ribbon(path: Float) -> Float:
     """Return quads of marking width along a path (n, 3)."""
-    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]  # noqa: PLR2004  # metres
-    if len(path) < 2:  # noqa: PLR2004  # two ends
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]
+    if len(path) < 2:
         return np.empty((0, 4, 3))
     along = np.gradient(path[:, :2], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -308,7 +303,8 @@ def _bar(left: Float, right: Float) -> Float:
     """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
     near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
     corners = [_before_end(right, far), _before_end(right, near), _before_end(left, near), _before_end(left, far)]
-    return np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
+    bar: Float = np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
+    return bar
 
 
 def _before_end(path: Float, distance: float) -> Float:

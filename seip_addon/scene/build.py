@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Generator
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -11,19 +12,12 @@ from mathutils import Vector
 
 from ..core.errors import SeipError
 from ..core.progress import Progress
-from ..core.site_parts import Role
+from ..core.site_model import SiteModel
+from ..core.site_parts import Part, Role
 from ..core.storage import digest, whole_file
-
+from ..core.street_furniture import Solid
 from . import collections
 from .materials import material
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-    from pathlib import Path
-
-    from ..core.site_model import SiteModel
-    from ..core.site_parts import Part
-    from ..core.street_furniture import Solid
 
 DRESSING = "Dressing"
 VIEW = "View"

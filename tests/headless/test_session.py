@@ -74,7 +74,7 @@ def test_what_is_no_blend_is_refused_by_name(tmp_path, content) -> None:
     path = tmp_path / "site.blend"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(SeipError, match="site.blend"):
+    with pytest.raises(SeipError, match=r"site\.blend"):
         session.open_blend(path)
 
 
