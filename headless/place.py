@@ -32,6 +32,7 @@ from seip_addon.core.carla import save_carla_spawns
 from seip_addon.core.deployment import Deployment, deploy
 from seip_addon.core.goal import DEFAULT_COUNT, Goal, placement_problem, reach
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
+from seip_addon.core.needed_triangles import triangles_sentence
 from seip_addon.core.placement import Placement, solve_greedy
 from seip_addon.core.placement_record import Record, Run, placement_record, save_placement_record, versions
 from seip_addon.core.plan_view import save_plan_view
@@ -91,7 +92,9 @@ def main(argv: list[str]) -> None:
     for sentence in warnings:
         session.say(f"warning: {sentence}")
     store = options.output / "visibility.npz"
-    grid = clock.run("visibility", stored_visibility(store, site, models, visibility, engine=options.engine))
+    steps = stored_visibility(store, site, models, visibility, options.engine, options.scheduler)
+    grid = clock.run("visibility", steps)
+    session.say(triangles_sentence(grid.parameters["triangles"]))
     problem = placement_problem(site, grid.visible, models, goal)
     placement = clock.run("placement", reach(problem, goal, solver=options.solver, time_limit=options.time_limit))
     greedy = None if goal.coverage is not None else clock.time("greedy", lambda: solve_greedy(problem))
@@ -221,6 +224,7 @@ def _parser() -> argparse.ArgumentParser:
     work.add_argument("--solver", default="highs", help="highs, cbc or gurobi")
     work.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for the solver, in seconds")
     work.add_argument("--engine", choices=("auto", "bvh", "embree"), default="auto", help="ray caster")
+    work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers cast, like tcp://host:8786")
     work.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

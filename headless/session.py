@@ -112,7 +112,7 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     except SeipError as error:
         _end(1, f"error: {error}")
     except KeyboardInterrupt:
-        _end(STOPPED, "stopped, nothing written")
+        _end(STOPPED, "stopped, no result written")
     _end(0)
 
 

@@ -75,18 +75,14 @@ class Planes:
 
     Parameters
     ----------
-    azimuth : (p,) float64, radians
-        Of the unit normal, which points away from the place.
-    level, rise : (p,) float64
-        Of the normal: its length in plan, and upwards.
+    normal : (p, 3) float64
+        Unit normals, which point away from the place.
     distance : (p,) float64, metres
     tolerance : float, metres
         How far returns may lie off their plane.
     """
 
-    azimuth: Float
-    level: Float
-    rise: Float
+    normal: Float
     distance: Float
     tolerance: float
 
@@ -152,23 +148,23 @@ class NearRays:
     ----------
     target : (k,) int64
         Target of each bundle.
+    patch : (k,) int64
+        Patch of each bundle.
     channel : (k,) int64
         Of the beams.
     first : (k,) int64
         First azimuth step, possibly negative or beyond the revolution, at the end of which step 0 follows.
     width : (k,) int64
         Number of steps, at least 1.
-    begin : (k,) float64, metres
-        No return from near the target is nearer than this in plan.
     miss : (k,) float64, metres
         How far before or behind the middle of the patch the channel comes down.
     """
 
     target: Integer
+    patch: Integer
     channel: Integer
     first: Integer
     width: Integer
-    begin: Float
     miss: Float
 
     def __len__(self) -> int:
@@ -191,18 +187,22 @@ class NearRays:
         sensor : (c,) int64
             Which sensor has which channel.
         """
-        order = np.lexsort((self.miss, self.target, sensor[self.channel]))
-        change = np.diff(self.target[order], prepend=-1) != 0
-        return self.pick(order[change])
+        number = sensor[self.channel] * (self.target.max(initial=0) + 1) + self.target
+        least = np.full(number.max(initial=0) + 1, np.inf)
+        np.minimum.at(least, number, self.miss)
+        best = np.flatnonzero(self.miss == least[number])
+        return self.pick(best[np.unique(number[best], return_index=True)[1]])
 
-    def beside_middle(self) -> NearRays:
-        """Return what is left and right of the middle rays."""
+    def beside_middle(self) -> tuple[NearRays, Integer]:
+        """Return what is left and right of the middle rays, and of which bundle each is a part."""
         before = (self.width - 1) // 2
         after = self.width - 1 - before
         right, left = np.flatnonzero(before), np.flatnonzero(after)
-        halves = self.pick(np.concatenate([right, left]))
+        parent = np.concatenate([right, left])
+        halves = self.pick(parent)
         first = np.concatenate([self.first[right], (self.first + before + 1)[left]])
-        return replace(halves, first=first, width=np.concatenate([before[right], after[left]]))
+        width = np.concatenate([before[right], after[left]])
+        return replace(halves, first=first, width=width), parent
 
 
 def target_patches(origin: Float, surfaces: NearSurfaces) -> Patches:
@@ -230,7 +230,7 @@ def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tupl
     azimuth, distance = _polar(centre)
     bottom, top = discs.low[pick] - origin[2], discs.high[pick] - origin[2]
     patches = Patches(discs.target[pick], azimuth, distance, discs.radius[pick] + surfaces.tolerance, bottom, top)
-    return patches, Planes(*_polar(normal), normal[:, 2], np.abs(away), surfaces.tolerance)
+    return patches, Planes(normal, np.abs(away), surfaces.tolerance)
 
 
 def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> NearRays:
@@ -258,10 +258,10 @@ def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> N
     last = np.floor((azimuth + arcs.half_width) / step).astype(np.int64)
     rays = NearRays(
         target=patches.target[arcs.patch],
+        patch=arcs.patch,
         channel=arcs.channel,
         first=first,
         width=np.minimum(last - first + 1, beams.steps[arcs.channel]),
-        begin=arcs.begin,
         miss=np.abs((arcs.begin + arcs.end) / 2 - patches.distance[arcs.patch]),
     )
     return rays.pick(np.flatnonzero(rays.width > 0))
@@ -328,9 +328,11 @@ def _half_width(distance: Float, begin: Float, end: Float, radius: Float) -> Flo
 
 def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
     """Leave of each arc what can meet the patch's plane: all of it, or a part on each side of the normal."""
-    distance, level = planes.distance[arcs.patch], np.maximum(planes.level[arcs.patch], _MARGIN)
+    distance, normal = planes.distance[arcs.patch], planes.normal[arcs.patch]
+    direction, level = _polar(normal)
+    level = np.maximum(level, _MARGIN)
     nearest, farthest = distance - planes.tolerance, distance + planes.tolerance
-    climb = planes.rise[arcs.patch] * arcs.slope
+    climb = normal[:, 2] * arcs.slope
     with np.errstate(divide="ignore"):
         least = nearest / np.where(nearest > 0, arcs.end, arcs.begin)
         most = farthest / arcs.begin
@@ -342,7 +344,7 @@ def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
     possible = ((most - climb) >= -level) & ((least - climb) <= level)
     parts = [arcs.pick(whole & possible)]
     for side in (-1, 1):
-        middle = planes.azimuth[arcs.patch] + side * (outer + inner) / 2
+        middle = direction + side * (outer + inner) / 2
         apart = (middle - arcs.azimuth + math.pi) % (2 * math.pi) - math.pi
         right = np.maximum(apart - half_width, -arcs.half_width)
         left = np.minimum(apart + half_width, arcs.half_width)

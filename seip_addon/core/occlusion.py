@@ -1,7 +1,7 @@
 """Bundles of rays that one triangle stops, proven without casting them.
 
 A bundle is a row of neighbouring azimuth steps of one channel, its rays
-u(a) = (cos a, sin a, σ) for azimuths a within w of a₀. With a half-space n·x > 0,
+u(a) = (cos a, sin a, σ) for azimuths a within w of a₀. For a half-space n·x > 0
 
     n·u(a₀ + t) = P cos t + Q sin t + n_z σ,   P = n·(cos a₀, sin a₀, 0),   Q = n·(−sin a₀, cos a₀, 0)
 
@@ -17,13 +17,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .beam_culling import Beams, NearRays
+from .beam_culling import Beams, NearRays, Planes
 
 Float = NDArray[np.float64]
 Boolean = NDArray[np.bool_]
 
 
-def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, tolerance: float) -> Boolean:
+def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, planes: Planes) -> Boolean:
     """Tell which bundles are stopped, each by its triangle, before they come near their targets.
 
     Parameters
@@ -34,13 +34,13 @@ def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, to
     beams : Beams
     rays : NearRays
         k bundles of them.
-    tolerance : float, metres
-        How far a ray caster's returns may lie off the triangles.
+    planes : Planes
+        Where the rays would return, by patch.
 
     Returns
     -------
     (k,) bool
-        True only where the triangle stops all rays of the bundle by more than the tolerance.
+        True only where the triangle stops all rays of the bundle by more than the tolerance of a ray caster.
     """
     step = 2 * math.pi / beams.steps[rays.channel]
     slope = np.tan(beams.elevation)[rays.channel]
@@ -54,18 +54,18 @@ def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, to
         ahead, aside = normal[0] * cos + normal[1] * sin, normal[1] * cos - normal[0] * sin
         return np.minimum(ahead, ahead * cos_width) - np.abs(aside) * sin_width + normal[2] * slope
 
-    first, second, third = np.moveaxis(triangles - origin, 0, 2)
+    first, second, third = np.ascontiguousarray(np.moveaxis(triangles - origin, 0, 2))
     edges = _cross(first, second), _cross(second, third), _cross(third, first)
     normal = edges[0] + edges[1] + edges[2]
+    normal /= np.sqrt((normal**2).sum(axis=0))
     away = (first * normal).sum(axis=0)
     side = np.where(away < 0, -1.0, 1.0)
-    length = np.sqrt((normal**2).sum(axis=0))
-    plane = np.abs(away) / length  # no point of the triangle is nearer to the sensor
-    stopped = (half_width <= math.pi / 2) & (rays.begin * least(side * normal) - np.abs(away) > tolerance * length)
-    ray_length = np.hypot(1.0, slope)
+    distance = np.abs(away)  # of the triangle's plane: no point of it is nearer to the sensor
+    margin = planes.tolerance * np.hypot(1.0, slope)
+    before = planes.distance[rays.patch] * side * normal - distance * planes.normal[rays.patch].T
+    stopped = (half_width <= math.pi / 2) & (least(before) > 2 * margin) & (least(side * normal) > 0)
     for edge in edges:
-        margin = tolerance * ray_length * np.sqrt((edge**2).sum(axis=0))
-        stopped &= plane * least(side * edge) > margin
+        stopped &= distance * least(side * edge) > margin * np.sqrt((edge**2).sum(axis=0))
     return stopped
 
 

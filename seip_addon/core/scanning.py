@@ -87,21 +87,27 @@ def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, in
     seen = np.zeros((len(place.models), len(surfaces.xyz)), dtype=bool)
 
     first = near_rays(beams, target_patches(place.origin, surfaces)).likeliest(beams.sensor)
-    sees, _ = returns.see(first, surfaces.xyz)
+    sees, triangle = returns.see(first, surfaces.xyz)
     seen[beams.sensor[first.channel], first.target] = sees
     unseen = np.zeros(len(surfaces.xyz), dtype=bool)
     unseen[first.target[~sees]] = True
+    blocker = np.full(seen.shape, -1)
+    blocker[beams.sensor[first.channel], first.target] = triangle
 
-    bundles = near_rays(beams, *disc_patches(place.origin, surfaces, unseen))
-    bundles = bundles.pick(~seen[beams.sensor[bundles.channel], bundles.target])
+    patches, planes = disc_patches(place.origin, surfaces, unseen)
+    bundles = near_rays(beams, patches, planes)
+    bundles = bundles.pick(np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target]))
+    triangle = blocker[beams.sensor[bundles.channel], bundles.target]
     while len(bundles):
+        stopped = triangle >= 0
+        corners = place.caster.triangles[triangle[stopped]]
+        stopped[stopped] = stopped_by(place.origin, corners, beams, bundles.pick(stopped), planes)
+        bundles = bundles.pick(~stopped)
         sees, triangle = returns.see(bundles, surfaces.xyz)
         seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
-        more = ~seen[beams.sensor[bundles.channel], bundles.target] & (bundles.width > 1)
-        bundles, triangle = bundles.pick(more), triangle[more]
-        corners = place.caster.triangles[triangle]
-        stopped = (triangle >= 0) & stopped_by(place.origin, corners, beams, bundles, surfaces.tolerance)
-        bundles = bundles.pick(~stopped).beside_middle()
+        unseen = np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target])
+        bundles, part_of = bundles.pick(unseen).beside_middle()
+        triangle = triangle[unseen][part_of]
     return seen, returns.cast
 
 
@@ -117,7 +123,7 @@ def seen_by_all_rays(place: Place, targets: Float) -> tuple[Boolean, int]:
             directions = pattern.directions(np.arange(begin, min(begin + _RAYS_AT_ONCE, total)))
             distance, triangle = place.caster.cast(place.origin, directions, model.max_range)
             counts = place.counting(model, directions, distance, triangle)
-            points = place.origin + distance[counts, None] * directions[counts]
+            points = _points(place.origin, directions[counts], distance[counts])
             seen[number, index.within_delta(points)] = True
         cast += total
     return seen, cast
@@ -141,6 +147,7 @@ class _Returns:
         self._row = np.zeros(beams.rays, dtype=np.int32)  # of each ray in the arrays below; row 0: not cast
         self._direction = np.zeros((1, 3))
         self._distance = np.full(1, np.inf)
+        self._point = np.full((1, 3), np.inf)
         self._triangle = np.full(1, -1, dtype=np.int64)
 
     @property
@@ -163,15 +170,14 @@ class _Returns:
             That stops the ray; -1 for none.
         """
         row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
-        triangle, sees = self._triangle[row], np.zeros(len(row), dtype=bool)
-        hit = np.flatnonzero(triangle >= 0)
-        direction, distance = self._direction[row[hit]], self._distance[row[hit]]
-        gap = self._place.origin + distance[:, None] * direction - targets[bundles.target[hit]]
-        near = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2 < self._place.delta**2
+        gap = self._point[row] - targets[bundles.target]
+        sees = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2 < self._place.delta**2
+        triangle = self._triangle[row]
+        near = np.flatnonzero(sees)
         for number, model in enumerate(self._place.models):
-            own = np.flatnonzero(near & (self._beams.sensor[bundles.channel[hit]] == number))
-            near[own] = self._place.counting(model, direction[own], distance[own], triangle[hit[own]])
-        sees[hit] = near
+            own = near[self._beams.sensor[bundles.channel[near]] == number]
+            counts = self._place.counting(model, self._direction[row[own]], self._distance[row[own]], triangle[own])
+            sees[own] = counts
         return sees, triangle
 
     def _rows(self, channel: Integer, step: Integer) -> Integer:
@@ -185,6 +191,7 @@ class _Returns:
             self._row[numbers] = np.arange(len(numbers)) + len(self._distance)
             self._direction = np.concatenate([self._direction, directions])
             self._distance = np.concatenate([self._distance, distance])
+            self._point = np.concatenate([self._point, _points(self._place.origin, directions, distance)])
             self._triangle = np.concatenate([self._triangle, triangle])
         rows: Integer = self._row[ray]
         return rows
@@ -196,3 +203,11 @@ class _Returns:
             local = channel[own] - self._first_channel[number]
             directions[own] = pattern.directions(local * self._place.models[number].azimuth_count + step[own])
         return directions
+
+
+def _points(origin: Float, directions: Float, distance: Float) -> Float:
+    """Where rays end; infinitely far on a miss."""
+    far = np.isinf(distance)
+    points: Float = origin + np.where(far, 0.0, distance)[:, None] * directions
+    points[far] = np.inf
+    return points
