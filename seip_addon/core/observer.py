@@ -60,6 +60,11 @@ class Observer:
         self._delta, self._min_intensity = delta, min_intensity
         self._surfaces = near_surfaces(site.triangles, site.targets.xyz, delta)
 
+    @property
+    def targets(self) -> int:
+        """Number of targets."""
+        return len(self._surfaces.xyz)
+
     def see(self, poses: Integer) -> Rows:
         """Find what poses see; those at one place, of different sensors, share rays.
 
@@ -67,7 +72,7 @@ class Observer:
         ----------
         poses : (k,) int64
         """
-        packed = np.zeros((len(poses), (len(self._surfaces.xyz) + 7) // 8), dtype=np.uint8)
+        packed = np.zeros((len(poses), (self.targets + 7) // 8), dtype=np.uint8)
         rays = 0
         for members in places(self._poses.xyz[poses], self._poses.yaw[poses]):
             here = poses[members]

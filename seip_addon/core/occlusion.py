@@ -52,7 +52,8 @@ def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, pl
     def least(normal: Float) -> Float:
         """Least n·u over the bundle; normals are (3, k)."""
         ahead, aside = normal[0] * cos + normal[1] * sin, normal[1] * cos - normal[0] * sin
-        return np.minimum(ahead, ahead * cos_width) - np.abs(aside) * sin_width + normal[2] * slope
+        value: Float = np.minimum(ahead, ahead * cos_width) - np.abs(aside) * sin_width + normal[2] * slope
+        return value
 
     first, second, third = np.ascontiguousarray(np.moveaxis(triangles - origin, 0, 2))
     edges = _cross(first, second), _cross(second, third), _cross(third, first)

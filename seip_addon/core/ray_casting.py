@@ -75,7 +75,7 @@ class RayCaster(Protocol):
         """
 
 
-def engine_name(engine: Engine) -> str:
+def engine_name(engine: Engine) -> Engine:
     """Return ``bvh`` or ``embree``; for ``auto`` Embree where it is installed, else Blender's BVH tree."""
     if engine == "auto":
         return "embree" if importlib.util.find_spec("embreex") else "bvh"
@@ -98,10 +98,11 @@ def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | N
     SeipError
         A coordinate is not finite, or the engine is not there.
     """
-    casters = {"embree": EmbreeRayCaster, "bvh": BvhRayCaster}
     name = engine_name(engine)
-    if name in casters:
-        return casters[name](triangles, keep)
+    if name == "embree":
+        return EmbreeRayCaster(triangles, keep)
+    if name == "bvh":
+        return BvhRayCaster(triangles, keep)
     raise SeipError(f"no ray-casting engine '{engine}'; choose auto, bvh or embree")
 
 

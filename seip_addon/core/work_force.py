@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .errors import SeipError
 from .lidar import LidarModel
 from .observer import Observer, Rows
-from .ray_casting import make_ray_caster
+from .ray_casting import Engine, make_ray_caster
 from .site import Site
 
 Integer = NDArray[np.int64]
@@ -34,8 +34,7 @@ class ObserverTask:
     models : mapping of str to LidarModel
     delta : float, metres
     min_intensity : float
-    engine : str
-        ``bvh`` or ``embree``.
+    engine : {"bvh", "embree"}
     keep : (n,) bool
         Which triangles of the site rays are cast against.
     """
@@ -44,7 +43,7 @@ class ObserverTask:
     models: Mapping[str, LidarModel]
     delta: float
     min_intensity: float
-    engine: str
+    engine: Engine
     keep: NDArray[np.bool_]
 
 

@@ -9,12 +9,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from engines import ANY, HAS_EMBREE, needs_embree
+from engines import ANY, needs_embree
 from synthetic_junction import junction_site
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
+from seip_addon.core.ray_casting import EmbreeRayCaster
 from seip_addon.core.visibility import VisibilitySettings, compute_visibility
 from seip_addon.core.visibility_store import stored_visibility
 
@@ -27,7 +28,7 @@ SETTINGS = VisibilitySettings()
 
 @pytest.fixture
 def cluster() -> Iterator[object]:
-    from distributed import LocalCluster
+    from distributed import LocalCluster  # noqa: PLC0415 - an extra that need not be installed
 
     with LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1", silence_logs=50
@@ -73,8 +74,6 @@ def test_a_cluster_writes_the_same_bytes_though_a_worker_dies(cluster, tmp_path:
 
 @needs_embree
 def test_the_number_of_threads_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    from seip_addon.core.ray_casting import EmbreeRayCaster
-
     grids = []
     for threads in (1, 3):
         monkeypatch.setattr(EmbreeRayCaster, "threads", threads)
