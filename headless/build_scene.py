@@ -15,10 +15,9 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from seip_addon.core.opendrive import read_map
-
 from headless import session
 from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.site_description import SiteDescription, read_site_description
 from seip_addon.core.site_model import site_model

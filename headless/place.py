@@ -24,26 +24,27 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import bpy
 import numpy as np
+
+from headless import session
 from seip_addon.core.candidate_table import save_candidate_table
+from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.carla import save_carla_spawns
 from seip_addon.core.deployment import Deployment, deploy
+from seip_addon.core.goal import DEFAULT_COUNT, Goal, placement_problem, reach
+from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.placement import Placement, solve_greedy
 from seip_addon.core.placement_record import Record, Run, placement_record, save_placement_record, versions
 from seip_addon.core.plan_view import save_plan_view
-from seip_addon.scene.render import save_rendered_view
-from seip_addon.scene.write import save_scene, write_result
-
-from headless import session
-from seip_addon.core.candidates import CandidateSettings
-from seip_addon.core.goal import DEFAULT_COUNT, Goal, placement_problem, reach
-from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site, make_site
 from seip_addon.core.visibility import VisibilityGrid, VisibilitySettings
 from seip_addon.core.visibility_store import stored_visibility
+from seip_addon.scene.build import save_blend
 from seip_addon.scene.read import read_scene
+from seip_addon.scene.render import save_rendered_view
+from seip_addon.scene.write import write_result
 
 Result = TypeVar("Result")
 
@@ -109,7 +110,9 @@ def main(argv: list[str]) -> None:
         inputs={"visibility": grid.key},
         warnings=warnings,
     )
-    record = placement_record(site, deployment, placement, run, weighted=goal.weighted, greedy=greedy)
+    record = placement_record(
+        site, deployment, placement, run, weighted=goal.weighted, cheapest=goal.coverage is not None, greedy=greedy
+    )
     _write(options, _Outcome(reading.geometry, site, models, grid, placement, deployment), record)
     session.say(_result_lines(deployment, placement, greedy))
     session.say(f"written to {options.output}/")
@@ -135,7 +138,7 @@ def _write(options: argparse.Namespace, outcome: _Outcome, record: Record) -> No
     save_carla_spawns(folder / "carla_spawn.json", deployment, site.origin)
     save_plan_view(folder / "plan.png", outcome.geometry, site, deployment)
     write_result(scene, site, deployment)
-    save_scene(folder / "placed.blend")
+    save_blend(folder / "placed.blend")
     if not options.no_render:
         save_rendered_view(folder / "view.png", scene, site, deployment)
     save_placement_record(folder / "placement.json", record)

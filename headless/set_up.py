@@ -19,7 +19,6 @@ from pathlib import Path
 from headless.system_libraries import complaint, missing_libraries
 
 SUPPORTED = ((3, 11), (3, 13))
-PIP = "pip==26.3"  # the first pip of Debian's Pythons knows no dependency groups
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -52,12 +51,18 @@ def what_is_missing() -> str | None:
     return complaint(missing) if missing else None
 
 
-def fingerprint() -> str:
-    """Return what an environment depends on: this Python and the pins."""
+def dependency_groups() -> dict[str, list[str]]:
+    """Return the pins of ``pyproject.toml`` by group."""
     import tomllib  # noqa: PLC0415  # Python 3.10 has none, and must get as far as its sentence
 
-    pins = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
-    return json.dumps({"python": sys.version, "base": sys.base_prefix, "pip": PIP, "groups": pins}, indent=1)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    groups: dict[str, list[str]] = project["dependency-groups"]
+    return groups
+
+
+def fingerprint() -> str:
+    """Return what an environment depends on: this Python and the pins."""
+    return json.dumps({"python": sys.version, "base": sys.base_prefix, "groups": dependency_groups()}, indent=1)
 
 
 def install(environment: Path) -> None:
@@ -69,7 +74,7 @@ def install(environment: Path) -> None:
         shutil.rmtree(environment)
     run(sys.executable, "-m", "venv", str(environment))
     python = str(environment / "bin" / "python")
-    run(python, "-m", "pip", "install", "--quiet", PIP)
+    run(python, "-m", "pip", "install", "--quiet", *dependency_groups()["installer"])
     run(python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--group", "development")
     run(python, "-c", "import bpy")
 
@@ -82,4 +87,7 @@ def run(*command: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit("set-up stopped; the next run starts it anew")

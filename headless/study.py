@@ -13,12 +13,12 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import bpy
-from seip_addon.core.plan_view import save_plan_view
 
 from headless import session
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.coverage_study import NUMBERS, coverage_study, judge
 from seip_addon.core.lidar import find_models, load_catalogue
+from seip_addon.core.plan_view import save_plan_view
 from seip_addon.core.progress import finish
 from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.site import make_site

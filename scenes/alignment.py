@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)  # type: ignore[no-untyped-call]  # numpy 1.26 has no types here
 SHORTEST = 1e-6  # metres; anything shorter comes from rounding and would only burden readers
 STRAIGHT = 1e-9  # radians
 

@@ -14,12 +14,15 @@ from the site descriptions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenes.corridor import corridor_map
 from scenes.four_arm_junction import junction_map
 from scenes.opendrive_writer import Map, opendrive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
 
 MAPS: Mapping[str, Callable[[], Map]] = {"junction.xodr": junction_map, "corridor.xodr": corridor_map}
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 from scenes.alignment import Alignment, Piece, Pose, transition_curve
 from scenes.junctions import Arm, connect, equip
-from scenes.opendrive_writer import Lane, Map, Neighbour, Road, RoadObject, Section
+from scenes.opendrive_writer import Lane, Map, Neighbour, Repeat, Road, RoadObject, Section
 from scenes.streets import (
     KERB,
     LIGHT_SETBACK,
@@ -35,17 +36,37 @@ PARKING_PAVEMENT = 4.5  # beside a parking lane 2.2 m of it are given up
 PARKING = 2.2
 
 
+class SideStreet(NamedTuple):
+    """A street off the arterial: where, at which angle to it in degrees, and how far from its middle it begins."""
+
+    id: str
+    name: str
+    junction: str
+    station: float
+    angle: float
+    setback: float
+    length: float
+    height: float
+    lanes: tuple[float, ...]
+    grade: float = 0.0
+
+
+SIDE_STREETS = (
+    SideStreet("11", "Mill Lane North", "100", MILL, 90.0, 14.5, 75.0, 0.0, SIDE_LANES, grade=0.02),
+    SideStreet("12", "Mill Lane South", "100", MILL, -95.0, 14.5, 75.0, 0.0, SIDE_LANES),
+    SideStreet("13", "School Street", "200", SCHOOL, -82.0, 13.5, 80.0, 1.6, SIDE_LANES, grade=-0.01),
+    SideStreet("14", "Station Road North", "300", STATION, 86.0, 15.0, 90.0, 0.9, LANES),
+    SideStreet("15", "Station Road South", "300", STATION, -88.0, 15.0, 90.0, 0.9, LANES, grade=-0.012),
+)
+
+
 def corridor_map() -> Map:
     """Return the map; the first junction's centre is the origin."""
     west = _furnish(_arterial("1", (0.0, MILL - 11.0), (-0.6, 0.0), (None, "100")))
     middle = _furnish(_arterial("2", (MILL + 11.0, SCHOOL - 10.0), (0.0, 1.6), ("100", "200"), parking=-1))
     inner = _furnish(_arterial("3", (SCHOOL + 10.0, STATION - 15.0), (1.6, 0.9), ("200", "300"), parking=1))
     east = _furnish(_arterial("4", (STATION + 15.0, ARTERIAL.length), (0.9, 1.5), ("300", None)))
-    mill_north = _side_street("11", "Mill Lane North", (MILL, 90.0, 14.5, 75.0), "100", 0.0, SIDE_LANES, grade=0.02)
-    mill_south = _side_street("12", "Mill Lane South", (MILL, -95.0, 14.5, 75.0), "100", 0.0, SIDE_LANES)
-    school = _side_street("13", "School Street", (SCHOOL, -82.0, 13.5, 80.0), "200", 1.6, SIDE_LANES, grade=-0.01)
-    north = _side_street("14", "Station Road North", (STATION, 86.0, 15.0, 90.0), "300", 0.9, LANES)
-    south = _side_street("15", "Station Road South", (STATION, -88.0, 15.0, 90.0), "300", 0.9, LANES, grade=-0.012)
+    mill_north, mill_south, school, north, south = (_side_street(street) for street in SIDE_STREETS)
     junctions = (
         connect(
             "100",
@@ -106,30 +127,21 @@ def _parking_sections(length: float, parking: int, clear: float = 24.0) -> tuple
     return linked((ends, middle, replace(ends, start=length - clear)))
 
 
-def _side_street(  # noqa: PLR0913  # a street has these properties
-    identity: str,
-    name: str,
-    course: tuple[float, float, float, float],
-    junction: str,
-    height: float,
-    lanes: tuple[float, ...],
-    grade: float = 0.0,
-) -> Road:
-    """Return a street off the arterial; its course is station, angle to the arterial (degrees), set-back and length."""
-    station, angle, setback, length = course
-    start = ARTERIAL.pose(station).turned(math.radians(angle)).moved(ahead=setback)
-    pavement = 2.5 if lanes == SIDE_LANES else 3.0
-    side = street_side(lanes, pavement)
+def _side_street(street: SideStreet) -> Road:
+    start = ARTERIAL.pose(street.station).turned(math.radians(street.angle)).moved(ahead=street.setback)
+    narrow = street.lanes == SIDE_LANES
+    pavement = 2.5 if narrow else 3.0
+    side = street_side(street.lanes, pavement)
     road = Road(
-        identity,
-        name,
-        Alignment(start, (Piece(length),)).geometries(),
-        (Section(0.0, side, side, "broken" if lanes == SIDE_LANES else "solid"),),
-        climb(grade, height),
-        predecessor=Neighbour("junction", junction),
-        speed=30 if lanes == SIDE_LANES else 50,
+        street.id,
+        street.name,
+        Alignment(start, (Piece(street.length),)).geometries(),
+        (Section(0.0, side, side, "broken" if narrow else "solid"),),
+        climb(street.grade, street.height),
+        predecessor=Neighbour("junction", street.junction),
+        speed=30 if narrow else 50,
     )
-    return _furnish_side_street(equip(road, "start"), sum(lanes), pavement)
+    return _furnish_side_street(equip(road, "start"), sum(street.lanes), pavement)
 
 
 def _furnish(road: Road) -> Road:
@@ -139,9 +151,9 @@ def _furnish(road: Road) -> Road:
         parking = any(lane.kind == "parking" for section in road.sections for lane in _lanes(section, side))
         first, last = (32.0, road.length - 32.0) if parking else (16.0, road.length - 16.0)
         kerb = sum(LANES) + (PARKING if parking else 0.0)
-        rows.append(light_row("street light", first, last, 28.0, side * (kerb + LIGHT_SETBACK)))
+        rows.append(light_row(Repeat(first, last - first, 28.0, side * (kerb + LIGHT_SETBACK))))
         if not parking:  # beside parking the pavement is too narrow for trees
-            rows.append(tree_row("lime tree", first + 7.0, last, 14.0, side * (kerb + 1.1), 7.0))
+            rows.append(tree_row("lime tree", Repeat(first + 7.0, last - first - 7.0, 14.0, side * (kerb + 1.1)), 7.0))
     houses = buildings(road, HOUSES[road.id], bent=len(road.geometries) > 1)
     return replace(road, objects=(*road.objects, *houses, *rows, *FURNITURE.get(road.id, ())))
 
@@ -153,16 +165,10 @@ def _lanes(section: Section, side: int) -> tuple[Lane, ...]:
 def _furnish_side_street(road: Road, kerb: float, pavement: float) -> Road:
     """Return a side street with houses, trees on its left and street lights on its right."""
     front = kerb + pavement + 1.5
-    houses = (
-        House(1, 19.0, 34.0, front, front + 11.0, 11.0),
-        House(1, 40.0, 58.0, front, front + 13.0, 14.0),
-        House(1, 63.0, 74.0, front + 3.0, front + 13.0, 7.0),
-        House(-1, 19.0, 44.0, front, front + 12.0, 13.0),
-        House(-1, 52.0, 72.0, front, front + 12.0, 9.0),
-    )
+    houses = [house._replace(near=front + house.near, far=front + house.far) for house in HOUSES[road.id]]
     rows = (
-        tree_row("maple", 18.0, road.length - 8.0, 11.0, kerb + 1.0, 5.5),
-        light_row("street light", 14.0, road.length - 5.0, 26.0, -kerb - LIGHT_SETBACK),
+        tree_row("maple", Repeat(18.0, road.length - 26.0, 11.0, kerb + 1.0), 5.5),
+        light_row(Repeat(14.0, road.length - 19.0, 26.0, -kerb - LIGHT_SETBACK)),
     )
     return replace(road, objects=(*road.objects, *buildings(road, houses), *rows))
 
@@ -212,6 +218,40 @@ HOUSES = {
         House(-1, 35.0, 50.0, 12.0, 25.0, 9.0),
         House(-1, 58.0, 84.0, 12.0, 25.0, 18.0),
         House(-1, 92.0, 120.0, 16.0, 28.0, 8.0),
+    ),
+    # Along the side streets the distances count from the line of their fronts.
+    "11": (
+        House(1, 19.0, 34.0, 0.0, 11.0, 11.0),
+        House(1, 40.0, 58.0, 0.0, 13.0, 14.0),
+        House(1, 63.0, 74.0, 3.0, 13.0, 7.0),
+        House(-1, 19.0, 44.0, 0.0, 12.0, 13.0),
+        House(-1, 52.0, 72.0, 0.0, 12.0, 9.0),
+    ),
+    "12": (
+        House(1, 20.0, 48.0, 0.0, 12.0, 10.0),
+        House(1, 55.0, 74.0, 4.0, 14.0, 7.0),
+        House(-1, 19.0, 33.0, 0.0, 10.0, 12.0),
+        House(-1, 38.0, 73.0, 1.0, 13.0, 15.0),
+    ),
+    "13": (
+        House(1, 22.0, 40.0, 0.0, 12.0, 9.0),
+        House(1, 47.0, 78.0, 2.0, 14.0, 12.0),
+        House(-1, 22.0, 60.0, 5.0, 19.0, 11.0),
+        House(-1, 66.0, 78.0, 0.0, 10.0, 7.0),
+    ),
+    "14": (
+        House(1, 18.0, 44.0, 0.0, 14.0, 20.0),
+        House(1, 52.0, 86.0, 2.0, 15.0, 14.0),
+        House(-1, 18.0, 36.0, 0.0, 12.0, 16.0),
+        House(-1, 42.0, 60.0, 0.0, 12.0, 13.0),
+        House(-1, 68.0, 88.0, 3.0, 15.0, 18.0),
+    ),
+    "15": (
+        House(1, 18.0, 33.0, 0.0, 11.0, 12.0),
+        House(1, 39.0, 57.0, 0.0, 13.0, 15.0),
+        House(1, 65.0, 88.0, 1.0, 13.0, 9.0),
+        House(-1, 18.0, 52.0, 0.0, 14.0, 17.0),
+        House(-1, 60.0, 86.0, 4.0, 16.0, 8.0),
     ),
 }
 

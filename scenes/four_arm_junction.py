@@ -16,10 +16,10 @@ SETBACK = 15.0  # metres from the centre to where the arms begin
 def junction_map() -> Map:
     """Return the map; its centre is the origin."""
     arms = [
-        _arm("1", "East Street", 0.0, transition_curve(45.0, 20.0, 35.0, 120.0), (3.0, 3.0)),
-        _arm("2", "North Street", 83.0, (Piece(120.0),), (2.5, 2.0)),
-        _arm("3", "West Street", 180.0, (Piece(120.0),), (4.0, 3.0), grade=0.015),
-        _arm("4", "South Street", 268.0, transition_curve(70.0, 15.0, 20.0, -300.0), (3.5, 2.5)),
+        _arm("1", "East Street", 0.0, transition_curve(45.0, 20.0, 35.0, 120.0), pavements=(3.0, 3.0)),
+        _arm("2", "North Street", 83.0, (Piece(120.0),), pavements=(2.5, 2.0)),
+        _arm("3", "West Street", 180.0, (Piece(120.0),), pavements=(4.0, 3.0), grade=0.015),
+        _arm("4", "South Street", 268.0, transition_curve(70.0, 15.0, 20.0, -300.0), pavements=(3.5, 2.5)),
     ]
     connecting, junction = connect(
         "100", "Central junction", [Arm(arm, "start") for arm in arms], phases=((0, 2), (1, 3))
@@ -27,11 +27,12 @@ def junction_map() -> Map:
     return Map("Four-arm signalised junction", (*arms, *connecting), (junction,))
 
 
-def _arm(
+def _arm(  # an arm has these properties
     identity: str,
     name: str,
     azimuth: float,
     pieces: tuple[Piece, ...],
+    *,
     pavements: tuple[float, float],
     grade: float = 0.0,
 ) -> Road:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from scenes.alignment import Pose, join, turn_between
 from scenes.opendrive_writer import (
@@ -24,6 +23,9 @@ from scenes.opendrive_writer import (
     smooth_step,
     value_at,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
 
 STRAIGHT_ON = math.radians(45.0)
 CROSSWALK = (1.0, 5.0)  # metres from the end of the road: where pedestrians cross
@@ -103,13 +105,11 @@ def equip(road: Road, contact: End) -> Road:
     crosswalk = _painted(
         "crosswalk",
         f"{road.name} crosswalk at {contact}",
-        station(sum(CROSSWALK) / 2.0),
-        side * (kerb - far_kerb) / 2.0,
-        CROSSWALK[1] - CROSSWALK[0],
-        kerb + far_kerb,
+        (station(sum(CROSSWALK) / 2.0), side * (kerb - far_kerb) / 2.0),
+        (CROSSWALK[1] - CROSSWALK[0], kerb + far_kerb),
     )
     stop_line = _painted(
-        "roadMark", f"{road.name} stop line at {contact}", station(STOP_LINE), side * kerb / 2.0, 0.4, kerb
+        "roadMark", f"{road.name} stop line at {contact}", (station(STOP_LINE), side * kerb / 2.0), (0.4, kerb)
     )
     light = TrafficLight(
         f"{road.id}{8 if contact == 'start' else 9}",
@@ -122,8 +122,9 @@ def equip(road: Road, contact: End) -> Road:
     return replace(road, objects=(*road.objects, crosswalk, stop_line), signals=(*road.signals, light))
 
 
-def _painted(kind: str, name: str, s: float, t: float, length: float, width: float) -> RoadObject:
-    """Return a rectangle of paint on the carriageway."""
+def _painted(kind: str, name: str, place: tuple[float, float], size: tuple[float, float]) -> RoadObject:
+    """Return a rectangle of paint on the carriageway: its middle (s, t), length and width."""
+    (s, t), (length, width) = place, size
     u, v = length / 2.0, width / 2.0
     corners = tuple(Corner(a, b, 0.0) for a, b in ((-u, -v), (u, -v), (u, v), (-u, v)))
     return RoadObject(kind, name, s, t, 0.0, size={"length": length, "width": width}, corners_local=corners)
@@ -134,9 +135,9 @@ def driving(lanes: Sequence[EdgeLane]) -> tuple[EdgeLane, ...]:
     return tuple(lane for lane in lanes if lane.kind == "driving")
 
 
-def connect(identity: str, name: str, arms: Sequence[Arm], phases: Sequence[Sequence[int]]) -> tuple[
-    tuple[Road, ...], Junction
-]:
+def connect(
+    identity: str, name: str, arms: Sequence[Arm], phases: Sequence[Sequence[int]]
+) -> tuple[tuple[Road, ...], Junction]:
     """Return the connecting roads and the junction of arms.
 
     Parameters

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
-from xml.etree.ElementTree import Element, SubElement, indent, tostring  # noqa: S405  # it writes, nothing is parsed
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from scenes.alignment import Geometry
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from scenes.alignment import Geometry
 
 Value = str | float | int
 
@@ -72,11 +75,12 @@ class Neighbour:
 
 @dataclass(frozen=True)
 class Corner:
-    """A corner of an outline: (u, v) in the object's axes or (s, t) of the road, and the height there, in metres."""
+    """A corner of an outline in metres: (u, v) in the object's axes or (s, t) of the road, the height, the foot."""
 
     first: float
     second: float
     height: float
+    foot: float = 0.0  # above the object's origin or the road
 
 
 @dataclass(frozen=True)
@@ -193,7 +197,8 @@ def opendrive(road_map: Map) -> bytes:
     for junction in road_map.junctions:
         _junction(root, junction)
     indent(root, " ")
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
+    text: str = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def _text(value: Value) -> str:
@@ -293,7 +298,7 @@ def _objects(element: Element, road: Road) -> None:
             if corners:
                 outline = _add(_add(record, "outlines"), "outline", id=0, outer="true", closed="true")
                 for index, corner in enumerate(corners):
-                    place = dict(zip(axes, (corner.first, corner.second, 0.0), strict=True))
+                    place = dict(zip(axes, (corner.first, corner.second, corner.foot), strict=True))
                     _add(outline, tag, id=index, **place, height=corner.height)
 
 

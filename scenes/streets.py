@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from scenes.opendrive_writer import Corner, Cubic, Lane, Repeat, Road, RoadObject, Section, smooth_step
+from scenes.opendrive_writer import Corner, Cubic, Lane, Repeat, Road, RoadObject, Section, smooth_step, value_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
 
 KERB = 0.12
 LIGHT_SETBACK = 0.6  # metres from kerb to the axis of a street light
@@ -40,35 +41,28 @@ def _there_and_back(outside: float, inside: float, length: float, taper: float) 
 
 def linked(sections: Sequence[Section]) -> tuple[Section, ...]:
     """Return the sections with lanes linked: the first driving lane to the first driving lane, and so on."""
-    result = list(sections)
-    for index, (before, after) in enumerate(pairwise(sections)):
-        for side, sign in (("left", 1), ("right", -1)):
-            first, second = getattr(before, side), getattr(after, side)
-            numbers, others = _by_kind(first, sign), _by_kind(second, sign)
-            leaving = getattr(result[index], side)
-            result[index] = replace(
-                result[index],
-                **{
-                    side: tuple(
-                        replace(lane, successor=others.get(key))
-                        for lane, key in zip(leaving, numbers, strict=True)
-                    )
-                },
-            )
-            result[index + 1] = replace(
-                result[index + 1],
-                **{
-                    side: tuple(
-                        replace(lane, predecessor=numbers.get(key))
-                        for lane, key in zip(second, others, strict=True)
-                    )
-                },
-            )
-    return tuple(result)
+    nothing = Section(0.0, (), ())
+    befores, afters = (nothing, *sections[:-1]), (*sections[1:], nothing)
+    return tuple(
+        replace(
+            section,
+            left=_linked_side(before.left, section.left, after.left, 1),
+            right=_linked_side(before.right, section.right, after.right, -1),
+        )
+        for before, section, after in zip(befores, sections, afters, strict=True)
+    )
+
+
+def _linked_side(before: Sequence[Lane], lanes: Sequence[Lane], after: Sequence[Lane], sign: int) -> tuple[Lane, ...]:
+    predecessors, successors = _by_kind(before, sign), _by_kind(after, sign)
+    return tuple(
+        replace(lane, predecessor=predecessors.get(key), successor=successors.get(key))
+        for lane, key in zip(lanes, _by_kind(lanes, sign), strict=True)
+    )
 
 
 def _by_kind(lanes: Sequence[Lane], sign: int) -> dict[tuple[str, int], int]:
-    """Return lane ids by type and rank among the lanes of that type."""
+    """Return lane ids by type and rank among the lanes of that type, in order."""
     kinds = [lane.kind for lane in lanes]
     return {(kind, kinds[:index].count(kind)): sign * (index + 1) for index, kind in enumerate(kinds)}
 
@@ -112,47 +106,40 @@ def buildings(road: Road, houses: Sequence[House], *, bent: bool = False) -> Ite
     for side, start in ((1, 1), (-1, 2)):
         row = [house for house in houses if house.side == side]
         for number, house in enumerate(row):
-            yield _building(f"{road.name} {start + 2 * number}", house, bent=bent)
+            yield _building(road, f"{road.name} {start + 2 * number}", house, bent=bent)
 
 
-def _building(name: str, house: House, *, bent: bool) -> RoadObject:
+def _building(road: Road, name: str, house: House, *, bent: bool) -> RoadObject:
     middle, offset = (house.first + house.last) / 2.0, (house.near + house.far) / 2.0
     length, depth = house.last - house.first, house.far - house.near
+    front = (house.first, middle, house.last)
+    # Houses are level, whatever the street does: they stand on the lowest ground beside them.
+    feet = {s: value_at(road.elevation, s) for s in front}
+    floor = min(feet.values())
     building = RoadObject(
         "building", name, middle, house.side * offset, house.height, size={"length": length, "width": depth}
     )
     if bent:
-        front = (house.first, middle, house.last)
-        near = [Corner(s, house.side * house.near, house.height) for s in front]
-        far = [Corner(s, house.side * house.far, house.height) for s in reversed(front)]
+        near = [Corner(s, house.side * house.near, house.height, floor - feet[s]) for s in front]
+        far = [Corner(s, house.side * house.far, house.height, floor - feet[s]) for s in reversed(front)]
         return replace(building, corners_road=(*near, *far))
     u, v = length / 2.0, depth / 2.0
-    corners = ((-u, -v), (u, -v), (u, v), (-u, v))
-    return replace(building, corners_local=tuple(Corner(a, b, house.height) for a, b in corners))
+    corners = tuple(Corner(a, b, house.height) for a, b in ((-u, -v), (u, -v), (u, v), (-u, v)))
+    return replace(building, z_offset=floor - feet[middle], corners_local=corners)
 
 
-def tree_row(name: str, first: float, last: float, spacing: float, offset: float, height: float) -> RoadObject:
+def tree_row(name: str, row: Repeat, height: float) -> RoadObject:
     """Return a row of trees on the pavement."""
-    return _row("tree", name, (first, last, spacing, offset), height, 0.28 * height)
+    return _row("tree", name, row, height, 0.28 * height)
 
 
-def light_row(name: str, first: float, last: float, spacing: float, offset: float) -> RoadObject:
+def light_row(row: Repeat) -> RoadObject:
     """Return a row of street lights on the pavement."""
-    return _row("streetLamp", name, (first, last, spacing, offset), 8.0, 0.1)
+    return _row("streetLamp", "street light", row, 8.0, 0.1)
 
 
-def _row(kind: str, name: str, row: tuple[float, float, float, float], height: float, radius: float) -> RoadObject:
-    first, last, spacing, offset = row
-    return RoadObject(
-        kind,
-        name,
-        first,
-        offset,
-        height,
-        z_offset=KERB,
-        size={"radius": radius},
-        repeat=Repeat(first, last - first, spacing, offset),
-    )
+def _row(kind: str, name: str, row: Repeat, height: float, radius: float) -> RoadObject:
+    return RoadObject(kind, name, row.start, row.offset, height, z_offset=KERB, size={"radius": radius}, repeat=row)
 
 
 def garden_wall(name: str, first: float, last: float, offset: float, height: float = 1.6) -> RoadObject:

@@ -124,7 +124,7 @@ def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: st
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _line(  # noqa: PLR0913  # one drawn line is all of these
+def _line(  # one drawn line is all of these
     panel: Axes, row: int, label: str, x: Sequence[int], y: Sequence[float], *, dashed: bool = False
 ) -> None:
     style = {"linestyle": (0, (4, 2)), "mfc": PAPER, "linewidth": 1.0} if dashed else {"linewidth": 1.6}

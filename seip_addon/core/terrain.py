@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+from shapely.geometry.base import BaseGeometry
 
 Float = NDArray[np.float64]
 
@@ -68,7 +64,7 @@ class Terrain:
         corners = plan.reshape(-1, 2)
         if len(corners) == 0:
             return np.empty((0, 3, 3))
-        return np.column_stack([corners, self.height(corners) + above]).reshape(-1, 3, 3)
+        return _raised(corners, self.height(corners) + above)
 
 
 def triangulate(area: BaseGeometry) -> Float:
@@ -78,7 +74,8 @@ def triangulate(area: BaseGeometry) -> Float:
     edges = corners[:, 1:] - corners[:, :1]
     turn = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     corners[turn < 0] = corners[turn < 0, ::-1]
-    return corners[np.abs(turn) > 2 * LEAST_AREA]
+    kept: Float = corners[np.abs(turn) > 2 * LEAST_AREA]
+    return kept
 
 
 def cut(triangles: Float, away: BaseGeometry) -> Float:
@@ -95,7 +92,7 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
             corners = triangulate(rest)
             flat = corners.reshape(-1, 2)
             height = plane_height(np.broadcast_to(triangle, (len(flat), 3, 3)), flat)
-            pieces.append(np.column_stack([flat, height]).reshape(-1, 3, 3))
+            pieces.append(_raised(flat, height))
     return np.concatenate(pieces)
 
 
@@ -103,9 +100,16 @@ def plane_height(triangles: Float, xy: Float) -> Float:
     """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     offset = xy - triangles[:, 0, :2]
-    return triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
+    height: Float = triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
+    return height
 
 
 def _plan_area(triangles: Float) -> Float:
     edges = triangles[:, 1:, :2] - triangles[:, :1, :2]
-    return np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
+    area: Float = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
+    return area
+
+
+def _raised(corners: Float, height: Float) -> Float:
+    """Return (n, 3, 3) triangles of their corners in plan (3 n, 2) and heights (3 n,)."""
+    return np.column_stack([corners, height]).reshape(-1, 3, 3)

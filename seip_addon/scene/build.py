@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Generator
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -11,19 +12,12 @@ from mathutils import Vector
 
 from ..core.errors import SeipError
 from ..core.progress import Progress
-from ..core.site_parts import Role
+from ..core.site_model import SiteModel
+from ..core.site_parts import Part, Role
 from ..core.storage import digest, whole_file
-
+from ..core.street_furniture import Solid
 from . import collections
 from .materials import material
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-    from pathlib import Path
-
-    from ..core.site_model import SiteModel
-    from ..core.site_parts import Part
-    from ..core.street_furniture import Solid
 
 DRESSING = "Dressing"
 VIEW = "View"
@@ -45,7 +39,7 @@ OUTLINES = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDA
 
 STEP = 50
 CAMERA_AZIMUTH = math.radians(-125.0)
-CAMERA_ELEVATION = math.radians(38.0)
+CAMERA_ELEVATION = math.radians(48.0)
 LENS = 40.0
 SUN_ELEVATION, SUN_AZIMUTH = math.radians(48.0), math.radians(-60.0)
 SKY = (0.62, 0.70, 0.80, 1.0)
@@ -169,7 +163,7 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     camera.lens = LENS
     camera.clip_end = 5000.0
     thing = bpy.data.objects.new("Overview", camera)
-    distance = 0.85 * radius / math.tan(camera.angle / 2)
+    distance = 0.9 * radius / math.tan(camera.angle / 2)
     direction = Vector(
         (
             math.cos(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),

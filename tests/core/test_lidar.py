@@ -50,7 +50,7 @@ def write_model(path: Path, **changes: str | None) -> Path:
         ("type3", 128, -25, 15, 300, 4.8e6, (70e3, 90e3)),
     ],
 )
-def test_the_studys_types_have_the_studys_figures(  # noqa: PLR0913, PLR0917 - a row of its table
+def test_the_studys_types_have_the_studys_figures(
     key: str, channels: int, low: float, high: float, reach: float, points: float, price: tuple[float, float]
 ) -> None:
     model = CATALOGUE[key]

@@ -10,7 +10,6 @@ from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
-
 from .lanes import LaneSurface
 from .road_map import Junction, RoadMap
 

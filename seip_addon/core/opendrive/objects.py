@@ -12,7 +12,6 @@ from shapely import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
-
 from .road_map import Corner, Repeat, Road, RoadMap, RoadObject
 from .sampling import sample
 

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Float, Integer
 from ..progress import Progress
-from ..site import Float, Integer
 from .clock import Clock
 from .instance import SLACK, Instance
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Integer
 from ..progress import Progress
-from ..site import Integer
 from .bounds import Bound, can_reach, lagrangian_bound
 from .clock import Clock
 from .feasibility import starting_choice

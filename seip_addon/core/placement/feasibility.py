@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Integer
 from ..errors import SeipError
-from ..site import Integer
 from .instance import Instance
 from .integer_program import CoverProgram
 from .problem import PlacementProblem

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..site import Boolean, Integer
+from ..arrays import Boolean, Integer
 from .bounds import select
 from .instance import SLACK, Instance
 from .problem import TIE

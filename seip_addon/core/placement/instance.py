@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from ..site import Boolean, Float, Integer
 from .problem import TIE, PlacementProblem, canonical_order
 
 SCALE = 1e4

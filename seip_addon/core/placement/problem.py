@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
-from ..site import Boolean, Float, Integer, Text
 
 TIE = 1e-9
 """Two placements count as equal when they differ by less than this fraction of all weight (or of the price)."""

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from ..site import Integer
 from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .exact import prove, solve

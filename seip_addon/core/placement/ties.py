@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Integer
 from ..progress import Progress
-from ..site import Integer
 from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .instance import SLACK, Instance

@@ -1,0 +1,11 @@
+"""Names for arrays by what they hold; docstrings give shapes and units."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Boolean = NDArray[np.bool_]
+Text = NDArray[np.str_]
