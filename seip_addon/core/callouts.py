@@ -73,4 +73,5 @@ def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
 def _hidden(low: Float, high: Float, subject: Float) -> Float:
     """Return how much of the subject each box hides, the most of them 1."""
     inside = np.all((subject > low[:, None]) & (subject < high[:, None]), axis=2).sum(axis=1)
-    return inside / max(1, inside.max())
+    share: Float = inside / max(1, inside.max())
+    return share

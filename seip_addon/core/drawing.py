@@ -34,7 +34,7 @@ def markers_of(deployment: Deployment) -> dict[str, str]:
     return {key: MARKERS[index % len(MARKERS)] for index, key in enumerate(keys)}
 
 
-def draw_sensors(  # noqa: PLR0913 - one thing for each part of the picture
+def draw_sensors(
     axes: Axes, deployment: Deployment, points: Float, road: Float, *, zorder: float, hidden: Boolean | None = None
 ) -> None:
     """Mark each sensor and write its label, type and height next to it, no label on another.
