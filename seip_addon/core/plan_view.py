@@ -38,14 +38,14 @@ MAP_WIDTH, PANEL_WIDTH, MARGIN, HEAD = 9.6, 3.7, 0.3, 0.95  # inches
 SHORTEST_MAP, TALLEST_MAP = 6.6, 10.5  # inches
 AROUND = 0.06  # of the region's size, shown around it
 
-LAND, GROUND, PAVEMENT, ROAD, KERB = "#f3f4f1", "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
+LAND, PAVEMENT, ROAD, KERB = "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
 HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
 WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
 ROW, LINE = 0.42, 0.24  # inches that a sensor and a line of the legend take in the panel
 CRACK = 0.06  # metres
 FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
 
-BACK, SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(9)
+SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
 def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment) -> None:
@@ -85,7 +85,8 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     norm = _draw_obstacles(plan, geometry.occluders, site, shown)
     _draw_areas(plan, geometry, site.region)
     _draw_candidates(plan, site)
-    draw_sensors(plan, deployment, np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2), SENSOR)
+    sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
+    draw_sensors(plan, deployment, sensors, site.targets.xyz[:, :2], zorder=SENSOR)
     _draw_scale(plan, width)
     _draw_north(plan)
     draw_title(figure, site, deployment, MARGIN)
@@ -118,8 +119,6 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
-    for mesh in geometry.ground:
-        _draw_area(plan, _footprint(mesh, shown), facecolor=GROUND, edgecolor="none", zorder=BACK)
     pavement = shapely.intersection(geometry.candidate_areas, shown)
     _draw_area(plan, _healed(pavement), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
@@ -179,7 +178,7 @@ def _road_level(site: Site, points: Float) -> Float:
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
-    _draw_area(plan, region, facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    _draw_area(plan, _healed(region), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
         (geometry.forbidden_areas, FORBIDDEN, "////"),
         (geometry.mandatory_areas, MANDATORY, "...."),
@@ -307,7 +306,7 @@ class _Panel:
         if len(deployment.sensors) > rows:
             self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
             self.y += LINE
-        self._text(0.0, "Per cent of the road that each sees alone", color=SOFT_INK, size=8)
+        self._text(0.0, "Share of the road that each sees by itself", color=SOFT_INK, size=8)
         self.y += 0.38
 
     def _targets(self, site: Site, deployment: Deployment) -> None:
