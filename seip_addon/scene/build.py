@@ -98,6 +98,7 @@ def save_blend(path: Path) -> None:
 
 def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     """Write what the scene contract asks for, and metres, into the scene."""
+    scene[collections.TITLE] = model.name
     scene[collections.ORIGIN] = model.origin.tolist()
     scene[collections.MAP] = map_name
     scene[collections.GEO_REFERENCE] = model.geo_reference or ""
@@ -163,7 +164,7 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     camera.lens = LENS
     camera.clip_end = 5000.0
     thing = bpy.data.objects.new("Overview", camera)
-    distance = 0.9 * radius / math.tan(camera.angle / 2)
+    distance = 1.05 * radius / math.tan(camera.angle / 2)
     direction = Vector(
         (
             math.cos(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),
@@ -180,4 +181,5 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     shading = scene.display.shading
     shading.light, shading.color_type = "STUDIO", "MATERIAL"
     shading.show_shadows = shading.show_cavity = True
-    scene.display.light_direction = (-0.45, -0.40, 0.80)
+    shading.shadow_intensity = 0.35
+    scene.display.light_direction = (-0.45, 0.80, 0.40)  # here y is up

@@ -16,9 +16,23 @@ MANDATORY_AREAS = "SEIP Mandatory Areas"
 SENSORS = "SEIP Sensors"
 COVERAGE = "SEIP Coverage"
 
+INPUTS = (
+    REGION,
+    ROADS,
+    GROUND,
+    OCCLUDERS,
+    POLES,
+    CANDIDATE_AREAS,
+    WEIGHTED_REGIONS,
+    FORBIDDEN_AREAS,
+    MANDATORY_AREAS,
+)
+"""The collections that are read; `SENSORS` and `COVERAGE` are written."""
+
 WEIGHT = "seip_weight"
 FORBIDDEN = "seip_forbidden"
 MANDATORY = "seip_mandatory"
+TITLE = "seip_title"
 ORIGIN = "seip_origin"
 MAP = "seip_map"
 GEO_REFERENCE = "seip_geo_reference"
