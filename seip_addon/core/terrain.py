@@ -11,6 +11,8 @@ Float = NDArray[np.float64]
 
 LEAST_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""
+GRID = 1e-6
+"""Grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated."""
 
 
 class Terrain:
@@ -81,8 +83,9 @@ def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
     x, y = column.ravel() * spacing, row.ravel() * spacing
     shapely.prepare(area)
     squares = shapely.box(x, y, x + spacing, y + spacing)
-    parts = shapely.get_parts(shapely.intersection(squares[shapely.intersects(area, squares)], area))
-    return parts[shapely.get_type_id(parts) == shapely.GeometryType.POLYGON]
+    met = squares[shapely.intersects(area, squares)]
+    parts = shapely.get_parts(shapely.intersection(met, area, grid_size=GRID))
+    return parts[shapely.area(parts) > LEAST_AREA]
 
 
 def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
@@ -103,7 +106,7 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
     plan = shapely.polygons(triangles[:, :, :2])
     shapely.prepare(away)
     touched = shapely.intersects(away, plan)
-    rests = shapely.difference(plan[touched], away)
+    rests = shapely.difference(plan[touched], away, grid_size=GRID)
     pieces = [triangles[~touched]]
     for triangle, rest in zip(triangles[touched], rests, strict=True):
         if rest.area > LEAST_AREA:
