@@ -85,7 +85,8 @@ def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
     squares = shapely.box(x, y, x + spacing, y + spacing)
     met = squares[shapely.intersects(area, squares)]
     parts = shapely.get_parts(shapely.intersection(met, area, grid_size=GRID))
-    return parts[shapely.area(parts) > LEAST_AREA]
+    kept: NDArray[np.object_] = parts[shapely.area(parts) > LEAST_AREA]
+    return kept
 
 
 def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:

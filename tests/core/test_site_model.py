@@ -145,7 +145,7 @@ def test_far_map_coordinates_change_nothing_but_the_origin(tmp_path):
     signal = SIGNAL.format(s=95, t=-5, to="+", dynamic="yes")
     here = model(tmp_path, replace(HERE, trees=(tree,)), signals=signal)
     x, y = 5_412_345.0, -4_987_654.0
-    moved = replace(HERE, near=(x, y), trees=(replace(tree, positions=tree.positions + [x, y]),))
+    moved = replace(HERE, near=(x, y), trees=(replace(tree, positions=tree.positions + np.array([x, y])),))
     there = model(tmp_path, moved, x=x, y=y, signals=signal)
     np.testing.assert_array_equal(there.origin - here.origin, [x, y, 0])
     assert [each.name for each in here.parts] == [each.name for each in there.parts]

@@ -13,7 +13,8 @@ from seip_addon.scene import collections as names
 
 ROOT = Path(__file__).resolve().parents[2]
 MAP = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="6" name="street"/>
-<road id="1" length="200" junction="-1"><planView><geometry s="0" x="1000" y="2000" hdg="0" length="200"><line/></geometry>
+<road id="1" length="200" junction="-1"><planView>
+<geometry s="0" x="1000" y="2000" hdg="0" length="200"><line/></geometry>
 </planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
 <lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
 <lane id="-2" type="sidewalk" level="false"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>

@@ -115,7 +115,7 @@ def test_a_saved_scene_opens_again_and_leaves_no_other_file(model, tmp_path):
     assert len(bpy.data.collections[names.OCCLUDERS].objects) == 2
 
 
-def test_a_name_that_is_none_of_a_blend_is_refused(model, tmp_path):
+def test_a_name_that_is_none_of_a_blend_is_refused(tmp_path):
     with pytest.raises(SeipError, match=r"let it end in \.blend"):
         save_blend(tmp_path / "site.txt")
 
