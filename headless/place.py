@@ -20,12 +20,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session
 
 import bpy
 import numpy as np
 
-from headless import session
 from seip_addon.core.candidate_table import save_candidate_table
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.carla import save_carla_spawns

@@ -10,11 +10,13 @@ import argparse
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session
 
 import bpy
 
-from headless import session
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.coverage_study import NUMBERS, coverage_study, judge
 from seip_addon.core.lidar import find_models, load_catalogue

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
+import shapely
 
 from ..core.errors import SeipError
 from ..core.progress import Progress
@@ -41,6 +41,8 @@ STEP = 50
 CAMERA_AZIMUTH = math.radians(-125.0)
 CAMERA_ELEVATION = math.radians(48.0)
 LENS = 40.0
+FRAME = 3.0
+"""Margin (metres) around the region in the camera's view."""
 SUN_ELEVATION, SUN_AZIMUTH = math.radians(48.0), math.radians(-60.0)
 SKY = (0.62, 0.70, 0.80, 1.0)
 
@@ -98,6 +100,7 @@ def save_blend(path: Path) -> None:
 
 def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     """Write what the scene contract asks for, and metres, into the scene."""
+    scene[collections.TITLE] = model.name
     scene[collections.ORIGIN] = model.origin.tolist()
     scene[collections.MAP] = map_name
     scene[collections.GEO_REFERENCE] = model.geo_reference or ""
@@ -155,29 +158,22 @@ def _light(scene: bpy.types.Scene) -> None:
 
 
 def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
-    """Add a camera that sees the region from above at a slant, and settings under which it looks good at once."""
-    x_low, y_low, x_high, y_high = model.region.bounds
-    middle = Vector(((x_low + x_high) / 2, (y_low + y_high) / 2, 0.0))
-    radius = math.hypot(x_high - x_low, y_high - y_low) / 2
+    """Add a camera that sees all of the region at a slant, and settings under which it looks good at once."""
+    scene.render.resolution_x, scene.render.resolution_y = 1600, 900
     camera = bpy.data.cameras.new("Overview")
     camera.lens = LENS
     camera.clip_end = 5000.0
     thing = bpy.data.objects.new("Overview", camera)
-    distance = 0.9 * radius / math.tan(camera.angle / 2)
-    direction = Vector(
-        (
-            math.cos(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),
-            math.sin(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),
-            math.sin(CAMERA_ELEVATION),
-        )
-    )
-    thing.location = middle + distance * direction
-    thing.rotation_euler = (-direction).to_track_quat("-Z", "Y").to_euler()
+    thing.rotation_euler = (math.pi / 2 - CAMERA_ELEVATION, 0.0, CAMERA_AZIMUTH + math.pi / 2)
     collections.find_or_make(scene, VIEW).objects.link(thing)
     scene.camera = thing
-    scene.render.resolution_x, scene.render.resolution_y = 1600, 900
+    bpy.context.view_layer.update()
+    outline = shapely.get_coordinates(model.region.convex_hull.buffer(FRAME))
+    corners = np.column_stack([outline, np.zeros(len(outline))])
+    thing.location, _ = thing.camera_fit_coords(bpy.context.evaluated_depsgraph_get(), corners.ravel().tolist())
     scene.view_settings.view_transform = "Standard"
     shading = scene.display.shading
     shading.light, shading.color_type = "STUDIO", "MATERIAL"
     shading.show_shadows = shading.show_cavity = True
-    scene.display.light_direction = (-0.45, -0.40, 0.80)
+    shading.shadow_intensity = 0.35
+    scene.display.light_direction = (-0.45, 0.80, 0.40)  # here y is up

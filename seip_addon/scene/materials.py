@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 PREFIX = "SEIP "
+VIEWPORT_GAMMA = 0.65  # the viewport's studio light is dimmer than the sun
 
 COLOURS = {
     "asphalt": (0.085, 0.087, 0.090),
@@ -45,7 +46,7 @@ def material(name: str) -> bpy.types.Material:
         return existing
     made = bpy.data.materials.new(PREFIX + name)
     colour = (*COLOURS[name], 1.0)
-    made.diffuse_color = colour
+    made.diffuse_color = tuple(value**VIEWPORT_GAMMA for value in colour)
     made.roughness = ROUGHNESS.get(name, 0.9)
     made.use_nodes = True
     surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

@@ -35,7 +35,8 @@ class PlacedSignal:
     position : (3,) float64, metres
         In map coordinates.
     yaw : float, radians
-        Direction of the traffic that it is meant for, counter-clockwise from +x.
+        By the standard the direction of the traffic that it is meant for,
+        counter-clockwise from +x; some exporters give the one it faces.
     height, width : float, metres
         Zero where the file says nothing.
     s, t, z_offset : float, metres
