@@ -34,8 +34,8 @@ COLLECTIONS = {
     Role.MANDATORY_AREAS: collections.MANDATORY_AREAS,
     Role.DRESSING: DRESSING,
 }
-OUTLINES = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDATORY_AREAS}
-"""Roles whose parts mean their outline alone: drawn as wire and not rendered."""
+VEILS = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDATORY_AREAS, Role.CANDIDATE_AREAS}
+"""Parts that have no other roles mean an area: the viewport shows them, a render does not."""
 
 STEP = 50
 CAMERA_AZIMUTH = math.radians(-125.0)
@@ -80,6 +80,7 @@ def build_scene(model: SiteModel, map_name: str) -> Generator[Progress, None, bp
     yield Progress(len(model.parts), len(model.parts), "objects")
     _light(scene)
     _frame(scene, model)
+    _set_up_views()
     return scene
 
 
@@ -120,9 +121,7 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     thing.rotation_euler = (0.0, 0.0, part.yaw)
     if part.weight is not None:
         thing[collections.WEIGHT] = part.weight
-    if OUTLINES.intersection(part.roles) or part.roles == (Role.CANDIDATE_AREAS,):
-        thing.display_type = "WIRE"
-        thing.hide_render = True
+    thing.hide_render = VEILS.issuperset(part.roles)
     for role in part.roles:
         collections.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)
 
@@ -177,3 +176,12 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     shading.show_shadows = shading.show_cavity = True
     shading.shadow_intensity = 0.35
     scene.display.light_direction = (-0.45, 0.80, 0.40)  # here y is up
+
+
+def _set_up_views() -> None:
+    """Let every 3D view look through the camera, in the materials' colours and far enough."""
+    views = (area.spaces.active for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    for view in views:
+        view.clip_end = 5000.0
+        view.shading.color_type = "MATERIAL"
+        view.region_3d.view_perspective = "CAMERA"

@@ -4,10 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from headless import build_scene
+
 import bpy
 import pytest
 
-from headless import build_scene
 from seip_addon.core.errors import SeipError
 from seip_addon.scene import collections as names
 

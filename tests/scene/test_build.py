@@ -86,11 +86,12 @@ def test_the_scene_knows_where_it_is(model):
     assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
 
 
-def test_outlines_are_wire_and_not_rendered(model):
+def test_areas_that_only_mean_something_are_not_rendered(model):
     finish(build_scene(model, "map.xodr"))
     for name, is_outline in (("Region", True), ("Middle", True), ("Road", False), ("Pavement", False)):
         thing = bpy.data.objects[name]
-        assert (thing.display_type == "WIRE", thing.hide_render) == (is_outline, is_outline)
+        assert thing.hide_render == is_outline
+        assert not thing.hide_viewport
 
 
 def test_the_camera_sees_the_whole_region(model):
