@@ -1,6 +1,6 @@
 """The site description: what a map does not say about a place, read from a small TOML file.
 
-The keys are explained in docs/formats-site.md. Coordinates are map
+The keys are explained in docs/site-description.md. Coordinates are map
 coordinates in metres; headings are degrees in the file and radians here.
 """
 

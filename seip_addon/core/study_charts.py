@@ -142,6 +142,3 @@ def _dress(panel: Axes) -> None:
         panel.spines[side].set_visible(False)
 
 
-def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    with whole_file(path) as temporary:
-        FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
