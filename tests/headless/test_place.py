@@ -9,10 +9,11 @@ import sys
 import time
 from pathlib import Path
 
+from headless import place
+
 import bpy
 import pytest
 
-from headless import place
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement_record import comparable, load_placement_record
 
