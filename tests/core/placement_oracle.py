@@ -58,7 +58,9 @@ def canonical(problem: PlacementProblem) -> list[int]:
 
 def covered(problem: PlacementProblem, choice: tuple[int, ...]) -> float:
     """Return the covered weight."""
-    return sum(w for w, column in zip(problem.weights, problem.visible.T, strict=True) if any(column[i] for i in choice))
+    return sum(
+        w for w, column in zip(problem.weights, problem.visible.T, strict=True) if any(column[i] for i in choice)
+    )
 
 
 def merit(problem: PlacementProblem, choice: tuple[int, ...]) -> tuple[object, ...]:

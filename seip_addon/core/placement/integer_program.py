@@ -116,6 +116,10 @@ class CoverProgram:
             # solvers take a budget with a tolerance of their own: forbid what overruns it in exact arithmetic
             self.require(self.number_among(outcome.chosen) <= len(outcome.chosen) - 1)
 
+    def maximise_coverage(self, solver: str, seconds: float) -> Outcome:
+        """Solve for the largest covered weight within a time limit."""
+        return self.maximise(self.covered, solver, seconds)
+
     def _solve(self, solver: str, seconds: float) -> Outcome:
         with _engine(solver, max(seconds, 0.01)) as engine:
             try:
