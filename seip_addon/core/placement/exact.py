@@ -15,7 +15,7 @@ from .clock import Clock
 from .feasibility import starting_choice
 from .greedy import exchange, greedy, greedy_and_exchange, without_idle
 from .instance import SLACK, Instance, make_instance
-from .integer_program import CoverProgram, check_solver
+from .integer_program import check_solver, reaching
 from .problem import Placement, PlacementProblem, placement
 from .ties import canonical_optimum
 
@@ -164,22 +164,25 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     """
     bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
     chosen = max(chosen, _from_relaxation(instance, bound, chosen), key=instance.covered)
-    keep = can_reach(instance, bound, instance.covered(chosen))
+    keep = can_reach(instance, bound, _better(instance, chosen))
     for factor, share in KERNELS:
         size = factor * max(len(chosen), 1)
-        if bound.value <= instance.covered(chosen) + SLACK or len(keep) <= size or clock.left <= 0:
+        if len(keep) <= size or clock.left <= 0:
             break
         yield Progress(0, 1, f"improving the placement among the {size} best candidates")
         chosen = _within_kernel(instance, bound, size, chosen, solver, share * clock.left)
-        keep = can_reach(instance, bound, instance.covered(chosen))
-    covered = instance.covered(chosen)
-    if bound.value <= covered + SLACK:
-        return Proof(chosen, covered, optimal=True)
-    keep = np.union1d(keep, chosen)
+        keep = can_reach(instance, bound, _better(instance, chosen))
+    if bound.value < _better(instance, chosen) or len(keep) == 0:
+        return Proof(chosen, instance.covered(chosen), optimal=True)
     if clock.left <= 0 or np.count_nonzero(instance.visible[keep]) > LARGEST:
         return Proof(chosen, bound.value, optimal=False)
     yield Progress(0, 1, f"proving with {len(keep)} of {len(instance)} candidates")
     return _decide(instance, keep, bound.value, chosen, solver, clock.left)
+
+
+def _better(instance: Instance, chosen: Integer) -> float:
+    """Return the covered weight that a strictly better placement reaches at least."""
+    return instance.covered(chosen) + instance.step
 
 
 def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Integer:
@@ -192,24 +195,20 @@ def _within_kernel(  # noqa: PLR0913 -- a search has a state, a solver and a lim
     instance: Instance, bound: Bound, size: int, chosen: Integer, solver: str, seconds: float
 ) -> Integer:
     """Return the best placement among the candidates of best scores, at least as good as the one given."""
-    best = np.argsort(-bound.selection.net, kind="stable")[:size]
-    keep = np.union1d(best, chosen)
-    outcome = CoverProgram(instance.part(keep)).maximise_coverage(solver, seconds)
-    if outcome.chosen is None or instance.covered(keep[outcome.chosen]) <= instance.covered(chosen):
-        return chosen
-    return exchange(instance, keep[outcome.chosen])
+    keep = np.sort(np.argsort(-bound.selection.net, kind="stable")[:size])
+    outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    return chosen if outcome.chosen is None else exchange(instance, keep[outcome.chosen])
 
 
 def _decide(  # noqa: PLR0913 -- a search has a state, a solver and a limit
     instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float
 ) -> Proof:
-    """Solve the integer program over the candidates that some optimum may contain."""
-    outcome = CoverProgram(instance.part(keep)).maximise_coverage(solver, seconds)
-    if outcome.chosen is not None and instance.covered(keep[outcome.chosen]) > instance.covered(chosen):
-        chosen = keep[outcome.chosen]
+    """Look for a better placement among the candidates that one may contain; that there is none is the proof."""
+    outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    chosen = chosen if outcome.chosen is None else keep[outcome.chosen]
     value = instance.covered(chosen)
     bound = value if outcome.finished else max(value, min(bound, outcome.bound))
-    return Proof(chosen, bound, optimal=bound <= value + SLACK)
+    return Proof(chosen, bound, optimal=bound < _better(instance, chosen))
 
 
 def _surplus(asked: int, used: int) -> str:

@@ -83,6 +83,13 @@ class Instance:
         numbered: Integer = np.unique(clique, return_inverse=True)[1]
         return numbered
 
+    @cached_property
+    def step(self) -> float:
+        """Half the smallest difference between covered weights: unit weights allow no value between two counts."""
+        times = self.weight / self.weight.min()
+        whole = bool(np.abs(times - np.rint(times)).max() < 1e-6)  # noqa: PLR2004 -- rounding of summed weights
+        return max(2 * SLACK, float(self.weight.min()) / 2 if whole else 0.0)
+
     def covered(self, chosen: Integer) -> float:
         """Return the scaled weight that the chosen candidates cover."""
         return math.fsum(self.weight[self.visible[chosen].any(axis=0)])

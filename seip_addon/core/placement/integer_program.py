@@ -155,6 +155,13 @@ class CoverProgram:
             self.model += self.number_among(clique) <= 1
 
 
+def reaching(instance: Instance, goal: float) -> CoverProgram:
+    """Return the program of an instance whose placements cover at least ``goal``."""
+    program = CoverProgram(instance)
+    program.require(program.covered >= goal)
+    return program
+
+
 def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
     """Cover all conflicts by cliques, of each of which one candidate at most can be chosen.
 

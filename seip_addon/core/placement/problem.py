@@ -132,7 +132,8 @@ class PlacementProblem:
         cheapest = float(self.prices[self.allowed].min())
         if self.budget is not None and not self.budget >= cheapest:
             raise SeipError(
-                f"the budget of {self.budget:g} is below the cheapest sensor, which costs {cheapest:g}; raise the budget"
+                f"the budget of {self.budget:g} is below the cheapest sensor, which costs {cheapest:g}; "
+                "raise the budget"
             )
 
 

@@ -17,7 +17,7 @@ from .exact import prove, solve
 from .feasibility import starting_choice
 from .greedy import greedy, greedy_and_exchange, without_idle
 from .instance import SLACK, Instance, make_instance
-from .integer_program import CoverProgram, check_solver
+from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, placement
 from .ties import fewest
 
@@ -111,8 +111,7 @@ def _cheapest(
     if bound.value < goal - SLACK or len(keep) == 0:
         return chosen, price
     yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = CoverProgram(cheaper.part(keep))
-    program.require(program.covered >= goal - SLACK)
+    program = reaching(cheaper.part(keep), goal - SLACK)
     outcome = program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])

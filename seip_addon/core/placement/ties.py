@@ -20,7 +20,7 @@ from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .greedy import without_idle
 from .instance import SLACK, Instance
-from .integer_program import CoverProgram
+from .integer_program import reaching
 from .problem import TIE
 
 MANY = 12
@@ -82,17 +82,11 @@ def fewest(
         if bound.value < goal - SLACK or len(keep) == 0:
             break
         yield Progress(0, 1, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
-        outcome = _reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
+        outcome = reaching(fewer.part(keep), goal - SLACK).maximise_coverage(solver, clock.left)
         if outcome.chosen is None:
             return chosen, outcome.finished
         chosen = without_idle(fewer, keep[outcome.chosen], goal)
     return chosen, True
-
-
-def _reaching(part: Instance, goal: float) -> CoverProgram:
-    program = CoverProgram(part)
-    program.require(program.covered >= goal - SLACK)
-    return program
 
 
 def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock: Clock) -> tuple[list[Integer], bool]:
@@ -101,7 +95,7 @@ def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock:
     Each is found by maximising coverage once more with those before forbidden:
     that prunes far better than any other objective under a coverage to reach.
     """
-    program = _reaching(part, goal)
+    program = reaching(part, goal - SLACK)
     found = [chosen]
     while len(found) < MANY:
         program.require(program.number_among(found[-1]) <= len(chosen) - 1)
@@ -123,7 +117,7 @@ class _Stages:
     """One program, solved for one objective after another; a stage that runs out of time ends them all."""
 
     def __init__(self, part: Instance, goal: float, chosen: Integer, solver: str, clock: Clock) -> None:
-        self.program = _reaching(part, goal)
+        self.program = reaching(part, goal - SLACK)
         self.chosen = chosen
         self.settled = True
         self._solver = solver
