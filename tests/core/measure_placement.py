@@ -25,8 +25,8 @@ SIZES = (
 def main(seconds: float) -> None:
     """Solve each size with each number of sensors and print a line for it."""
     write = sys.stdout.write
-    print(
-        f"{'poses':>6}{'targets':>8}{'N':>4}{'greedy':>9}{'found':>9}{'bound':>11}{'gap':>8}{'s':>7}{'MB':>6}  status"
+    write(
+        f"{'poses':>6}{'targets':>8}{'N':>4}{'greedy':>9}{'found':>9}{'bound':>11}{'gap':>8}{'s':>7}{'MB':>6}  status\n"
     )
     for positions, targets, blocks, counts in SIZES:
         for count in counts:

@@ -111,7 +111,7 @@ def _cheapest(
     if bound.value < goal - SLACK or len(keep) == 0:
         return chosen, price
     yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = reaching(cheaper.part(keep), goal - SLACK)
+    program = reaching(cheaper.part(keep), goal)
     outcome = program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
