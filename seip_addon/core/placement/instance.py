@@ -98,6 +98,10 @@ class Instance:
         """How far a coverage to reach is lowered for a solver, which may miss each target by its tolerance."""
         return max(self.step / 2, SOLVER_SLACK)
 
+    def attainable(self, goal: float) -> float:
+        """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
+        return math.ceil((goal - SLACK) / self.step) * self.step if self.step > 2 * SLACK else goal
+
     def covered(self, chosen: Integer) -> float:
         """Return the scaled weight that the chosen candidates cover."""
         return math.fsum(self.weight[self.visible[chosen].any(axis=0)])
