@@ -124,7 +124,7 @@ def test_a_short_time_limit_on_the_reverse_problem() -> None:
     placement = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=0.01))
     assert placement.covered >= 800
     best = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=10.0))
-    assert best.price / 3 <= placement.bound <= best.price <= placement.objective == placement.price
+    assert 6000 <= placement.bound <= best.price <= placement.objective == placement.price
 
 
 def test_solvers_agree_on_a_street() -> None:

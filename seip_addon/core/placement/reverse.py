@@ -104,7 +104,7 @@ def _cheapest(
     if price == 0:
         return chosen, price
     bound = yield from lagrangian_bound(replace(instance, budget=min(price, instance.budget)), goal, clock)
-    least = min(price, least_price(instance, bound, goal))
+    least = min(price, max(least_price(instance, bound, goal), float(instance.price.min())))
     if np.ptp(instance.price) == 0:
         chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
         price = math.fsum(instance.price[chosen])

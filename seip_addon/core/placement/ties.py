@@ -18,7 +18,7 @@ from ..progress import Progress
 from ..site import Integer
 from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
-from .greedy import without_idle
+from .greedy import exchange, without_idle, without_weakest
 from .instance import SLACK, Instance
 from .integer_program import reaching
 
@@ -76,6 +76,10 @@ def fewest(
     """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
     while len(chosen) > 1:
         fewer = replace(instance, count=len(chosen) - 1)
+        exchanged = exchange(fewer, without_weakest(instance, chosen))
+        if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - SLACK:
+            chosen = without_idle(fewer, exchanged, goal)
+            continue
         bound = yield from lagrangian_bound(fewer, goal, clock)
         keep = can_reach(fewer, bound, goal)
         if bound.value < goal - SLACK or len(keep) == 0:
