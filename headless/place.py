@@ -20,7 +20,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session
 
@@ -111,7 +112,9 @@ def main(argv: list[str]) -> None:
         inputs={"visibility": grid.key},
         warnings=warnings,
     )
-    record = placement_record(site, deployment, placement, run, weighted=goal.weighted, greedy=greedy)
+    record = placement_record(
+        site, deployment, placement, run, weighted=goal.weighted, cheapest=goal.coverage is not None, greedy=greedy
+    )
     _write(options, _Outcome(reading.geometry, site, models, grid, placement, deployment), record)
     session.say(_result_lines(deployment, placement, greedy))
     session.say(f"written to {options.output}/")

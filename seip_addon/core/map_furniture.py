@@ -2,33 +2,35 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from . import street_furniture
+from .opendrive import Outline, PlacedObject, PlacedSignal
 from .site_parts import Part, Role
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from shapely.geometry.base import BaseGeometry
-
-    from .opendrive import Outline, PlacedObject, PlacedSignal
-    from .terrain import Terrain
+from .street_furniture import Solid
+from .terrain import Terrain
 
 Float = NDArray[np.float64]
 
-FLAT_KINDS = {"crosswalk", "parkingspace", "roadmark", "roadsurface", "patch", "soundbarrierflat"}
+FLAT_KINDS = {"crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
 PLANT_KINDS = {"tree", "vegetation"}
 POST_KINDS = {"pole", "streetlamp"}
 LEAST_HEIGHT = 0.2
 """Outlines lower than this (metres) hide nothing that matters."""
 POLE_HEIGHT = 3.0
 """Posts from this height up can carry a sensor."""
+
+TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
+LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
+POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
+"""Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
 
 SIGNAL_POLE_HEIGHT = 6.0
 MAST_ARM = 4.5
@@ -57,7 +59,7 @@ def building_parts(name: str, base: Float, height: Float, number: int) -> tuple[
     """Return a block (k, 3) raised by (k,) metres, and its windows where it is a house with level eaves."""
     walls = street_furniture.block(base, height, side=FACADES[number % len(FACADES)], cap="roof")
     block = Part(name, walls, (Role.OCCLUDERS,))
-    level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1  # metres
+    level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1
     if not level or height[0] < street_furniture.STOREY:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
@@ -76,11 +78,9 @@ def object_parts(objects: Iterable[PlacedObject], origin: Float, carriageway: Ba
     carriageway : shapely geometry
         In local axes, for the arms of street lights.
     """
-    parts: list[Part] = []
-    for number, placed in enumerate(objects):
-        name = placed.name or f"{placed.kind} {placed.id}"
-        parts += _object(placed, name, number, origin, carriageway)
-    return tuple(parts)
+    return tuple(
+        part for number, placed in enumerate(objects) for part in _object(_local(placed, origin), number, carriageway)
+    )
 
 
 def signal_parts(
@@ -98,23 +98,25 @@ def signal_parts(
             continue
         foot, heading, arm = _pole_for(signal.position[:2] - origin[:2], signal.yaw, carriageway)
         if all(np.hypot(*(foot - other[0])) > SAME_POLE for other in poles):
-            faces_left = math.sin(signal.yaw - heading) >= 0
+            faces_left = math.sin(signal.yaw + math.pi - heading) >= 0  # the lamps look against the traffic
             poles.append((foot, heading, arm, faces_left))
     return tuple(
-        signal_part(f"Signal pole {number}", _on(foot, terrain), heading, SIGNAL_POLE_HEIGHT, arm, faces_left=left)
-        for number, (foot, heading, arm, left) in enumerate(poles, start=1)
+        pole_part(
+            f"Signal pole {number}",
+            street_furniture.signal_pole(SIGNAL_POLE_HEIGHT, arm, faces_left=faces_left),
+            _on(foot, terrain),
+            heading,
+        )
+        for number, (foot, heading, arm, faces_left) in enumerate(poles, start=1)
     )
 
 
-def signal_part(  # a pole has these properties
-    name: str, foot: Float, heading: float, height: float, arm: float, *, faces_left: bool = True
-) -> Part:
-    """Return a signal pole."""
-    shape = street_furniture.signal_pole(height, arm, faces_left=faces_left)
+def pole_part(name: str, shape: Solid, foot: Float, heading: float) -> Part:
+    """Return a post that can carry a sensor, its arm turned to a heading."""
     return Part(name, shape, (Role.POLES,), _xyz(foot), heading)
 
 
-def _pole_for(xy: Float, facing: float, carriageway: BaseGeometry) -> tuple[Float, float, float]:
+def _pole_for(xy: Float, travel: float, carriageway: BaseGeometry) -> tuple[Float, float, float]:
     """Return foot, heading and length of the arm of the pole of a signal."""
     point = shapely.Point(xy)
     if carriageway.contains(point):
@@ -124,61 +126,60 @@ def _pole_for(xy: Float, facing: float, carriageway: BaseGeometry) -> tuple[Floa
         foot = edge + KERB_CLEARANCE * outwards
         return foot, math.atan2(*-outwards[::-1]), round(max(reach + KERB_CLEARANCE, 1.0), 1)
     towards = arm_heading(xy, carriageway)
-    across = facing + math.pi / 2  # the arm is square to the direction that the lamps face
+    across = travel + math.pi / 2  # the arm is square to the traffic
     heading = across if math.cos(across - towards) >= 0 else across + math.pi
     return xy, heading, MAST_ARM
 
 
-def _object(  # noqa: PLR0911  # one return for each kind of object
-    placed: PlacedObject, name: str, number: int, origin: Float, carriageway: BaseGeometry
-) -> tuple[Part, ...]:
-    kind, called = placed.kind.lower(), name.lower()
-    foot = placed.position - origin
-    if kind in FLAT_KINDS:
+def _local(placed: PlacedObject, origin: Float) -> PlacedObject:
+    outlines = tuple(dataclasses.replace(outline, base=outline.base - origin) for outline in placed.outlines)
+    return dataclasses.replace(placed, position=placed.position - origin, outlines=outlines)
+
+
+def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tuple[Part, ...]:
+    """Return the parts of one object in local axes; ``number`` varies the looks of equal ones."""
+    name = placed.name or f"{placed.kind} {placed.id}"
+    size = max(placed.length, placed.width, 2 * placed.radius)
+    if placed.kind in FLAT_KINDS:
         return ()
     if placed.outlines:
-        pieces = (_outlined(outline, name, number, kind, placed.width, origin) for outline in placed.outlines)
-        return tuple(part for piece in pieces for part in piece)
-    size = max(placed.length, placed.width, 2 * placed.radius)
-    if kind in PLANT_KINDS and size <= max(placed.height, 1.0):
-        height = placed.height or 8.0
-        return (tree_part(name, foot, height, size or 0.6 * height, number),)
-    if kind in POST_KINDS or "lamp" in called or "streetlight" in called:
-        return (
-            _post(name, foot, placed, carriageway, lit=kind == "streetlamp" or "lamp" in called or "light" in called),
-        )
+        return tuple(part for outline in placed.outlines for part in _outlined(placed, outline, name, number))
+    if placed.kind in PLANT_KINDS and size <= max(placed.height, 1.0):
+        height = placed.height or TREE_HEIGHT
+        return (tree_part(name, placed.position, height, size or CROWN_SHARE * height, number),)
+    if placed.kind in POST_KINDS or "lamp" in name.lower():
+        return (_post(name, placed, carriageway),)
     if size == 0 or placed.height < LEAST_HEIGHT:
         return ()
-    base = _footprint(placed) + foot
-    height = np.full(len(base), placed.height)
-    if kind == "building":
-        return building_parts(name, base, height, number)
-    return (Part(name, street_furniture.block(base, height, side=_material(kind)), (Role.OCCLUDERS,)),)
+    base = _footprint(placed) + placed.position
+    return _block(placed, name, number, base, np.full(len(base), placed.height))
 
 
-def _outlined(  # an outline with its object's properties
-    outline: Outline, name: str, number: int, kind: str, width: float, origin: Float
-) -> tuple[Part, ...]:
-    base = outline.base - origin
+def _outlined(placed: PlacedObject, outline: Outline, name: str, number: int) -> tuple[Part, ...]:
     if outline.height.max() < LEAST_HEIGHT:
         return ()
     height = np.maximum(outline.height, 0.0)
-    if not outline.closed or len(base) < 3:  # no area
-        panel = street_furniture.fence(base, height, width or 0.1, side=_material(kind))
-        return (Part(name, panel, (Role.OCCLUDERS,)),)
-    if kind == "building" or "building" in name.lower():
+    if outline.closed and len(outline.base) >= 3:
+        return _block(placed, name, number, outline.base, height)
+    panels = street_furniture.fence(outline.base, height, placed.width or FENCE_WIDTH, side=_material(placed))
+    return (Part(name, panels, (Role.OCCLUDERS,)),)
+
+
+def _block(placed: PlacedObject, name: str, number: int, base: Float, height: Float) -> tuple[Part, ...]:
+    if placed.kind == "building" or "building" in name.lower():
         return building_parts(name, base, height, number)
-    return (Part(name, street_furniture.block(base, height, side=_material(kind)), (Role.OCCLUDERS,)),)
+    return (Part(name, street_furniture.block(base, height, side=_material(placed)), (Role.OCCLUDERS,)),)
 
 
-def _post(name: str, foot: Float, placed: PlacedObject, carriageway: BaseGeometry, *, lit: bool) -> Part:
-    height = round(placed.height or 8.0, 2)
+def _post(name: str, placed: PlacedObject, carriageway: BaseGeometry) -> Part:
+    height = round(placed.height or LIGHT_HEIGHT, 2)
+    lit = placed.kind == "streetlamp" or "lamp" in name.lower() or "light" in name.lower()
     if lit and height >= POLE_HEIGHT:
-        shape = street_furniture.street_light(height, 1.5)
+        shape = street_furniture.street_light(height, LIGHT_ARM)
     else:
-        shape = street_furniture.post(height, placed.radius or 0.06)
+        shape = street_furniture.post(height, placed.radius or POST_RADIUS)
     role = Role.POLES if height >= POLE_HEIGHT else Role.OCCLUDERS
-    return Part(name, shape, (role,), _xyz(foot), arm_heading(foot[:2], carriageway))
+    return Part(name, shape, (role,), _xyz(placed.position), arm_heading(placed.position[:2], carriageway))
 
 
 def _footprint(placed: PlacedObject) -> Float:
@@ -192,8 +193,8 @@ def _footprint(placed: PlacedObject) -> Float:
     return np.column_stack([corners, np.zeros(4)])
 
 
-def _material(kind: str) -> str:
-    return "leaves" if kind in PLANT_KINDS else "wall"
+def _material(placed: PlacedObject) -> str:
+    return "leaves" if placed.kind in PLANT_KINDS else "wall"
 
 
 def _on(xy: Float, terrain: Terrain) -> Float:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from .opendrive import LaneSurface
 from .terrain import Terrain, cut
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from shapely.geometry.base import BaseGeometry
-
-    from .opendrive import LaneSurface
 
 Float = NDArray[np.float64]
 
@@ -36,10 +31,11 @@ GROUPS = {
 }  # fmt: skip
 """Group of each OpenDRIVE lane type (ASAM OpenDRIVE 1.8, table of e_laneType); ``none`` has no surface."""
 
-CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "border", "track")
+CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
 LONGEST_STEP = 10.0
 CORNER_NOTCH = 3.0
 """Notches up to twice this (metres) at the corners of a junction are pavement."""
+JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
@@ -50,7 +46,7 @@ STOP_LINE_SETBACK = 1.0
 GRID = 1e-4
 """Grid (metres) that plans snap to when they are joined."""
 NARROW = 1.0
-"""Lanes narrower than this (metres) are tapers; nothing is painted along them."""
+"""Lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them."""
 SEAM = 0.05
 """Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
 
@@ -108,19 +104,21 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
 def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
     """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
 
-    The lanes that cross each other in a junction are made one layer: where
-    driving lanes overlap the longest one counts, and other groups give way to
-    driving lanes. Between roads, whose lanes meet edge to edge, nothing is cut.
+    Lanes that cross each other in a junction differ in height by some
+    centimetres: there the group is laid anew as one layer at their mean
+    height, and groups other than driving lanes give way to these. Elsewhere
+    lanes meet edge to edge and stay as they are.
     """
     lanes = in_groups(surfaces, [name])
     pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
     for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
         own = [lane for lane in lanes if lane.junction_id == junction]
-        driving = [] if name == "driving" else in_groups(surfaces, ["driving"])
-        covered = _plan([lane for lane in driving if lane.junction_id == junction])
-        for lane in sorted(own, key=lambda lane: -lane.polygon.area):
-            pieces.append(cut(lane.triangles, covered))
-            covered = covered.union(_plan([lane]), grid_size=GRID)
+        area = outline(own)
+        if name != "driving":
+            driving = in_groups(surfaces, ["driving"])
+            area = without_crumbs(area.difference(_plan([lane for lane in driving if lane.junction_id == junction])))
+        terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
+        pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
     return cut(np.concatenate(pieces), beyond)
 
@@ -157,38 +155,36 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
 
 
 def markings(surfaces: Sequence[LaneSurface]) -> Float:
-    """Return (n, 4, 3) quads of lines between and beside the driving lanes outside junctions."""
+    """Return (n, 4, 3) quads of lines between and beside the driving lanes, up to the stop lines of junctions."""
     lanes = {(lane.road_id, lane.section, lane.lane_id): lane for lane in surfaces if lane.junction_id is None}
+    unpainted = _junctions(surfaces).buffer(STOP_LINE_SETBACK + STOP_LINE_WIDTH)
+    shapely.prepare(unpainted)
     quads = [np.empty((0, 4, 3))]
     for (road, section, number), lane in lanes.items():
-        if group(lane) != "driving":
+        if group(lane) != "driving" or _is_taper(lane):
             continue
         away = 1 if number > 0 else -1
         inner = lanes.get((road, section, number - away if number != away else -away))
         outer = lanes.get((road, section, number + away))
         divides = inner is not None and group(inner) == "driving"
         if number != -1 or not divides:  # the middle line is painted once, by lane 1
-            quads.append(_line(inner_edge(lane), lane, dashed=divides and number != away))
+            quads += _line(inner_edge(lane), unpainted, dashed=divides and number != away)
         if outer is not None and group(outer) in ("shoulder", "biking", "parking", "border"):
-            quads.append(_line(outer_edge(lane), lane, dashed=False))
+            quads += _line(outer_edge(lane), unpainted, dashed=False)
     return np.concatenate(quads)
 
 
-def stop_lines(surfaces: Sequence[LaneSurface], *, keep_right: bool = True) -> Float:
-    """Return (n, 4, 3) quads where driving lanes enter a junction."""
-    junctions = [lane.polygon for lane in surfaces if lane.junction_id is not None and group(lane) == "driving"]
-    if not junctions:
-        return np.empty((0, 4, 3))
-    inside = shapely.union_all([shapely.make_valid(polygon) for polygon in junctions]).buffer(0.3)
+def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
+    """Return (n, 4, 3) quads where driving lanes enter a junction; traffic keeps to the right."""
+    inside = _junctions(surfaces).buffer(0.3)
     shapely.prepare(inside)
     quads = [np.empty((0, 4, 3))]
-    for lane in surfaces:
-        if lane.junction_id is None and group(lane) == "driving":
-            forward = (lane.lane_id < 0) == keep_right
-            left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
-            end = (left[-1, :2] + right[-1, :2]) / 2
-            if inside.contains(shapely.Point(end)) and np.hypot(*(left[-1] - right[-1])[:2]) > NARROW:
-                quads.append(_bar(left, right))
+    for lane in in_groups(surfaces, ["driving"]):
+        forward = lane.lane_id < 0
+        left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
+        end = shapely.Point((left[-1, :2] + right[-1, :2]) / 2)
+        if lane.junction_id is None and inside.contains(end) and not _is_taper(lane):
+            quads.append(_bar(left, right))
     return np.concatenate(quads)
 
 
@@ -272,24 +268,32 @@ def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def _line(edge: Float, lane: LaneSurface, *, dashed: bool) -> Float:
-    """Return quads of a painted line along a lane's edge, where the lane is no mere taper."""
-    wide = np.hypot(*(lane.left - lane.right)[:, :2].T) > NARROW
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))])
-    if travelled[-1] <= 0 or not wide.all():
-        return np.empty((0, 4, 3))
-    if not dashed:
-        return _ribbon(edge)
-    begins = np.arange(0.0, max(travelled[-1] - DASH, 0.0) + 1e-9, DASH + GAP)
-    dashes = (np.stack([begins, np.minimum(begins + DASH, travelled[-1])], axis=1)).reshape(-1)
-    ends = np.column_stack([np.interp(dashes, travelled, edge[:, axis]) for axis in range(3)]).reshape(-1, 2, 3)
-    return np.concatenate([np.empty((0, 4, 3)), *map(_ribbon, ends)])
+def _junctions(surfaces: Sequence[LaneSurface]) -> BaseGeometry:
+    return _plan([lane for lane in in_groups(surfaces, ["driving"]) if lane.junction_id is not None])
+
+
+def _is_taper(lane: LaneSurface) -> bool:
+    return bool(np.hypot(*(lane.left - lane.right)[:, :2].T).min() < NARROW)
+
+
+def _line(edge: Float, unpainted: BaseGeometry, *, dashed: bool) -> list[Float]:
+    """Return quads of a painted line along a lane's edge (n, 3) outside an area."""
+    rest = shapely.LineString(edge).difference(unpainted)
+    paths = [shapely.get_coordinates(part, include_z=True) for part in shapely.get_parts(rest)]
+    return [_ribbon(piece) for path in paths for piece in (_dashes(path) if dashed else [path])]
+
+
+def _dashes(path: Float) -> list[Float]:
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    begins = np.arange(0.0, travelled[-1] - DASH, DASH + GAP)
+    ends = np.stack([begins, begins + DASH], axis=1).reshape(-1)
+    return list(np.column_stack([np.interp(ends, travelled, path[:, axis]) for axis in range(3)]).reshape(-1, 2, 3))
 
 
 def _ribbon(path: Float) -> Float:
     """Return quads of marking width along a path (n, 3)."""
-    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]  # metres
-    if len(path) < 2:  # two ends
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-6])]
+    if len(path) < 2:
         return np.empty((0, 4, 3))
     along = np.gradient(path[:, :2], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -302,7 +306,8 @@ def _bar(left: Float, right: Float) -> Float:
     """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
     near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
     corners = [_before_end(right, far), _before_end(right, near), _before_end(left, near), _before_end(left, far)]
-    return np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
+    bar: Float = np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
+    return bar
 
 
 def _before_end(path: Float, distance: float) -> Float:

@@ -1,6 +1,6 @@
 """The site description: what a map does not say about a place, read from a small TOML file.
 
-The keys are explained in docs/formats-site.md. Coordinates are map
+The keys are explained in docs/site-description.md. Coordinates are map
 coordinates in metres; headings are degrees in the file and radians here.
 """
 
@@ -9,8 +9,10 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +20,6 @@ from shapely import MultiPolygon, Polygon
 from shapely.validation import explain_validity
 
 from .errors import SeipError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 Float = NDArray[np.float64]
 
@@ -277,7 +275,7 @@ class _Table:
 
     def line(self, key: str) -> Float:
         value = self._take(key)
-        if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):  # ends
+        if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):
             raise self._wrong(key, "a list of at least two points [[x, y], [x, y]]")
         return np.array(value, dtype=np.float64)
 
@@ -309,7 +307,8 @@ class _Table:
         length = float(np.hypot(*(ends[1] - ends[0])))
         gaps = int(length / spacing + 1e-9)
         along = np.arange(gaps + 1) * (spacing / length if length > 0 else 0.0)
-        return ends[0] + along[:, None] * (ends[1] - ends[0])
+        row: Float = ends[0] + along[:, None] * (ends[1] - ends[0])
+        return row
 
     def rows(self, key: str) -> Iterator[_Table]:
         value = self._take(key)
@@ -328,7 +327,7 @@ class _Table:
                 raise SeipError(f"{self.where}: unknown key {key!r}; did you mean {' or '.join(close)}?")
 
     def _ring(self, key: str, value: Any) -> Polygon:  # noqa: ANN401  # as _take
-        if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):  # triangle
+        if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):
             raise self._wrong(key, "a list of at least three points [[x, y], [x, y], [x, y]]")
         polygon = Polygon(value)
         if not polygon.is_valid or polygon.area == 0.0:
@@ -342,4 +341,4 @@ def _is_number(value: object) -> bool:
 
 
 def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))  # x and y
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))

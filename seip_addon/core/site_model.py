@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from . import road_surface, street_furniture
 from .errors import SeipError
-from .map_furniture import arm_heading, building_parts, object_parts, signal_part, signal_parts, tree_part
-from .opendrive import find_junction, junction_area, lane_surfaces, nearest_junctions, placed_objects, placed_signals
-from .site_description import DEFAULT_WEIGHT
+from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
+from .opendrive import (
+    LaneSurface,
+    RoadMap,
+    find_junction,
+    junction_area,
+    lane_surfaces,
+    nearest_junctions,
+    placed_objects,
+    placed_signals,
+)
+from .site_description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
 from .site_parts import Part, Role
 from .terrain import Terrain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from shapely.geometry.base import BaseGeometry
-
-    from .opendrive import LaneSurface, RoadMap
-    from .site_description import Poles, SiteDescription, WeightedRegion
 
 Float = NDArray[np.float64]
 
@@ -34,17 +36,26 @@ CANDIDATE_MARGIN = 15.0
 VERGE_STRIP = (0.8, 2.3)
 """Where new posts may stand beside a road without pavements: metres from the carriageway."""
 VERGE_BELOW = 0.03
+GARDEN = 5.0
+"""How far the ground goes on around what stands outside the extent (metres)."""
 VERGE_SPACING = 12.0
-REGION_ABOVE = 0.05
-REGION_SPACING = 10.0
+VEIL_SPACING = 10.0
+VEILS = {
+    Role.REGION: (0.05, "region veil"),
+    Role.WEIGHTED_REGIONS: (0.08, "weighted veil"),
+    Role.FORBIDDEN_AREAS: (0.11, "forbidden veil"),
+    Role.MANDATORY_AREAS: (0.14, "mandatory veil"),
+    Role.CANDIDATE_AREAS: (0.05, "candidate veil"),
+}
+"""Height above the ground (metres) and material of areas that are not there to be seen."""
 
 SURFACES = {
     "driving": ("Driving lanes", "asphalt", Role.ROADS),
     "shoulder": ("Shoulders", "asphalt shoulder", Role.ROADS),
     "parking": ("Parking lanes", "asphalt parking", Role.ROADS),
     "biking": ("Cycle lanes", "asphalt cycle", Role.ROADS),
-    "border": ("Borders", "asphalt shoulder", Role.ROADS),
     "track": ("Tracks", "asphalt shoulder", Role.ROADS),
+    "border": ("Borders", "verge", Role.GROUND),
     "median": ("Medians", "median", Role.GROUND),
 }
 """Name, material and role of the surface of each group of lanes but the pavements."""
@@ -83,6 +94,7 @@ class SiteModel:
 class _Street:
     """What everything else of a site stands on and leans against, in local axes."""
 
+    origin: Float
     lanes: tuple[LaneSurface, ...]
     region: BaseGeometry
     extent: BaseGeometry
@@ -109,24 +121,21 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
     region = _region(road_map, surfaces, description, centre)
     origin = _origin(surfaces, centre)
     street = _street(surfaces, origin, _shifted(region, -origin))
-    signals = placed_signals(road_map, area=_shifted(street.extent, origin))
-    objects = placed_objects(road_map, area=_shifted(street.extent, origin))
-    furniture = [
-        *object_parts(objects, origin, street.carriageway),
-        *signal_parts(signals, origin, street.carriageway, street.terrain),
-        *_described_parts(description, origin, street),
-    ]
+    around = _shifted(street.extent, origin)
+    objects = object_parts(placed_objects(road_map, area=around), origin, street.carriageway)
+    signals = signal_parts(placed_signals(road_map, area=around), origin, street.carriageway, street.terrain)
+    furniture = [*objects, *signals, *_described_parts(description, street)]
     pavement, notes = _pavement_parts(street)
-    has_signals = any(Role.POLES in part.roles and part.name.startswith("Signal") for part in furniture)
+    weighted = _weighted_areas(road_map, surfaces, description, centre)
     parts = [
         *_surface_parts(street),
         *pavement,
-        _verge_part(street),
-        _marking_part(street, stop_lines=has_signals),
+        _verge_part(street, furniture),
+        _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
         _region_part(street),
-        *_weighted_parts(road_map, surfaces, description, centre, origin, street),
-        *_area_parts(description, origin, street),
+        *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
+        *_area_parts(description, street),
     ]
     return SiteModel(
         name=description.name or road_map.name,
@@ -179,7 +188,8 @@ def _region(
 def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) -> str:
     """Return the junctions next to a place, as the end of a sentence."""
     names = []
-    for junction, _ in nearest_junctions(road_map, surfaces, *centre, 3):
+    x, y = centre.tolist()
+    for junction, _ in nearest_junctions(road_map, surfaces, x, y, 3):
         middle = junction_area(surfaces, junction.id).centroid
         names.append(f"{junction.id} at ({middle.x:.0f}, {middle.y:.0f})")
     if names:
@@ -201,7 +211,7 @@ def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry
     triangles = np.concatenate([lane.triangles for lane in lanes])
     carriageway = road_surface.outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
     shapely.prepare(carriageway)
-    return _Street(lanes, region, extent, carriageway, Terrain(triangles))
+    return _Street(origin, lanes, region, extent, carriageway, Terrain(triangles))
 
 
 def _surface_parts(street: _Street) -> list[Part]:
@@ -242,14 +252,16 @@ def _verge_strip(street: _Street) -> Part:
     inner, outer = VERGE_STRIP
     strip = street.carriageway.buffer(outer).difference(street.carriageway.buffer(inner))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
-    triangles = street.terrain.drape(near, spacing=REGION_SPACING)
-    return Part("Verge strip", _solid(triangles, "verge"), (Role.CANDIDATE_AREAS,))
+    return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(street: _Street) -> Part:
-    """Return the ground beside all lanes, a little below their edges and under their seams."""
-    covered = road_surface.outline(street.lanes).buffer(-road_surface.SEAM, join_style="mitre")
-    beside = road_surface.without_crumbs(street.extent.difference(covered))
+def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
+    """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
+    corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
+    built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
+    ground = street.extent if built_up.is_empty else street.extent.union(built_up.buffer(GARDEN)).convex_hull
+    covered = road_surface.outline(street.lanes).intersection(street.extent)
+    beside = road_surface.without_crumbs(ground.difference(covered.buffer(-road_surface.SEAM, join_style="mitre")))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
@@ -263,31 +275,34 @@ def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
 
 
 def _region_part(street: _Street) -> Part:
-    return Part("Region of interest", _draped(street.region, street), (Role.REGION,))
+    return _area_part("Region of interest", street.region, Role.REGION, street)
 
 
-def _weighted_parts(  # the map, the place and its axes
-    road_map: RoadMap,
-    surfaces: Sequence[LaneSurface],
-    description: SiteDescription,
-    centre: Float,
-    origin: Float,
-    street: _Street,
-) -> Iterable[Part]:
-    """Yield the weighted regions; where none is described, the box of the junction next to the middle."""
-    if not description.weighted_regions:
-        nearest = nearest_junctions(road_map, surfaces, *centre, 1)
-        boxes = [(f"Junction {found.id}", _central_box(surfaces, found.id), DEFAULT_WEIGHT) for found, _ in nearest]
-    else:
-        boxes = [
+def _weighted_areas(
+    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
+) -> list[tuple[str, BaseGeometry, float]]:
+    """Return name, area and weight of the weighted regions, map coordinates.
+
+    Where none is described it is the box of the junction nearest to the middle.
+    """
+    if description.weighted_regions:
+        return [
             (weighted.name, _weighted_area(road_map, surfaces, weighted), weighted.weight)
             for weighted in description.weighted_regions
         ]
-    for name, area, weight in boxes:
-        local = _shifted(area, -origin)
+    x, y = centre.tolist()
+    nearest = nearest_junctions(road_map, surfaces, x, y, 1)
+    return [(f"Junction {found.id}", _central_box(surfaces, found.id), DEFAULT_WEIGHT) for found, _ in nearest]
+
+
+def _weighted_parts(
+    areas: Sequence[tuple[str, BaseGeometry, float]], street: _Street, *, described: bool
+) -> Iterator[Part]:
+    for name, area, weight in areas:
+        local = _shifted(area, -street.origin)
         if local.intersects(street.region):
-            yield Part(name, _draped(local, street), (Role.WEIGHTED_REGIONS,), weight=weight)
-        elif description.weighted_regions:
+            yield _area_part(name, local, Role.WEIGHTED_REGIONS, street, weight=weight)
+        elif described:
             raise SeipError(
                 f"the weighted region {name!r} lies outside the region of interest; move it or widen the region"
             )
@@ -310,62 +325,65 @@ def _junction_driving_area(surfaces: Sequence[LaneSurface], junction_id: str) ->
     return junction_area(surfaces, junction_id) if area.is_empty else area
 
 
-def _area_parts(description: SiteDescription, origin: Float, street: _Street) -> list[Part]:
+def _area_parts(description: SiteDescription, street: _Street) -> list[Part]:
     kinds = (
         (description.forbidden_areas, Role.FORBIDDEN_AREAS),
         (description.mandatory_areas, Role.MANDATORY_AREAS),
     )
     return [
-        Part(area.name, _draped(_shifted(area.polygon, -origin), street), (role,))
+        _area_part(area.name, _shifted(area.polygon, -street.origin), role, street)
         for areas, role in kinds
         for area in areas
     ]
 
 
-def _described_parts(description: SiteDescription, origin: Float, street: _Street) -> list[Part]:
+def _described_parts(description: SiteDescription, street: _Street) -> list[Part]:
     """Return what the site description adds, standing on the ground."""
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
-        plan = shapely.get_coordinates(building.outline)[:-1] - origin[:2]
+        plan = shapely.get_coordinates(building.outline)[:-1] - street.origin[:2]
         base = np.full(len(plan), street.terrain.height(plan).min() + building.base)
         height = np.full(len(plan), building.height)
         parts += building_parts(f"Building {number}", np.column_stack([plan, base]), height, number)
     for number, wall in enumerate(description.walls, start=1):
-        foot = _on_ground(wall.line, origin, street)
+        foot = _on_ground(wall.line, street)
         panels = street_furniture.fence(foot, np.full(len(foot), wall.height), wall.thickness, side="wall")
         parts.append(Part(f"Wall {number}", panels, (Role.OCCLUDERS,)))
-    trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, origin, street)]
+    trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, street)]
     parts += [
         tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number)
         for number, (foot, row) in enumerate(trees, start=1)
     ]
-    parts += _poles("Street light", description.street_lights, origin, street)
-    parts += _poles("Signal pole", description.signal_poles, origin, street)
+    parts += _pole_parts(description, street)
     return parts
 
 
-def _poles(name: str, rows: Sequence[Poles], origin: Float, street: _Street) -> list[Part]:
-    parts = []
-    feet = [(foot, row) for row in rows for foot in _on_ground(row.positions, origin, street)]
-    for number, (foot, row) in enumerate(feet, start=1):
-        heading = arm_heading(foot[:2], street.carriageway) if row.heading is None else row.heading
-        called = f"{name} {number} of the site file" if name == "Signal pole" else f"{name} {number}"
-        if name == "Signal pole":
-            parts.append(signal_part(called, foot, heading, row.height, row.arm))
-        else:
-            shape = street_furniture.street_light(row.height, row.arm)
-            x, y, z = foot.tolist()
-            parts.append(Part(called, shape, (Role.POLES,), (x, y, z), heading))
-    return parts
+def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]:
+    for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
+        shape = street_furniture.street_light(row.height, row.arm)
+        yield pole_part(f"Street light {number}", shape, foot, heading)
+    for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
+        shape = street_furniture.signal_pole(row.height, row.arm)
+        yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading)
 
 
-def _on_ground(plan: Float, origin: Float, street: _Street) -> Float:
-    local = plan - origin[:2]
+def _pole_places(rows: Sequence[Poles], street: _Street) -> Iterator[tuple[Float, float, Poles]]:
+    """Yield foot, heading of the arm and row of each post."""
+    for row in rows:
+        for foot in _on_ground(row.positions, street):
+            yield foot, arm_heading(foot[:2], street.carriageway) if row.heading is None else row.heading, row
+
+
+def _on_ground(plan: Float, street: _Street) -> Float:
+    local = plan - street.origin[:2]
     return np.column_stack([local, street.terrain.height(local)])
 
 
-def _draped(area: BaseGeometry, street: _Street) -> street_furniture.Solid:
-    return _solid(street.terrain.drape(area, spacing=REGION_SPACING, above=REGION_ABOVE), "outline")
+def _area_part(name: str, area: BaseGeometry, role: Role, street: _Street, *, weight: float | None = None) -> Part:
+    """Return an area in plan as a veil over the ground."""
+    above, material = VEILS[role]
+    triangles = street.terrain.drape(area, spacing=VEIL_SPACING, above=above)
+    return Part(name, _solid(triangles, material), (role,), weight=weight)
 
 
 def _solid(faces: Float, material: str) -> street_furniture.Solid:

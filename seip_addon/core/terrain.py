@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+from shapely.geometry.base import BaseGeometry
 
 Float = NDArray[np.float64]
 
 LEAST_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""
+GRID = 1e-6
+"""Grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated."""
 
 
 class Terrain:
@@ -41,21 +39,25 @@ class Terrain:
         Returns
         -------
         (n,) float64, metres
-            Beside all triangles: the height at the nearest point of one.
+            The mean of the triangles there; beside all, the height at the nearest point of one.
         """
         points = shapely.points(xy)
         nearest = self._tree.nearest(points)
         on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
-        return plane_height(self._triangles[nearest], on_triangle)
+        height = plane_height(self._triangles[nearest], on_triangle)
+        point, triangle = self._tree.query(points, predicate="intersects")
+        found = np.bincount(point, minlength=len(xy))
+        total = np.bincount(point, plane_height(self._triangles[triangle], xy[point]), minlength=len(xy))
+        return np.where(found > 0, total / np.maximum(found, 1), height)
 
     def drape(self, area: BaseGeometry, *, spacing: float, above: float = 0.0) -> Float:
-        """Return an area in plan as triangles that lie on the terrain at their corners.
+        """Return an area in plan as triangles that lie on the terrain at their corners, without cracks.
 
         Parameters
         ----------
         area : shapely geometry
         spacing : float, metres
-            Longest edge along the area's outline.
+            Side of the square grid along which the area is divided.
         above : float, metres
             Height over the terrain.
 
@@ -64,21 +66,38 @@ class Terrain:
         (n, 3, 3) float64, metres
             Normals up.
         """
-        plan = triangulate(shapely.segmentize(area, spacing))
+        plan = triangulate(_cells(area, spacing))
         corners = plan.reshape(-1, 2)
         if len(corners) == 0:
             return np.empty((0, 3, 3))
-        return np.column_stack([corners, self.height(corners) + above]).reshape(-1, 3, 3)
+        return _raised(corners, self.height(corners) + above)
 
 
-def triangulate(area: BaseGeometry) -> Float:
-    """Return (n, 3, 2) counter-clockwise triangles that fill an area in plan, with no corners of their own."""
+def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
+    """Return the polygons that a square grid through the origin divides an area into."""
+    if area.is_empty:
+        return np.array([], dtype=object)
+    low = np.floor(np.array(area.bounds[:2]) / spacing)
+    count = np.ceil(np.array(area.bounds[2:]) / spacing) - low
+    column, row = np.meshgrid(low[0] + np.arange(count[0]), low[1] + np.arange(count[1]), indexing="ij")
+    x, y = column.ravel() * spacing, row.ravel() * spacing
+    shapely.prepare(area)
+    squares = shapely.box(x, y, x + spacing, y + spacing)
+    met = squares[shapely.intersects(area, squares)]
+    parts = shapely.get_parts(shapely.intersection(met, area, grid_size=GRID))
+    kept: NDArray[np.object_] = parts[shapely.area(parts) > LEAST_AREA]
+    return kept
+
+
+def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
+    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, with no corners of their own."""
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
     edges = corners[:, 1:] - corners[:, :1]
     turn = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     corners[turn < 0] = corners[turn < 0, ::-1]
-    return corners[np.abs(turn) > 2 * LEAST_AREA]
+    kept: Float = corners[np.abs(turn) > 2 * LEAST_AREA]
+    return kept
 
 
 def cut(triangles: Float, away: BaseGeometry) -> Float:
@@ -88,14 +107,14 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
     plan = shapely.polygons(triangles[:, :, :2])
     shapely.prepare(away)
     touched = shapely.intersects(away, plan)
-    rests = shapely.difference(plan[touched], away)
+    rests = shapely.difference(plan[touched], away, grid_size=GRID)
     pieces = [triangles[~touched]]
     for triangle, rest in zip(triangles[touched], rests, strict=True):
         if rest.area > LEAST_AREA:
             corners = triangulate(rest)
             flat = corners.reshape(-1, 2)
             height = plane_height(np.broadcast_to(triangle, (len(flat), 3, 3)), flat)
-            pieces.append(np.column_stack([flat, height]).reshape(-1, 3, 3))
+            pieces.append(_raised(flat, height))
     return np.concatenate(pieces)
 
 
@@ -103,9 +122,16 @@ def plane_height(triangles: Float, xy: Float) -> Float:
     """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     offset = xy - triangles[:, 0, :2]
-    return triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
+    height: Float = triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
+    return height
 
 
 def _plan_area(triangles: Float) -> Float:
     edges = triangles[:, 1:, :2] - triangles[:, :1, :2]
-    return np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
+    area: Float = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
+    return area
+
+
+def _raised(corners: Float, height: Float) -> Float:
+    """Return (n, 3, 3) triangles of their corners in plan (3 n, 2) and heights (3 n,)."""
+    return np.column_stack([corners, height]).reshape(-1, 3, 3)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
 
-LIFT = 0.03  # metres above the road, against flicker
+LIFT = 0.08  # metres above the road, against flicker in a viewport that shows the whole site
 BODY_RADIUS, BODY_HEIGHT = 0.12, 0.22  # metres; somewhat larger than life
 POST_RADIUS, BRACKET_RADIUS = 0.06, 0.03  # metres
 SIDES = 16

@@ -69,20 +69,20 @@ def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float
 
 def _behind_boxes(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     hidden = np.zeros((len(posts), len(points)), bool)
-    for row, post in zip(hidden, posts, strict=True):
+    for index, post in enumerate(posts):
         step = points - post
         step = np.where(np.abs(step) < 1e-9, 1e-9, step)
         for box in boxes:
             first, second = (box[:2] - post) / step, (box[2:] - post) / step
             enter = np.minimum(first, second).max(axis=1)
             leave = np.maximum(first, second).min(axis=1)
-            row |= (enter < leave) & (leave > 0) & (enter < 1)
+            hidden[index] |= (enter < leave) & (leave > 0) & (enter < 1)
     return hidden
 
 
 def _behind_discs(posts: np.ndarray, points: np.ndarray, discs: np.ndarray) -> np.ndarray:
     hidden = np.zeros((len(posts), len(points)), bool)
-    for row, post in zip(hidden, posts, strict=True):
+    for index, post in enumerate(posts):
         step = points - post
         length = (step**2).sum(axis=1)
         for x, y, radius in discs:
@@ -90,5 +90,5 @@ def _behind_discs(posts: np.ndarray, points: np.ndarray, discs: np.ndarray) -> n
             if np.hypot(*centre) < radius + 0.5:
                 continue
             share = np.clip(step @ centre / length, 0, 1)
-            row |= np.hypot(*(share[:, None] * step - centre).T) < radius
+            hidden[index] |= np.hypot(*(share[:, None] * step - centre).T) < radius
     return hidden

@@ -218,13 +218,16 @@ def test_a_wall_hides_what_lies_behind_it() -> None:
 @needs_any
 def test_range_limits_returns() -> None:
     site = one_sensor_site()
-    x = np.abs(site.targets.xyz[:, 0])
-    caster = make_ray_caster(site.triangles, ANY)
-    models = {"fine": small_model("fine", 64, 360, min_range=7.0, max_range=10.0)}
-    visible = finish(compute_visibility(site, models, VisibilitySettings(0.6), caster)).visible[0]
-    slant = np.hypot(x, 5.0)
-    assert not visible[(slant < 6.3) | (slant > 10.7)].any()
-    assert visible[(slant > 7.1) & (slant < 9.9)].all()
+    model = small_model("fine", 16, 120, min_range=7.0, max_range=10.0)
+    steps = compute_visibility(site, {"fine": model}, VisibilitySettings(0.9), make_ray_caster(site.triangles, ANY))
+    nearest = nearest_return(site.candidates.xyz[0], 0.0, model, site.triangles, site.targets.xyz)
+    assert (np.abs(nearest - 0.9) > 1e-3).all()
+    visible = finish(steps).visible[0]
+    assert (visible == (nearest < 0.9)).all()
+    slant = np.hypot(site.targets.xyz[:, 0], 5.0)
+    unlimited = nearest_return(site.candidates.xyz[0], 0.0, MODELS["fine"], site.triangles, site.targets.xyz) < 0.9
+    assert (unlimited & ~visible & (slant > 6.1) & (slant < 7)).any()  # reached, but by returns that are too near
+    assert (unlimited & ~visible & (slant > 10.9)).any()
 
 
 @needs_any

@@ -75,8 +75,9 @@ def lane_surfaces(
 ) -> tuple[LaneSurface, ...]:
     """Return the surfaces of all lanes that have an area.
 
-    Elevation, superelevation, crossfall, level lanes and lane heights are part
-    of them. Lane sections shorter than a micrometre are left out.
+    Elevation, superelevation, crossfall, shape, level lanes and lane heights
+    are part of them; across, a lane is straight from edge to edge. Lane
+    sections shorter than a micrometre are left out.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def _knots(road: Road, section: LaneSection) -> list[float]:
         *(road.elevation, road.superelevation, road.left_crossfall, road.right_crossfall, road.lane_offset),
         *(of_lane for lane in lanes for of_lane in (lane.width, lane.border, lane.inner_height, lane.outer_height)),
     )
-    starts = np.concatenate([road.reference_line.s, *(profile.start for profile in profiles)])
+    starts = np.concatenate([road.reference_line.s, road.shape.s, *(profile.start for profile in profiles)])
     inside = starts[(starts > section.start) & (starts < section.end)]
     return [section.start, *inside.tolist(), section.end]
 
@@ -168,10 +169,10 @@ def _side_edges(
 ) -> Iterator[tuple[Float, Float]]:
     """Yield the inner and outer edge, (k, 3) each, of the lanes of one side from the centre outwards."""
     centre = t = road.lane_offset(s)
-    left_fall, right_fall = np.tan(road.left_crossfall(s)), np.tan(road.right_crossfall(s))
+    left_slope, right_slope = -np.tan(road.left_crossfall(s)), np.tan(road.right_crossfall(s))
 
     def rise(t: Float) -> Float:
-        return np.asarray(t * np.where(t > 0.0, -left_fall, right_fall))
+        return np.asarray(t * np.where(t > 0.0, left_slope, right_slope) + road.shape(s, t))
 
     point = frame.origin + t[:, None] * frame.left + rise(t)[:, None] * frame.up
     for lane in lanes:

@@ -17,7 +17,7 @@ from .sampling import sample
 
 Float = NDArray[np.float64]
 
-_MOST_COPIES = 100_000
+_MOST_COPIES = 10_000
 _STRIP_TOLERANCE = 0.02  # metres
 _ENDS = (0.0, 1.0)
 

@@ -70,3 +70,44 @@ def profile(records: list[tuple[float, tuple[float, float, float, float]]]) -> P
 
 NONE = profile([])
 """The profile without records: zero everywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Height of the road surface across the road, at stations along it and blended linearly in between.
+
+    Before the first and after the last station the shape stays as it is there;
+    without any station the road is flat across.
+
+    Parameters
+    ----------
+    s : (n,) float64, metres
+        Stations along the road, ascending.
+    across : tuple of Profile
+        Height over t at each station.
+    """
+
+    s: Float
+    across: tuple[Profile, ...]
+
+    def __call__(self, s: Float, t: Float) -> Float:
+        """Return the heights, (k,) metres, at ``s`` along and ``t`` to the left, (k,) metres each."""
+        if not self.across:
+            return np.zeros_like(t)
+        # Position among the stations: 2.25 is a quarter of the way from the third to the fourth.
+        position = np.interp(s, self.s, np.arange(len(self.s)))
+        heights = np.zeros_like(t)
+        for station, height in enumerate(self.across):
+            share = np.maximum(1.0 - np.abs(position - station), 0.0)
+            near = share > 0.0
+            heights[near] += share[near] * height(t[near])
+        return heights
+
+
+def shape(records: list[tuple[float, float, tuple[float, float, float, float]]]) -> Shape:
+    """Return the shape of ``(s, t, (a, b, c, d))`` records in any order."""
+    stations = sorted({s for s, _, _ in records})
+    return Shape(
+        np.array(stations, dtype=np.float64),
+        tuple(profile([(t, cubic) for s, t, cubic in records if s == station]) for station in stations),
+    )

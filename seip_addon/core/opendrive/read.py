@@ -16,18 +16,20 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
-from .profile import NONE, Profile, profile
+from .profile import NONE, Profile, Shape, profile, shape
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
     Junction,
     Lane,
     LaneSection,
+    MapPlace,
     ObjectOutline,
     Repeat,
     Road,
     RoadMap,
     RoadObject,
+    RoadPlace,
     RoadSignal,
 )
 
@@ -92,6 +94,7 @@ def _road(node: Node) -> Road:
         superelevation=_profile(node, "lateralProfile", "superelevation"),
         left_crossfall=_crossfall(node, "left"),
         right_crossfall=_crossfall(node, "right"),
+        shape=_shape(node),
         lane_offset=_profile(node, "lanes", "laneOffset"),
         sections=_sections(node, line.end),
         objects=tuple(
@@ -168,6 +171,11 @@ def _crossfall(road: Node, side: str) -> Profile:
     return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
 
 
+def _shape(road: Node) -> Shape:
+    nodes = road.children("lateralProfile", "shape")
+    return shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
+
+
 def _cubic(node: Node) -> tuple[float, float, float, float]:
     return node.number("a", 0.0), node.number("b", 0.0), node.number("c", 0.0), node.number("d", 0.0)
 
@@ -177,7 +185,7 @@ def _sections(road: Node, end: float) -> tuple[LaneSection, ...]:
     starts = [max(node.number("s"), 0.0) for node in nodes]
     return tuple(
         LaneSection(start, min(stop, end), _side(node, "left", start), _side(node, "right", start))
-        for node, start, stop in zip(nodes, starts, [*starts[1:], end], strict=True)
+        for node, start, stop in zip(nodes, starts, [*starts, end][1:], strict=True)
         if start < min(stop, end)
     )
 
@@ -298,4 +306,19 @@ def _signal(node: Node) -> RoadSignal:
         heading=turned + node.number("hOffset", 0.0),
         height=node.number("height", 0.0),
         width=node.number("width", 0.0),
+        place=_signal_place(node, turned),
     )
+
+
+def _signal_place(signal: Node, turned: float) -> RoadPlace | MapPlace | None:
+    if node := signal.child("positionInertial"):
+        return MapPlace(node.number("x"), node.number("y"), node.number("z"), node.number("hdg", 0.0))
+    if node := signal.child("positionRoad"):
+        return RoadPlace(
+            node.text("roadId"),
+            node.number("s"),
+            node.number("t"),
+            node.number("zOffset", 0.0),
+            turned + node.number("hOffset", 0.0),
+        )
+    return None

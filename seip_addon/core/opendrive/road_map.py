@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from shapely.geometry import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
-from .profile import Profile
+from .profile import Profile, Shape
 from .reference_line import ReferenceLine
 
 Float = NDArray[np.float64]
@@ -125,8 +125,32 @@ class RoadObject:
 
 
 @dataclass(frozen=True)
+class RoadPlace:
+    """Another road on which a signal stands, and where (metres, radians)."""
+
+    road_id: str
+    s: float
+    t: float
+    z_offset: float
+    heading: float
+
+
+@dataclass(frozen=True)
+class MapPlace:
+    """Where a signal stands in map coordinates (metres, radians)."""
+
+    x: float
+    y: float
+    z: float
+    heading: float
+
+
+@dataclass(frozen=True)
 class RoadSignal:
-    """A signal as the file gives it, in road coordinates (metres, radians)."""
+    """A signal as the file gives it, in road coordinates (metres, radians).
+
+    ``place`` is where it really stands, if that is not where it applies.
+    """
 
     id: str
     name: str
@@ -139,6 +163,7 @@ class RoadSignal:
     heading: float
     height: float
     width: float
+    place: RoadPlace | MapPlace | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +182,8 @@ class Road:
     superelevation, left_crossfall, right_crossfall : Profile
         Radians over metres along the road. A road with superelevation above
         zero falls to the right; crossfall above zero falls outwards.
+    shape : Shape
+        Height of the surface above the plane that these make.
     sections : tuple of LaneSection
         In order along the road.
     objects : tuple of RoadObject
@@ -171,6 +198,7 @@ class Road:
     superelevation: Profile
     left_crossfall: Profile
     right_crossfall: Profile
+    shape: Shape
     lane_offset: Profile
     sections: tuple[LaneSection, ...]
     objects: tuple[RoadObject, ...]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
+from seip_addon.core.errors import SeipError
+
 from .lanes import ground_elevation
-from .road_map import Road, RoadMap
+from .road_map import MapPlace, Road, RoadMap, RoadPlace, RoadSignal
 
 Float = NDArray[np.float64]
 
@@ -25,18 +26,21 @@ class PlacedSignal:
 
     Parameters
     ----------
-    road_id, id, name, kind, subtype : str
+    road_id : str
+        The road beside which it stands, not always the one that it applies to.
+    id, name, kind, subtype : str
         As in the file; ``kind`` is its type.
     dynamic : bool
         Whether it changes, as a traffic light does.
     position : (3,) float64, metres
         In map coordinates.
     yaw : float, radians
-        Direction of the traffic that it is meant for, counter-clockwise from +x.
+        By the standard the direction of the traffic that it is meant for,
+        counter-clockwise from +x; some exporters give the one it faces.
     height, width : float, metres
         Zero where the file says nothing.
     s, t, z_offset : float, metres
-        As in the file.
+        On that road, as in the file.
     ground : float, metres
         Elevation of the road surface below, or of its edge beside the road.
     """
@@ -58,32 +62,47 @@ class PlacedSignal:
 
 
 def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedSignal, ...]:
-    """Return the signals of a map, those in an area of the plan (map coordinates) if one is given."""
-    return tuple(
-        signal
-        for road in road_map.roads
-        for signal in _signals(road)
-        if area is None or Point(signal.position[:2]).intersects(area)
+    """Return the signals of a map, those in an area of the plan (map coordinates) if one is given.
+
+    Raises
+    ------
+    SeipError
+        A signal stands on a road that the map does not have.
+    """
+    roads = {road.id: road for road in road_map.roads}
+    signals = (_placed(road, signal, roads) for road in road_map.roads for signal in road.signals)
+    return tuple(signal for signal in signals if area is None or Point(signal.position[:2]).intersects(area))
+
+
+def _placed(road: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSignal:
+    match signal.place:
+        case None:
+            return _on_road(road, signal)
+        case MapPlace(x, y, z, heading):
+            return replace(_on_road(road, signal), position=np.array([x, y, z]), yaw=heading)
+        case RoadPlace(road_id, s, t, z_offset, heading):
+            if road_id not in roads:
+                raise SeipError(
+                    f"road {road.id}: signal {signal.id} stands on road {road_id}, which is not there; correct the map"
+                )
+            return _on_road(roads[road_id], replace(signal, s=s, t=t, z_offset=z_offset, heading=heading))
+
+
+def _on_road(road: Road, signal: RoadSignal) -> PlacedSignal:
+    s, t = np.array([signal.s]), np.array([signal.t])
+    return PlacedSignal(
+        road_id=road.id,
+        id=signal.id,
+        name=signal.name,
+        kind=signal.kind,
+        subtype=signal.subtype,
+        dynamic=signal.dynamic,
+        position=road.place(s, t)[0] + np.array([0.0, 0.0, signal.z_offset]),
+        yaw=float(road.frame(s).heading[0]) + signal.heading,
+        height=signal.height,
+        width=signal.width,
+        s=signal.s,
+        t=signal.t,
+        z_offset=signal.z_offset,
+        ground=ground_elevation(road, signal.s, signal.t),
     )
-
-
-def _signals(road: Road) -> Iterator[PlacedSignal]:
-    for signal in road.signals:
-        s, t = np.array([signal.s]), np.array([signal.t])
-        position = road.place(s, t)[0] + np.array([0.0, 0.0, signal.z_offset])
-        yield PlacedSignal(
-            road_id=road.id,
-            id=signal.id,
-            name=signal.name,
-            kind=signal.kind,
-            subtype=signal.subtype,
-            dynamic=signal.dynamic,
-            position=position,
-            yaw=float(road.frame(s).heading[0]) + signal.heading,
-            height=signal.height,
-            width=signal.width,
-            s=signal.s,
-            t=signal.t,
-            z_offset=signal.z_offset,
-            ground=ground_elevation(road, signal.s, signal.t),
-        )

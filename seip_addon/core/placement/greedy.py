@@ -70,13 +70,11 @@ def exchange(instance: Instance, chosen: Integer) -> Integer:
         chosen = swapped
 
 
-def without_idle(instance: Instance, chosen: Integer) -> Integer:
-    """Take away sensors, the dearest first, that neither coverage nor a mandatory group needs."""
-    covered = instance.covered(chosen)
+def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
+    """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != candidate]
-        needed = not instance.mandatory[:, rest].any(axis=1).all()
-        if not needed and instance.covered(rest) >= covered - SLACK:
+        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - SLACK:
             chosen = rest
     return chosen
 
@@ -85,7 +83,7 @@ def addable(instance: Instance, chosen: Integer) -> Boolean:
     """Return which candidates can join the chosen ones within all constraints, (c,) bool."""
     if len(chosen) >= instance.count:
         return np.zeros(len(instance), bool)
-    room = ~instance.conflict[chosen].any(axis=0)
+    room: Boolean = ~instance.conflict[chosen].any(axis=0)
     room[chosen] = False
     room &= instance.affordable(math.fsum(instance.price[chosen]) + instance.price)
     unserved = ~instance.mandatory[:, chosen].any(axis=1)

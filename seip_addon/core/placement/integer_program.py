@@ -9,7 +9,7 @@ import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -116,11 +116,15 @@ class CoverProgram:
             # solvers take a budget with a tolerance of their own: forbid what overruns it in exact arithmetic
             self.require(self.number_among(outcome.chosen) <= len(outcome.chosen) - 1)
 
+    def maximise_coverage(self, solver: str, seconds: float) -> Outcome:
+        """Solve for the largest covered weight within a time limit."""
+        return self.maximise(self.covered, solver, seconds)
+
     def _solve(self, solver: str, seconds: float) -> Outcome:
         with _engine(solver, max(seconds, 0.01)) as engine:
             try:
                 self.model.solve(engine)
-            except pulp.PulpSolverError as error:
+            except (pulp.PulpSolverError, OSError) as error:
                 raise SeipError(
                     f"the solver {solver} stopped with an error ({error}); choose another solver"
                 ) from error
@@ -149,6 +153,13 @@ class CoverProgram:
             self.model += self.number_among(np.flatnonzero(group)) >= 1
         for clique in cover_by_cliques(instance.conflict):
             self.model += self.number_among(clique) <= 1
+
+
+def reaching(instance: Instance, goal: float) -> CoverProgram:
+    """Return the program of an instance whose placements cover at least ``goal``."""
+    program = CoverProgram(instance)
+    program.require(program.covered >= goal)
+    return program
 
 
 def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
@@ -192,9 +203,11 @@ def check_solver(solver: str) -> str:
     """
     if solver not in SOLVERS:
         raise SeipError(f"unknown solver {solver!r}; choose among {', '.join(_available())}")
-    if not _AVAILABLE[solver]():
+    if not is_available(solver):
         raise SeipError(f"the solver {solver} is not available here; choose among {', '.join(_available())}")
-    return f"{_VERSION[solver]()} with PuLP {importlib.metadata.version('pulp')}"
+    if solver == "cbc":
+        return f"CBC of PuLP {pulp.__version__}"
+    return f"{_PULP_NAME[solver]} {importlib.metadata.version(_PACKAGE[solver])}, PuLP {pulp.__version__}"
 
 
 def _linear(variables: list[Any], factors: Float) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
@@ -241,35 +254,17 @@ def _executable_cbc() -> Iterator[str]:
         yield str(copy)
 
 
+def is_available(solver: str) -> bool:
+    """Return whether a known solver can run here."""
+    if solver == "cbc":
+        return os.access(pulp_cbc_path, os.R_OK)
+    return _PULP_NAME[solver] in pulp.listSolvers(onlyAvailable=True)
+
+
+_PULP_NAME = {"highs": "HiGHS", "gurobi": "GUROBI"}
+
+_PACKAGE = {"highs": "highspy", "gurobi": "gurobipy"}
+
+
 def _available() -> list[str]:
-    return [name for name in SOLVERS if _AVAILABLE[name]()]
-
-
-def _has_highs() -> bool:
-    return bool(pulp.HiGHS(msg=False).available())
-
-
-def _has_cbc() -> bool:
-    return os.access(pulp_cbc_path, os.R_OK)
-
-
-def _has_gurobi() -> bool:
-    return "GUROBI" in pulp.listSolvers(onlyAvailable=True)
-
-
-_AVAILABLE: dict[str, Callable[[], bool]] = {"highs": _has_highs, "cbc": _has_cbc, "gurobi": _has_gurobi}
-
-
-def _highs_version() -> str:
-    return f"HiGHS {importlib.metadata.version('highspy')}"
-
-
-def _cbc_version() -> str:
-    return "CBC"
-
-
-def _gurobi_version() -> str:
-    return f"Gurobi {importlib.metadata.version('gurobipy')}"
-
-
-_VERSION: dict[str, Callable[[], str]] = {"highs": _highs_version, "cbc": _cbc_version, "gurobi": _gurobi_version}
+    return [name for name in SOLVERS if is_available(name)]

@@ -15,10 +15,11 @@ from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .exact import prove, solve
 from .feasibility import starting_choice
-from .greedy import greedy, greedy_and_exchange
+from .greedy import greedy, greedy_and_exchange, without_idle
 from .instance import SLACK, Instance, make_instance
-from .integer_program import CoverProgram, check_solver
+from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, placement
+from .ties import fewest
 
 FINISH = 1.0
 """Seconds that choosing among equally cheap placements may take when the time limit is used up."""
@@ -64,14 +65,14 @@ def cheapest_for_coverage(
     whole = math.fsum(problem.weights) * factor
     goal = coverage * whole
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
-    cheapest, bound = yield from _cheapest(instance, _pruned(instance, chosen, goal), goal, solver, clock)
+    cheapest, bound = yield from _cheapest(instance, without_idle(instance, chosen, goal), goal, solver, clock)
     best = yield from solve(_no_dearer(problem, instance, cheapest), solver=solver, time_limit=max(clock.left, FINISH))
     reached = best.covered * factor >= goal - SLACK
     chosen = best.chosen if reached else instance.original[cheapest]
     return _record(problem, chosen, bound, best, clock)
 
 
-def _reaching(
+def _reaching(  # noqa: PLR0913 -- a search has a state, a solver and a limit
     problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, Integer]:
     """Return some placement that reaches the goal."""
@@ -95,32 +96,22 @@ def _reaching(
     )
 
 
-def _pruned(instance: Instance, chosen: Integer, goal: float) -> Integer:
-    """Take away sensors, the dearest first, that the goal does not need."""
-    for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
-        rest = chosen[chosen != candidate]
-        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - SLACK:
-            chosen = rest
-    return chosen
-
-
 def _cheapest(
     instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, float]]:
     """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
+    if np.ptp(instance.price) == 0:
+        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        price = math.fsum(instance.price[chosen])
+        return chosen, price if proven else float(instance.price.min())
     price = math.fsum(instance.price[chosen])
     cheaper = replace(instance, budget=price * (1 - 3 * TIE))
-    if np.ptp(instance.price) == 0:
-        cheaper = replace(instance, count=len(chosen) - 1)
-    if price == 0 or cheaper.count == 0:
-        return chosen, price
     bound = yield from lagrangian_bound(cheaper, goal, clock)
     keep = can_reach(cheaper, bound, goal)
     if bound.value < goal - SLACK or len(keep) == 0:
         return chosen, price
     yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = CoverProgram(cheaper.part(keep))
-    program.require(program.covered >= goal - SLACK)
+    program = reaching(cheaper.part(keep), goal - SLACK)
     outcome = program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])

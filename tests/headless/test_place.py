@@ -1,0 +1,161 @@
+"""The place command, from a scene to its folder of results, and what it says when it cannot."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from headless import place
+
+import bpy
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement_record import comparable, load_placement_record
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = ROOT / "scenes" / "junction.blend"
+QUICK = ["--sensor", "type1", "--heights", "3.5", "--grid", "4", "--spacing", "16", "--no-render"]
+
+
+def run(folder, *options):
+    place.main([str(SCENE), "-o", str(folder), *QUICK, *options])
+    return load_placement_record(folder / "placement.json")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("out") / "made for it"
+    run(folder, "--count", "2")
+    return folder
+
+
+def test_the_folder_holds_every_result(folder):
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "placement.json",
+        "candidates.csv",
+        "visibility.npz",
+        "carla_spawn.json",
+        "plan.png",
+        "placed.blend",
+    }
+
+
+def test_tables_agree_with_the_record(folder):
+    record = load_placement_record(folder / "placement.json")
+    rows = list(csv.DictReader((folder / "candidates.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == record["counts"]["poses"]
+    chosen = {int(row["pose"]) for row in rows if row["chosen"]}
+    assert chosen == {sensor["pose"] for sensor in record["sensors"]}
+    assert len(json.loads((folder / "carla_spawn.json").read_text(encoding="utf-8"))) == len(record["sensors"])
+
+
+def test_the_saved_scene_holds_the_sensors(folder):
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
+    record = load_placement_record(folder / "placement.json")
+    empties = [item for item in bpy.data.collections["SEIP Sensors"].objects if item.type == "EMPTY"]
+    assert len(empties) == len(record["sensors"])
+    assert {item["seip_sensor"] for item in empties} == {"type1"}
+
+
+def test_the_same_run_gives_the_same_bytes(folder, tmp_path):
+    again = run(tmp_path / "again", "--count", "2")
+    assert comparable(again) == comparable(load_placement_record(folder / "placement.json"))
+    for name in ("candidates.csv", "carla_spawn.json", "plan.png"):
+        assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_another_goal_uses_the_stored_grid(folder, tmp_path):
+    stored = tmp_path / "visibility.npz"
+    stored.write_bytes((folder / "visibility.npz").read_bytes())
+    before = stored.stat().st_mtime_ns
+    record = run(tmp_path, "--budget", "20000")
+    assert record["price_usd"] <= 20_000
+    assert stored.stat().st_mtime_ns == before
+    run(tmp_path, "--count", "2", "--delta", "0.7")
+    assert stored.stat().st_mtime_ns != before
+
+
+def test_heights_come_as_a_list_or_a_range(tmp_path):
+    record = run(tmp_path, "--count", "1", "--heights", "4:5:0.5", "8")
+    assert record["settings"]["candidates"]["heights"] == [4.0, 4.5, 5.0, 8.0]
+
+
+def test_the_reverse_problem_by_command(tmp_path):
+    record = run(tmp_path, "--coverage", "0.2")
+    assert record["coverage"]["whole"] >= 0.2
+    assert record["greedy"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--count", "0"], "asked for 0 sensors"),
+        (["--count", "999"], "asked for 999 sensors"),
+        (["--budget", "5"], "below the cheapest sensor"),
+        (["--delta", "0"], "delta must be"),
+        (["--grid", "0"], "grid spacing must be"),
+        (["--sensor", "typ1"], "type1"),
+        (["--coverage", "1"], "cannot be reached"),
+        (["--solver", "cplex"], "highs"),
+        (["--forbid", "sidewalk 3", "--require", "sidewalk 3"], "both forbidden and mandatory"),
+        (["--require", "sidewalk 4000"], "there is no position"),
+        (["--catalogue", "missing.toml"], "missing.toml"),
+        (["--spacing", "-1"], "spacing must be"),
+    ],
+)
+def test_each_mistake_has_its_sentence_and_leaves_no_result(options, sentence, tmp_path):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path, *options)
+    assert not (tmp_path / "placement.json").exists()
+    assert all(not path.name.startswith(".") for path in tmp_path.iterdir())
+
+
+def test_a_missing_scene_is_named(tmp_path):
+    with pytest.raises(SeipError, match=r"there is no file nowhere\.blend"):
+        place.main(["nowhere.blend", "-o", str(tmp_path)])
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.touch()
+    with pytest.raises(SeipError, match="cannot write"):
+        run(blocked / "out")
+
+
+def start(*options):
+    command = [sys.executable, "-m", "headless.place", str(SCENE), *options]
+    return subprocess.Popen(  # noqa: S603  # our own command
+        command,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_a_mistake_ends_the_process_with_one_line_and_status_1(tmp_path):
+    process = start("-o", str(tmp_path), *QUICK, "--count", "0")
+    _, complaint = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert complaint.strip().splitlines()[-1].startswith("error: asked for 0 sensors")
+    assert "Traceback" not in complaint
+
+
+def test_control_c_leaves_nothing_half_written(tmp_path):
+    process = start("-o", str(tmp_path), "--sensor", "type3", "--grid", "1")
+    while "targets" not in process.stdout.readline():
+        assert process.poll() is None
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    _, complaint = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "stopped, nothing written" in complaint
+    assert list(tmp_path.iterdir()) == []
