@@ -123,7 +123,8 @@ def test_a_short_time_limit_gives_an_incumbent_and_a_valid_bound(limit: float) -
 def test_a_short_time_limit_on_the_reverse_problem() -> None:
     placement = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=0.01))
     assert placement.covered >= 800
-    assert placement.bound <= placement.objective == placement.price
+    best = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=10.0))
+    assert 6000 <= placement.bound <= best.price <= placement.objective == placement.price
 
 
 def test_solvers_agree_on_a_street() -> None:
@@ -154,6 +155,23 @@ def test_merging_targets_keeps_weight_and_does_not_depend_on_order() -> None:
     assert sums.sum() == pytest.approx(weight[visible.any(axis=0)].sum())
     np.testing.assert_array_equal(merged, again)
     np.testing.assert_array_equal(sums, same)
+
+
+def test_of_many_pairs_that_see_all_the_one_that_sees_most_twice() -> None:
+    problem = street_problem(60, 1000, blocks=2, count=6)
+    visible = problem.visible.copy()
+    visible[7] = np.arange(1000) > 0
+    visible[9] = np.arange(1000) % 2 == 0
+    visible[100] = np.arange(1000) % 2 == 1
+    visible[11, 0] = True
+    problem = replace(problem, visible=visible)
+    numbers = visible.astype(np.float64)
+    pairs = ((1 - numbers) @ (1 - numbers).T == 0) & (problem.positions[:, None] != problem.positions)
+    placement = finish(solve(problem))
+    assert pairs.sum() > 40
+    assert pairs[tuple(placement.chosen)]
+    assert (placement.seen_by > 1).sum() == (numbers @ numbers.T)[pairs].max()
+    assert len(placement.notes) == 1
 
 
 def test_dominated_candidates_at_one_position_are_dropped() -> None:

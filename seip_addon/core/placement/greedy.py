@@ -79,6 +79,11 @@ def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
     return chosen
 
 
+def without_weakest(instance: Instance, chosen: Integer) -> Integer:
+    """Take away the sensor that is missed least."""
+    return max((chosen[chosen != candidate] for candidate in chosen), key=instance.covered)
+
+
 def addable(instance: Instance, chosen: Integer) -> Boolean:
     """Return which candidates can join the chosen ones within all constraints, (c,) bool."""
     if len(chosen) >= instance.count:

@@ -19,6 +19,9 @@ SCALE = 1e4
 SLACK = TIE * SCALE
 """Scaled weights that differ by less count as equal."""
 
+SOLVER_SLACK = 2e-6 * SCALE
+"""What a solver's tolerance of 1e-6 on every variable may add up to, doubled."""
+
 
 @dataclass(frozen=True, eq=False)
 class Instance:
@@ -85,10 +88,19 @@ class Instance:
 
     @cached_property
     def step(self) -> float:
-        """Half the smallest difference between covered weights: unit weights allow no value between two counts."""
+        """Smallest difference between two covered weights: unit weights allow no value between two counts."""
         times = self.weight / self.weight.min()
         whole = bool(np.abs(times - np.rint(times)).max() < 1e-6)  # noqa: PLR2004 -- rounding of summed weights
-        return max(2 * SLACK, float(self.weight.min()) / 2 if whole else 0.0)
+        return max(2 * SLACK, float(self.weight.min()) if whole else 0.0)
+
+    @property
+    def margin(self) -> float:
+        """How far a coverage to reach is lowered for a solver, which may miss each target by its tolerance."""
+        return max(self.step / 2, SOLVER_SLACK)
+
+    def attainable(self, goal: float) -> float:
+        """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
+        return math.ceil((goal - SLACK) / self.step) * self.step if self.step > 2 * SLACK else goal
 
     def covered(self, chosen: Integer) -> float:
         """Return the scaled weight that the chosen candidates cover."""

@@ -9,7 +9,7 @@ import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,9 +20,9 @@ import numpy as np
 import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
-from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from .instance import Instance
+from ..arrays import Boolean, Float, Integer
+from .instance import SLACK, Instance
 from .problem import TIE
 
 SOLVERS = ("highs", "cbc", "gurobi")
@@ -64,6 +64,7 @@ class CoverProgram:
         self.instance = instance
         self.model = pulp.LpProblem("placement", pulp.LpMaximize)
         self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
+        self._checks: list[Callable[[Integer], bool]] = [instance.feasible]
         self._constrain()
 
     @cached_property
@@ -101,9 +102,27 @@ class CoverProgram:
         """Return the (weighted) number of sensors among some candidates."""
         return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
 
-    def require(self, constraint: Any) -> None:  # noqa: ANN401 -- PuLP's constraints are untyped
-        """Add a constraint for this and all later solves."""
+    def require(self, constraint: Any, check: Callable[[Integer], bool] | None = None) -> None:  # noqa: ANN401
+        """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
         self.model += constraint
+        if check is not None:
+            self._checks.append(check)
+
+    def require_coverage(self, goal: float) -> None:
+        """Require a covered weight, but for `SLACK`."""
+        instance = self.instance
+        self.require(self.covered >= goal - instance.margin, lambda c: instance.covered(c) >= goal - SLACK)
+
+    def require_double_coverage(self, goal: float) -> None:
+        """Require a doubly covered weight, but for `SLACK`."""
+        instance = self.instance
+        self.require(self.doubly_covered >= goal - instance.margin, lambda c: instance.doubly(c) >= goal - SLACK)
+
+    def require_price(self, price: float) -> None:
+        """Require a total price of at most ``price``, but for `TIE`."""
+        limit = price * (1 + TIE)
+        prices = self.instance.price
+        self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
 
     def maximise(self, objective: Any, solver: str, seconds: float) -> Outcome:  # noqa: ANN401 -- as above
         """Solve for the largest objective within a time limit; the last requirement stays."""
@@ -111,10 +130,12 @@ class CoverProgram:
         ends = time.perf_counter() + seconds
         while True:
             outcome = self._solve(solver, ends - time.perf_counter())
-            if outcome.chosen is None or self.instance.feasible(outcome.chosen):
+            chosen = outcome.chosen
+            if chosen is None or all(check(chosen) for check in self._checks):
                 return outcome
-            # solvers take a budget with a tolerance of their own: forbid what overruns it in exact arithmetic
-            self.require(self.number_among(outcome.chosen) <= len(outcome.chosen) - 1)
+            # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
+            others = np.setdiff1d(np.arange(len(self.x)), chosen)
+            self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
 
     def maximise_coverage(self, solver: str, seconds: float) -> Outcome:
         """Solve for the largest covered weight within a time limit."""
@@ -158,7 +179,7 @@ class CoverProgram:
 def reaching(instance: Instance, goal: float) -> CoverProgram:
     """Return the program of an instance whose placements cover at least ``goal``."""
     program = CoverProgram(instance)
-    program.require(program.covered >= goal)
+    program.require_coverage(goal)
     return program
 
 

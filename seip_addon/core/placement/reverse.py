@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from .bounds import can_reach, lagrangian_bound
+from ..arrays import Integer
+from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .clock import Clock
 from .exact import prove, solve
 from .feasibility import starting_choice
@@ -63,7 +63,7 @@ def cheapest_for_coverage(
     check_solver(solver)
     instance, factor = make_instance(problem)
     whole = math.fsum(problem.weights) * factor
-    goal = coverage * whole
+    goal = instance.attainable(coverage * whole)
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
     cheapest, bound = yield from _cheapest(instance, without_idle(instance, chosen, goal), goal, solver, clock)
     best = yield from solve(_no_dearer(problem, instance, cheapest), solver=solver, time_limit=max(clock.left, FINISH))
@@ -100,24 +100,28 @@ def _cheapest(
     instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, float]]:
     """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
+    price = math.fsum(instance.price[chosen])
+    if price == 0:
+        return chosen, price
+    bound = yield from lagrangian_bound(replace(instance, budget=min(price, instance.budget)), goal, clock)
+    least = min(price, max(least_price(instance, bound, goal), float(instance.price.min())))
     if np.ptp(instance.price) == 0:
         chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
         price = math.fsum(instance.price[chosen])
-        return chosen, price if proven else float(instance.price.min())
-    price = math.fsum(instance.price[chosen])
+        single = float(instance.price[0])
+        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
     cheaper = replace(instance, budget=price * (1 - 3 * TIE))
-    bound = yield from lagrangian_bound(cheaper, goal, clock)
-    keep = can_reach(cheaper, bound, goal)
-    if bound.value < goal - SLACK or len(keep) == 0:
+    keep = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    if len(keep) == 0:
         return chosen, price
     yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = reaching(cheaper.part(keep), goal - SLACK)
+    program = reaching(cheaper.part(keep), goal)
     outcome = program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
     if outcome.finished:
         return chosen, price
-    return chosen, min(price, max(-outcome.bound / program.price_scale, float(instance.price.min())))
+    return chosen, min(price, max(least, -outcome.bound / program.price_scale))
 
 
 def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:

@@ -18,10 +18,9 @@ from ..arrays import Integer
 from ..progress import Progress
 from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
-from .greedy import without_idle
+from .greedy import exchange, without_idle, without_weakest
 from .instance import SLACK, Instance
 from .integer_program import reaching
-from .problem import TIE
 
 MANY = 12
 """Ties that are listed one by one; beyond, each stage is a program of its own."""
@@ -77,12 +76,16 @@ def fewest(
     """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
     while len(chosen) > 1:
         fewer = replace(instance, count=len(chosen) - 1)
+        exchanged = exchange(fewer, without_weakest(instance, chosen))
+        if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - SLACK:
+            chosen = without_idle(fewer, exchanged, goal)
+            continue
         bound = yield from lagrangian_bound(fewer, goal, clock)
         keep = can_reach(fewer, bound, goal)
         if bound.value < goal - SLACK or len(keep) == 0:
             break
         yield Progress(0, 1, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
-        outcome = reaching(fewer.part(keep), goal - SLACK).maximise_coverage(solver, clock.left)
+        outcome = reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
         if outcome.chosen is None:
             return chosen, outcome.finished
         chosen = without_idle(fewer, keep[outcome.chosen], goal)
@@ -95,7 +98,7 @@ def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock:
     Each is found by maximising coverage once more with those before forbidden:
     that prunes far better than any other objective under a coverage to reach.
     """
-    program = reaching(part, goal - SLACK)
+    program = reaching(part, goal)
     found = [chosen]
     while len(found) < MANY:
         program.require(program.number_among(found[-1]) <= len(chosen) - 1)
@@ -117,7 +120,7 @@ class _Stages:
     """One program, solved for one objective after another; a stage that runs out of time ends them all."""
 
     def __init__(self, part: Instance, goal: float, chosen: Integer, solver: str, clock: Clock) -> None:
-        self.program = reaching(part, goal - SLACK)
+        self.program = reaching(part, goal)
         self.chosen = chosen
         self.settled = True
         self._solver = solver
@@ -137,11 +140,10 @@ def _settle(part: Instance, goal: float, chosen: Integer, solver: str, clock: Cl
     program = stages.program
     if np.ptp(part.price) > 0:
         stages.maximise(-1 * program.price)
-        price = float(part.price[stages.chosen].sum())
-        program.require(program.price <= price * program.price_scale * (1 + TIE))
+        program.require_price(math.fsum(part.price[stages.chosen]))
     if len(chosen) > 1:
         stages.maximise(program.doubly_covered)
-        program.require(program.doubly_covered >= part.doubly(stages.chosen) - SLACK)
+        program.require_double_coverage(part.doubly(stages.chosen))
     for block in np.array_split(np.arange(len(part)), range(BLOCK, len(part), BLOCK)):
         # the indicator of the choice, read as a binary number, a block of digits at a time
         stages.maximise(program.number_among(block, 2.0 ** np.arange(len(block))[::-1]))
