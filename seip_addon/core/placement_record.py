@@ -197,7 +197,8 @@ def _greedy(greedy: Placement, placement: Placement) -> Record:
     lost = placement.objective - greedy.objective
     return {
         "value": _significant(greedy.objective),
-        "bound": _significant(greedy.bound),
+        # The better of the two bounds: once the optimum is proven, it no longer hangs on a platform's rounding.
+        "bound": _significant(min(greedy.bound, placement.bound)),
         "gap_to_placement": _share(lost / placement.objective) if placement.objective > 0.0 else 0.0,
         "poses": [int(pose) for pose in greedy.chosen],
         "notes": list(greedy.notes),

@@ -148,7 +148,8 @@ def _light(scene: bpy.types.Scene) -> None:
     thing.location = (0.0, 0.0, 60.0)
     collections.find_or_make(scene, VIEW).objects.link(thing)
     world = bpy.data.worlds.new("Sky")
-    world.use_nodes = True
+    if world.node_tree is None:  # from Blender 5.0 on nodes are always there
+        world.use_nodes = True
     world.color = SKY[:3]
     sky = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
     sky.inputs["Color"].default_value = SKY

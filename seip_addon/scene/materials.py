@@ -56,7 +56,8 @@ def material(name: str) -> bpy.types.Material:
     opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
     made.diffuse_color = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
     made.roughness = ROUGHNESS.get(name, 0.9)
-    made.use_nodes = True
+    if made.node_tree is None:  # from Blender 5.0 on nodes are always there
+        made.use_nodes = True
     surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     surface.inputs["Base Color"].default_value = colour
     surface.inputs["Roughness"].default_value = made.roughness

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.errors import SeipError
-
+from ..errors import SeipError
 from .lanes import ground_elevation
 from .road_map import MapPlace, Road, RoadMap, RoadPlace, RoadSignal
 
