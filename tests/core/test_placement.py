@@ -54,6 +54,12 @@ def test_of_equal_placements_the_cheapest_then_the_most_doubly_seen() -> None:
     assert finish(solve(row_problem(visible, count=2))).chosen.tolist() == [0, 3]
 
 
+def test_a_bound_that_only_a_better_placement_meets_proves_nothing() -> None:
+    visible = [[1, 1, 1, 1, 1, 0, 0], [1, 1, 1, 0, 0, 0, 1], [1, 1, 1, 1, 0, 1, 0], [1] * 7]
+    problem = row_problem(visible, positions=np.array([0, 1, 2, 2]), mandatory=np.array([[0, 1, 1, 0]], bool), count=2)
+    assert finish(solve(problem)).chosen.tolist() == [1, 3]
+
+
 def test_seen_by_counts_the_chosen_sensors() -> None:
     placement = finish(solve(row_problem(halves, count=3, mandatory=np.array([[0, 0, 1, 0]], bool))))
     assert placement.seen_by.tolist() == [1, 2, 2, 1]

@@ -172,7 +172,7 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
         yield Progress(0, 1, f"improving the placement among the {size} best candidates")
         chosen = _within_kernel(instance, bound, size, chosen, solver, share * clock.left)
         keep = can_reach(instance, bound, _better(instance, chosen))
-    if bound.value < _better(instance, chosen) or len(keep) == 0:
+    if bound.value < _better(instance, chosen) - SLACK or len(keep) == 0:
         return Proof(chosen, instance.covered(chosen), optimal=True)
     if clock.left <= 0 or np.count_nonzero(instance.visible[keep]) > LARGEST:
         return Proof(chosen, bound.value, optimal=False)
@@ -208,7 +208,7 @@ def _decide(  # noqa: PLR0913 -- a search has a state, a solver and a limit
     chosen = chosen if outcome.chosen is None else keep[outcome.chosen]
     value = instance.covered(chosen)
     bound = value if outcome.finished else max(value, min(bound, outcome.bound))
-    return Proof(chosen, bound, optimal=bound < _better(instance, chosen))
+    return Proof(chosen, bound, optimal=bound < _better(instance, chosen) - SLACK)
 
 
 def _surplus(asked: int, used: int) -> str:
@@ -216,18 +216,10 @@ def _surplus(asked: int, used: int) -> str:
 
 
 def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
-    if (
-        len(instance.mandatory)
-        or problem.min_distance > 0
-        or (problem.count is not None and problem.budget is not None)
-    ):
+    single = len(np.unique(instance.clique)) == len(instance)
+    both = problem.count is not None and problem.budget is not None
+    if len(instance.mandatory) or problem.min_distance > 0 or both or (problem.budget is not None and not single):
         return "greedy has no guarantee under these constraints beyond the bound given"
     if problem.budget is not None:
-        share = "(1 - 1/e)/2 (32 %)" if len(np.unique(instance.clique)) == len(instance) else ""
-        return (
-            f"greedy covers at least {share} of the optimum"
-            if share
-            else ("greedy has no guarantee under a budget with several poses per position beyond the bound given")
-        )
-    share = "1 - 1/e (63 %)" if len(np.unique(instance.clique)) == len(instance) else "one half"
-    return f"greedy covers at least {share} of the optimum"
+        return "greedy covers at least (1 - 1/e)/2 (32 %) of the optimum"
+    return f"greedy covers at least {'1 - 1/e (63 %)' if single else 'one half'} of the optimum"

@@ -11,6 +11,9 @@ from .bounds import select
 from .instance import SLACK, Instance
 from .problem import TIE
 
+SINGLE = 1e-6
+"""Relative error of a sum of positive numbers in single precision, with room to spare."""
+
 
 def greedy(
     instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf
@@ -47,10 +50,6 @@ def greedy(
         if gain[best] <= 0 or instance.covered(chosen) >= enough:
             return np.sort(chosen), bound
         chosen = np.append(chosen, best)
-
-
-SINGLE = 1e-6
-"""Relative error of a sum of positive numbers in single precision, with room to spare."""
 
 
 def greedy_and_exchange(instance: Instance, start: Integer) -> Integer:

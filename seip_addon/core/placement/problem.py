@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -179,10 +179,6 @@ class Placement:
     price: float
     seen_by: Integer
     notes: tuple[str, ...] = ()
-
-    def with_notes(self, *notes: str) -> Placement:
-        """Return the same placement with further notes."""
-        return replace(self, notes=self.notes + notes)
 
 
 def canonical_order(problem: PlacementProblem) -> Integer:
