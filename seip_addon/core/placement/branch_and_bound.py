@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,10 @@ from .instance import SLACK, Instance
 LARGEST = 30_000_000
 """Entries of V up to which the search keeps V as numbers: 120 MB, or twice that where weights are uneven."""
 
-Numbers = NDArray[np.floating]
+MOST_SENSORS = 8
+"""Beyond so many sensors to choose the branches are too many to hope for an end."""
+
+Numbers = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,11 @@ class _Node:
     value: float
     followers: Integer
     gains: Numbers
+
+
+def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
+    """Return whether a search among some candidates of an instance may end in useful time and memory."""
+    return instance.count <= MOST_SENSORS and len(candidates) * len(instance.weight) <= LARGEST
 
 
 def best_reaching(instance: Instance, goal: float, clock: Clock, seconds: float) -> Generator[Progress, None, Found]:

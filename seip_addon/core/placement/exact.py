@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Integer
 from ..progress import Progress
 from .bounds import Bound, can_reach, lagrangian_bound
+from .branch_and_bound import best_reaching, is_worthwhile
 from .clock import Clock
 from .feasibility import starting_choice
 from .greedy import exchange, greedy, greedy_and_exchange, without_idle
@@ -21,6 +22,9 @@ from .ties import canonical_optimum
 
 KERNELS = ((6, 0.15), (12, 0.3))
 """Small programs over the candidates of best scores: how many per sensor, and what share of the time left."""
+
+BRANCHING = 0.6
+"""Share of the time for branch and bound, where that is worthwhile, before programs are tried."""
 
 LARGEST = 1_000_000
 """Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
@@ -47,8 +51,8 @@ def solve(
 
     Reductions that lose nothing come first; a greedy choice improved by
     exchanges gives an incumbent, a Lagrangian relaxation a bound; candidates
-    that the bound rules out are dropped, and an integer program decides among
-    the rest.
+    that the bound rules out are dropped. Among the rest branch and bound
+    decides for few sensors, an integer program for many.
 
     Parameters
     ----------
@@ -165,6 +169,12 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
     chosen = max(chosen, _from_relaxation(instance, bound, chosen), key=instance.covered)
     keep = can_reach(instance, bound, _better(instance, chosen))
+    if len(keep) and is_worthwhile(instance, keep):
+        part = instance.part(keep)
+        found = yield from best_reaching(part, _better(instance, chosen), clock, BRANCHING * clock.left)
+        chosen = keep[found.placements[0]] if found.placements else chosen
+        if found.finished:
+            return Proof(chosen, instance.covered(chosen), optimal=True)
     for factor, share in KERNELS:
         size = factor * max(len(chosen), 1)
         if len(keep) <= size or clock.left <= 0:

@@ -17,13 +17,17 @@ import numpy as np
 from ..arrays import Integer
 from ..progress import Progress
 from .bounds import can_reach, lagrangian_bound
+from .branch_and_bound import all_reaching, best_reaching, is_worthwhile
 from .clock import Clock
 from .greedy import exchange, without_idle, without_weakest
 from .instance import SLACK, Instance
 from .integer_program import reaching
 
-MANY = 12
-"""Ties that are listed one by one; beyond, each stage is a program of its own."""
+MANY = 20_000
+"""Ties that branch and bound lists."""
+
+SOME = 12
+"""Ties that are listed by one program each; beyond, each stage is a program of its own."""
 
 BLOCK = 10
 """Candidates whose order is settled by one program: powers of two up to 512 stay far above all tolerances."""
@@ -62,9 +66,13 @@ def canonical_optimum(
     keep = np.union1d(can_reach(same_number, bound, goal), chosen)
     yield Progress(0, 1, f"breaking ties among {len(keep)} candidates")
     part, within = same_number.part(keep), np.searchsorted(keep, chosen)
+    if is_worthwhile(same_number, keep):
+        listed = yield from all_reaching(part, goal, MANY, clock, clock.left / 2)
+        if listed.finished:
+            return keep[min(listed.placements, key=lambda choice: _merit(part, choice))], True
     equal, all_found = _all_equal(part, within, goal, solver, clock)
     best = min(equal, key=lambda choice: _merit(part, choice))
-    if all_found or len(equal) < MANY:
+    if all_found or len(equal) < SOME:
         return keep[best], all_found
     best, settled = _settle(part, goal, best, solver, clock)
     return keep[best], settled
@@ -85,6 +93,13 @@ def fewest(
         if bound.value < goal - SLACK or len(keep) == 0:
             break
         yield Progress(0, 1, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
+        if is_worthwhile(fewer, keep):
+            found = yield from best_reaching(fewer.part(keep), goal, clock, clock.left / 2)
+            if found.placements:
+                chosen = without_idle(fewer, keep[found.placements[0]], goal)
+                continue
+            if found.finished:
+                break
         outcome = reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
         if outcome.chosen is None:
             return chosen, outcome.finished
@@ -93,14 +108,14 @@ def fewest(
 
 
 def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock: Clock) -> tuple[list[Integer], bool]:
-    """Return the placements that reach the goal, `MANY` at most, and whether these are all.
+    """Return the placements that reach the goal, `SOME` at most, and whether these are all.
 
     Each is found by maximising coverage once more with those before forbidden:
     that prunes far better than any other objective under a coverage to reach.
     """
     program = reaching(part, goal)
     found = [chosen]
-    while len(found) < MANY:
+    while len(found) < SOME:
         program.require(program.number_among(found[-1]) <= len(chosen) - 1)
         outcome = program.maximise_coverage(solver, clock.left)
         if outcome.chosen is None:
