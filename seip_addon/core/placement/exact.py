@@ -201,7 +201,7 @@ def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Integ
     return exchange(instance, picked) if instance.feasible(picked) else chosen
 
 
-def _within_kernel(  # noqa: PLR0913 -- a search has a state, a solver and a limit
+def _within_kernel(
     instance: Instance, bound: Bound, size: int, chosen: Integer, solver: str, seconds: float
 ) -> Integer:
     """Return the best placement among the candidates of best scores, at least as good as the one given."""
@@ -210,9 +210,7 @@ def _within_kernel(  # noqa: PLR0913 -- a search has a state, a solver and a lim
     return chosen if outcome.chosen is None else exchange(instance, keep[outcome.chosen])
 
 
-def _decide(  # noqa: PLR0913 -- a search has a state, a solver and a limit
-    instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float
-) -> Proof:
+def _decide(instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float) -> Proof:
     """Look for a better placement among the candidates that one may contain; that there is none is the proof."""
     outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
     chosen = chosen if outcome.chosen is None else keep[outcome.chosen]

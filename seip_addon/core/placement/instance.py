@@ -90,7 +90,7 @@ class Instance:
     def step(self) -> float:
         """Smallest difference between two covered weights: unit weights allow no value between two counts."""
         times = self.weight / self.weight.min()
-        whole = bool(np.abs(times - np.rint(times)).max() < 1e-6)  # noqa: PLR2004 -- rounding of summed weights
+        whole = bool(np.abs(times - np.rint(times)).max() < 1e-6)
         return max(2 * SLACK, float(self.weight.min()) if whole else 0.0)
 
     @property

@@ -20,8 +20,8 @@ import numpy as np
 import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
-from ..errors import SeipError
 from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
 from .instance import SLACK, Instance
 from .problem import TIE
 

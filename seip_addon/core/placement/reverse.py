@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from ..arrays import Integer
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .clock import Clock
 from .exact import prove, solve
@@ -72,7 +72,7 @@ def cheapest_for_coverage(
     return _record(problem, chosen, bound, best, clock)
 
 
-def _reaching(  # noqa: PLR0913 -- a search has a state, a solver and a limit
+def _reaching(
     problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, Integer]:
     """Return some placement that reaches the goal."""
