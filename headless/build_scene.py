@@ -21,8 +21,8 @@ from headless import session
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.site_description import SiteDescription, read_site_description
-from seip_addon.core.site_model import site_model
+from seip_addon.core.streetscape.description import SiteDescription, read_site_description
+from seip_addon.core.streetscape.model import site_model
 from seip_addon.scene.build import build_scene, save_blend
 
 

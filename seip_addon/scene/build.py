@@ -12,10 +12,10 @@ import shapely
 
 from ..core.errors import SeipError
 from ..core.progress import Progress
-from ..core.site_model import SiteModel
-from ..core.site_parts import Part, Role
 from ..core.storage import digest, whole_file
-from ..core.street_furniture import Solid
+from ..core.streetscape.model import SiteModel
+from ..core.streetscape.parts import Part, Role
+from ..core.streetscape.street_furniture import Solid
 from . import collections
 from .materials import material
 

@@ -38,7 +38,7 @@ COLOURS = {
     "mandatory veil": (0.100, 0.700, 0.250),
     "candidate veil": (0.650, 0.650, 0.600),
 }
-"""Linear RGB of each material that the solids of `core.street_furniture` name."""
+"""Linear RGB of each material that the solids of `core.streetscape.street_furniture` name."""
 
 VEIL_OPACITY = 0.25
 """Of areas that mean something and are not there to be seen in a render."""

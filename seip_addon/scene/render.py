@@ -15,19 +15,16 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..core.errors import SeipError
-from ..core.labelled_view import Sight, save_labelled_view
-from ..core.viewpoint import Viewpoint, frame
+from ..core.pictures.labelled_view import Sight, save_labelled_view
+from ..core.pictures.viewpoint import Viewpoint, frame
 from . import collections as contract
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
-    from ..core.deployment import Deployment
+    from ..core.results.deployment import Deployment
     from ..core.site import Site
 
-    Float = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES = 12

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core.palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
+from ..core.arrays import Float
+from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
 from . import collections as contract
 
 if TYPE_CHECKING:
@@ -16,10 +17,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..core.deployment import Deployment, Sensor
+    from ..core.results.deployment import Deployment, Sensor
     from ..core.site import Site, Targets
 
-    Float = NDArray[np.float64]
 
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.callouts import place_callouts
+from seip_addon.core.pictures.callouts import place_callouts
 
 BOUNDS = (0.0, 0.0, 1000.0, 800.0)
 CLEARANCE = 8.0

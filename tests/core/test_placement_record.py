@@ -8,7 +8,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import Placement
-from seip_addon.core.placement_record import (
+from seip_addon.core.results.placement_record import (
     Run,
     comparable,
     degrees,

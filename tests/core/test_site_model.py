@@ -10,9 +10,9 @@ from street_map import street_map
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
-from seip_addon.core.site_description import Area, Building, Poles, SiteDescription, Trees, WeightedRegion
-from seip_addon.core.site_model import site_model
-from seip_addon.core.site_parts import Role
+from seip_addon.core.streetscape.description import Area, Building, Poles, SiteDescription, Trees, WeightedRegion
+from seip_addon.core.streetscape.model import site_model
+from seip_addon.core.streetscape.parts import Role
 
 MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[3] / "shared" / "opendrive")
 HERE = SiteDescription(near=(0.0, 0.0), radius=30.0)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core import street_furniture as furniture
+from seip_addon.core.streetscape import street_furniture as furniture
 
 SIZES = st.floats(0.5, 40)
 

@@ -8,9 +8,9 @@ from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.site_model import SiteModel
-from seip_addon.core.site_parts import Part, Role
-from seip_addon.core.street_furniture import block, tree
+from seip_addon.core.streetscape.model import SiteModel
+from seip_addon.core.streetscape.parts import Part, Role
+from seip_addon.core.streetscape.street_furniture import block, tree
 from seip_addon.scene import collections as names
 from seip_addon.scene.build import COLLECTIONS, build_scene, save_blend
 from seip_addon.scene.materials import COLOURS

@@ -13,8 +13,8 @@ from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.ray_casting import make_ray_caster
 from seip_addon.core.site import make_site
-from seip_addon.core.site_description import SiteDescription
-from seip_addon.core.site_model import site_model
+from seip_addon.core.streetscape.description import SiteDescription
+from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.visibility import VisibilitySettings, compute_visibility
 from seip_addon.scene import collections as names
 from seip_addon.scene.build import build_scene

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from ..arrays import Float
 
 _ROOTS, _ROOT_WEIGHTS = np.polynomial.legendre.leggauss(16)  # type: ignore[no-untyped-call]  # numpy 1.26 has no types here
 # On the unit interval, where 16 nodes integrate every polynomial up to degree 31 exactly.

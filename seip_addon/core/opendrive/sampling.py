@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Float
 from ..errors import SeipError
 
-Float = NDArray[np.float64]
 Curves = Callable[[Float], Float]
 
 _SHORTEST = 1e-6  # metres; less carries nothing but slivers

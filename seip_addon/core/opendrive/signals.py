@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
+from ..arrays import Float
 from ..errors import SeipError
 from .lanes import ground_elevation
 from .road_map import MapPlace, Road, RoadMap, RoadPlace, RoadSignal
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Boolean, Float
 from .callouts import place_callouts
 from .palette import INK, PAPER, SOFT_INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
-    from .deployment import Deployment
-    from .site import Site
+    from ..results.deployment import Deployment
+    from ..site import Site
 
-    Float = NDArray[np.float64]
-    Boolean = NDArray[np.bool_]
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}

@@ -7,14 +7,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from .opendrive import LaneSurface
+from ..arrays import Float
+from ..opendrive import LaneSurface
 from .terrain import Terrain, cut
-
-Float = NDArray[np.float64]
 
 GROUPS = {
     "driving": "driving", "entry": "driving", "exit": "driving", "onRamp": "driving", "offRamp": "driving",

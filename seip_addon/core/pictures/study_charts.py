@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from .coverage_study import NUMBERS, WEIGHTS, Case, Claim, CoverageStudy
+from ..coverage_study import NUMBERS, WEIGHTS, Case, Claim, CoverageStudy
+from ..storage import whole_file
 from .palette import INK, PAPER, SOFT_INK
-from .storage import whole_file
 
 SERIES = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Colours of sensor types, told apart by colour-blind people (Okabe and Ito 2008)."""

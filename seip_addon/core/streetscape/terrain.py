@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-Float = NDArray[np.float64]
+from ..arrays import Float
 
 LEAST_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""

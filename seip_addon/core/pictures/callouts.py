@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from ..arrays import Float
+
 Bounds = tuple[float, float, float, float]
 
 DIRECTIONS = 16

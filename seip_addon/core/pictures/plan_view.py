@@ -14,23 +14,22 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
+from ..arrays import Float
+from ..storage import whole_file
 from .drawing import SENSOR_MARK, draw_sensors, draw_title, markers_of, percent
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .storage import whole_file
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from .deployment import Deployment
-    from .scene_geometry import Mesh, SceneGeometry
-    from .site import Site
+    from ..results.deployment import Deployment
+    from ..scene_geometry import Mesh, SceneGeometry
+    from ..site import Site
 
-    Float = NDArray[np.float64]
     Style = dict[str, Any]
 
 DPI = 160

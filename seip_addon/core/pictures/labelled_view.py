@@ -11,20 +11,17 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 
+from ..arrays import Boolean, Float
+from ..storage import whole_file
 from .drawing import draw_sensors, draw_title, percent
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .storage import whole_file
 
 if TYPE_CHECKING:
     import os
 
-    from numpy.typing import NDArray
+    from ..results.deployment import Deployment
+    from ..site import Site
 
-    from .deployment import Deployment
-    from .site import Site
-
-    Float = NDArray[np.float64]
-    Boolean = NDArray[np.bool_]
 
 DPI = 160
 HEAD, FOOT, MARGIN = 0.86, 0.42, 0.2  # inches

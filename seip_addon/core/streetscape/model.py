@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from . import road_surface, street_furniture
-from .errors import SeipError
-from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
-from .opendrive import (
+from ..arrays import Float
+from ..errors import SeipError
+from ..opendrive import (
     LaneSurface,
     RoadMap,
     find_junction,
@@ -23,11 +21,11 @@ from .opendrive import (
     placed_objects,
     placed_signals,
 )
-from .site_description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
-from .site_parts import Part, Role
+from . import road_surface, street_furniture
+from .description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
+from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
+from .parts import Part, Role
 from .terrain import Terrain
-
-Float = NDArray[np.float64]
 
 MARGIN = 40.0
 """How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""

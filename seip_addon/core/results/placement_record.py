@@ -15,20 +15,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float
+from ..errors import SeipError
+from ..placement import Placement
+from ..site import Site
+from ..storage import whole_file
 from .deployment import Deployment, Sensor
-from .errors import SeipError
-from .placement import Placement
-from .site import Site
-from .storage import whole_file
 
-Float = NDArray[np.float64]
 Record = dict[str, Any]
 
 SCHEMA = "seip-placement/1"
 LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
-MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
+MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
 
 @dataclass(frozen=True)

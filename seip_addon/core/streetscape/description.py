@@ -15,13 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.validation import explain_validity
 
-from .errors import SeipError
-
-Float = NDArray[np.float64]
+from ..arrays import Float
+from ..errors import SeipError
 
 DEFAULT_RADIUS = 80.0
 DEFAULT_WEIGHT = 2.0
