@@ -1,18 +1,20 @@
-"""End with status 1 where two placement.json differ in more than times and versions."""
+"""End with status 1 where two placement.json differ in more than times and versions, or are not proven optimal."""
 
 import json
 import sys
-from pathlib import Path
+
+from seip_addon.core.results.placement_record import comparable, load_placement_record
 
 
-def comparable(path: str) -> list[str]:
+def lines(path: str) -> list[str]:
     """Lines of a record, without what differs from one machine and run to the next."""
-    record = json.loads(Path(path).read_text(encoding="utf-8"))
-    kept = {key: value for key, value in record.items() if key not in {"times", "versions"}}
-    return json.dumps(kept, indent=1, sort_keys=True).splitlines()
+    record = load_placement_record(path)
+    if record["objective"]["status"] != "optimal":
+        sys.exit(f"{path} is not proven optimal, so that it depends on the machine's speed")
+    return json.dumps(comparable(record), indent=1, sort_keys=True).splitlines()
 
 
-one, other = map(comparable, sys.argv[1:])
+one, other = map(lines, sys.argv[1:])
 differing = [(left, right) for left, right in zip(one, other, strict=False) if left != right]
 if differing or len(one) != len(other):
     sys.exit("\n".join(["the placements differ:", *(f"{left}   |   {right}" for left, right in differing[:20])]))

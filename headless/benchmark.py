@@ -13,13 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ParamSpec
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from headless import session
+from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel, load_catalogue
@@ -30,8 +32,6 @@ from seip_addon.core.site import Site, make_site
 from seip_addon.core.visibility import VisibilitySettings
 from seip_addon.scene.read import read_scene
 
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
 P = ParamSpec("P")
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
@@ -94,7 +94,7 @@ def visibility_costs(
     return costs
 
 
-def cast_rate(caster: RayCaster, origin: NDArray[np.float64], rays: int = 20_000) -> float:
+def cast_rate(caster: RayCaster, origin: Float, rays: int = 20_000) -> float:
     """Return how many rays a second a caster casts, in one thread, in random directions below the horizon."""
     random = np.random.default_rng(0)
     directions = random.normal(size=(rays, 3)) * (1, 1, 0.1)

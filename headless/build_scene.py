@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import sys
 from pathlib import Path
 
@@ -16,11 +17,12 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session
+
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.site_description import SiteDescription, read_site_description
-from seip_addon.core.site_model import site_model
+from seip_addon.core.streetscape.description import SiteDescription, read_site_description
+from seip_addon.core.streetscape.model import site_model
 from seip_addon.scene.build import build_scene, save_blend
 
 
@@ -70,9 +72,11 @@ def _description(asked: argparse.Namespace) -> SiteDescription:
         description = dataclasses.replace(described, map=asked.source)
     if asked.near is not None or asked.junction is not None:
         near = None if asked.near is None else (asked.near[0], asked.near[1])
+        if near is not None and not all(map(math.isfinite, near)):
+            raise SeipError("--near must be two numbers, x and y in metres")
         description = dataclasses.replace(description, near=near, junction=asked.junction, region=None)
     if asked.radius is not None:
-        if not 0 < asked.radius < float("inf"):
+        if not 0 < asked.radius < math.inf:
             raise SeipError(f"--radius must be above 0 m, not {asked.radius:g}")
         description = dataclasses.replace(description, radius=asked.radius, region=None)
     return description

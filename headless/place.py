@@ -20,23 +20,25 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session
 
 import bpy
 import numpy as np
 
-from headless import session
-from seip_addon.core.candidate_table import save_candidate_table
 from seip_addon.core.candidates import CandidateSettings
-from seip_addon.core.carla import save_carla_spawns
-from seip_addon.core.deployment import Deployment, deploy
 from seip_addon.core.goal import DEFAULT_COUNT, Goal, placement_problem, reach
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.needed_triangles import triangles_sentence
+from seip_addon.core.pictures.plan_view import save_plan_view
 from seip_addon.core.placement import Placement, solve_greedy
-from seip_addon.core.placement_record import Record, Run, placement_record, save_placement_record, versions
-from seip_addon.core.plan_view import save_plan_view
 from seip_addon.core.progress import Progress, finish
+from seip_addon.core.results.candidate_table import save_candidate_table
+from seip_addon.core.results.carla import save_carla_spawns
+from seip_addon.core.results.deployment import Deployment, deploy
+from seip_addon.core.results.placement_record import Record, Run, placement_record, save_placement_record, versions
 from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site, make_site

@@ -11,9 +11,10 @@ import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
+from headless.system_libraries import complaint, missing_libraries
+
 from tqdm import tqdm
 
-from headless.system_libraries import complaint, missing_libraries
 from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import whole_file
 

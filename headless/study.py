@@ -10,19 +10,21 @@ import argparse
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session
 
 import bpy
 
-from headless import session
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.coverage_study import NUMBERS, coverage_study, judge
 from seip_addon.core.lidar import find_models, load_catalogue
-from seip_addon.core.plan_view import save_plan_view
+from seip_addon.core.pictures.plan_view import save_plan_view
+from seip_addon.core.pictures.study_charts import save_claims, save_height_chart, save_study_table, save_weight_chart
 from seip_addon.core.progress import finish
 from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.site import make_site
-from seip_addon.core.study_charts import save_claims, save_height_chart, save_study_table, save_weight_chart
 from seip_addon.core.visibility import VisibilitySettings
 from seip_addon.core.visibility_store import stored_visibility
 from seip_addon.scene.read import read_scene

@@ -32,14 +32,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Float, Integer
 from .lidar import LidarModel
 from .near_surfaces import NearSurfaces
-
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
 
 _MARGIN = 1e-9  # radians; a ray too many costs a cast, a ray too few a wrong grid
 

@@ -7,16 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from .arrays import Boolean, Float, Integer, Text
 from .errors import SeipError
-from .scene_geometry import Float, Mesh, NamedArea, Pole, SceneGeometry
+from .scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 from .targets import surface_height
-
-Boolean = NDArray[np.bool_]
-Integer = NDArray[np.int64]
-Text = NDArray[np.str_]
 
 _POST_FOOT = 0.3
 """Metres above the ground from which a post must keep clear: kerbs and plinths are no walls."""

@@ -14,11 +14,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .deployment import Deployment, deploy
 from .goal import Goal, placement_problem
 from .lidar import LidarModel
 from .placement import Placement, solve, solve_greedy
 from .progress import Progress, within
+from .results.deployment import Deployment, deploy
 from .site import Site
 
 NUMBERS = (1, 2, 4)

@@ -130,7 +130,7 @@ def reach(
 
 def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
     """Positions of that name, (p,) bool."""
-    found = candidates.position_name == name
+    found: NDArray[np.bool_] = candidates.position_name == name
     if not found.any():
         raise SeipError(f"there is no position {name!r}{_close(name, candidates.position_name.tolist())}")
     return found

@@ -14,10 +14,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
+from .arrays import Float, Integer
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 

@@ -14,12 +14,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Float
 from .near_surfaces import caster_tolerance
-
-Float = NDArray[np.float64]
-Boolean = NDArray[np.bool_]
 
 _ROUNDNESS = 1.01  # how much farther than δ the corners of the polygon lie that stands for a circle
 

@@ -15,12 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Float
 from .beam_culling import Beams, NearRays, Planes
-
-Float = NDArray[np.float64]
-Boolean = NDArray[np.bool_]
 
 
 def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, planes: Planes) -> Boolean:

@@ -14,13 +14,10 @@ from contextlib import contextmanager
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Float, Integer
 from .errors import SeipError
 
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
 Engine = Literal["auto", "bvh", "embree"]
 
 # Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray

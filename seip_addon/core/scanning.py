@@ -17,18 +17,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Float, Integer
 from .beam_culling import Beams, NearRays, disc_patches, near_rays, target_patches
 from .lidar import BeamPattern, LidarModel, return_intensity
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
 from .ray_casting import RayCaster
 from .target_index import TargetIndex
-
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
 

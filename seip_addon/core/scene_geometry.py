@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-Float = NDArray[np.float64]
+from .arrays import Float
 
 
 @dataclass(frozen=True, eq=False)

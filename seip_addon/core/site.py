@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
+from .arrays import Float
 from .candidates import Candidates, CandidateSettings, lay_candidates
 from .errors import SeipError
-from .scene_geometry import Float, SceneGeometry
+from .scene_geometry import SceneGeometry
 from .targets import Targets, lay_targets
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]

@@ -10,8 +10,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from .arrays import Float
 from .errors import SeipError
-from .scene_geometry import Float, NamedArea
+from .scene_geometry import NamedArea
 
 MAX_TARGETS = 2_000_000
 """A grid beyond this is a slip of the keyboard, not a plan."""

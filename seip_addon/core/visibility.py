@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Boolean, Float, Integer
 from .errors import SeipError
 from .lidar import LidarModel, find_models
 from .needed_triangles import needed_triangles
@@ -31,9 +32,6 @@ from .scanning import Place, seen_by_all_rays
 from .site import Site
 from .storage import digest, whole_file
 from .work_force import ObserverTask, cluster, threads_of
-
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
 
 SCHEMA = "seip.visibility"
 SCHEMA_VERSION = 1
@@ -93,7 +91,7 @@ class VisibilityGrid:
         times: Integer = rows.sum(axis=0, dtype=np.int64)
         return times
 
-    def coverage(self, poses: Integer, weight: NDArray[np.float64] | None = None) -> float:
+    def coverage(self, poses: Integer, weight: Float | None = None) -> float:
         """Return the share of targets that at least one of the given poses sees, 0 to 1.
 
         Parameters

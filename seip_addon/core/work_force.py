@@ -8,16 +8,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Integer
 from .errors import SeipError
 from .lidar import LidarModel
 from .observer import Observer, Rows
 from .ray_casting import Engine, make_ray_caster
 from .site import Site
 
-Integer = NDArray[np.int64]
 Submit = Callable[[Integer], Future[Rows]]
 
 _SECONDS_FOR_AN_ANSWER = 20
@@ -44,7 +42,7 @@ class ObserverTask:
     delta: float
     min_intensity: float
     engine: Engine
-    keep: NDArray[np.bool_]
+    keep: Boolean
 
 
 @contextmanager

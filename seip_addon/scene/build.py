@@ -8,14 +8,14 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
+import shapely
 
 from ..core.errors import SeipError
 from ..core.progress import Progress
-from ..core.site_model import SiteModel
-from ..core.site_parts import Part, Role
 from ..core.storage import digest, whole_file
-from ..core.street_furniture import Solid
+from ..core.streetscape.model import SiteModel
+from ..core.streetscape.parts import Part, Role
+from ..core.streetscape.street_furniture import Solid
 from . import collections
 from .materials import material
 
@@ -34,13 +34,15 @@ COLLECTIONS = {
     Role.MANDATORY_AREAS: collections.MANDATORY_AREAS,
     Role.DRESSING: DRESSING,
 }
-OUTLINES = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDATORY_AREAS}
-"""Roles whose parts mean their outline alone: drawn as wire and not rendered."""
+VEILS = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDATORY_AREAS, Role.CANDIDATE_AREAS}
+"""Parts that have no other roles mean an area: the viewport shows them, a render does not."""
 
 STEP = 50
 CAMERA_AZIMUTH = math.radians(-125.0)
 CAMERA_ELEVATION = math.radians(48.0)
 LENS = 40.0
+FRAME = 3.0
+"""Margin (metres) around the region in the camera's view."""
 SUN_ELEVATION, SUN_AZIMUTH = math.radians(48.0), math.radians(-60.0)
 SKY = (0.62, 0.70, 0.80, 1.0)
 
@@ -78,6 +80,7 @@ def build_scene(model: SiteModel, map_name: str) -> Generator[Progress, None, bp
     yield Progress(len(model.parts), len(model.parts), "objects")
     _light(scene)
     _frame(scene, model)
+    _set_up_views()
     return scene
 
 
@@ -98,6 +101,7 @@ def save_blend(path: Path) -> None:
 
 def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     """Write what the scene contract asks for, and metres, into the scene."""
+    scene[collections.TITLE] = model.name
     scene[collections.ORIGIN] = model.origin.tolist()
     scene[collections.MAP] = map_name
     scene[collections.GEO_REFERENCE] = model.geo_reference or ""
@@ -117,9 +121,7 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     thing.rotation_euler = (0.0, 0.0, part.yaw)
     if part.weight is not None:
         thing[collections.WEIGHT] = part.weight
-    if OUTLINES.intersection(part.roles) or part.roles == (Role.CANDIDATE_AREAS,):
-        thing.display_type = "WIRE"
-        thing.hide_render = True
+    thing.hide_render = VEILS.issuperset(part.roles)
     for role in part.roles:
         collections.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)
 
@@ -146,7 +148,8 @@ def _light(scene: bpy.types.Scene) -> None:
     thing.location = (0.0, 0.0, 60.0)
     collections.find_or_make(scene, VIEW).objects.link(thing)
     world = bpy.data.worlds.new("Sky")
-    world.use_nodes = True
+    if world.node_tree is None:  # from Blender 5.0 on nodes are always there
+        world.use_nodes = True
     world.color = SKY[:3]
     sky = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
     sky.inputs["Color"].default_value = SKY
@@ -155,29 +158,31 @@ def _light(scene: bpy.types.Scene) -> None:
 
 
 def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
-    """Add a camera that sees the region from above at a slant, and settings under which it looks good at once."""
-    x_low, y_low, x_high, y_high = model.region.bounds
-    middle = Vector(((x_low + x_high) / 2, (y_low + y_high) / 2, 0.0))
-    radius = math.hypot(x_high - x_low, y_high - y_low) / 2
+    """Add a camera that sees all of the region at a slant, and settings under which it looks good at once."""
+    scene.render.resolution_x, scene.render.resolution_y = 1600, 900
     camera = bpy.data.cameras.new("Overview")
     camera.lens = LENS
     camera.clip_end = 5000.0
     thing = bpy.data.objects.new("Overview", camera)
-    distance = 0.9 * radius / math.tan(camera.angle / 2)
-    direction = Vector(
-        (
-            math.cos(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),
-            math.sin(CAMERA_AZIMUTH) * math.cos(CAMERA_ELEVATION),
-            math.sin(CAMERA_ELEVATION),
-        )
-    )
-    thing.location = middle + distance * direction
-    thing.rotation_euler = (-direction).to_track_quat("-Z", "Y").to_euler()
+    thing.rotation_euler = (math.pi / 2 - CAMERA_ELEVATION, 0.0, CAMERA_AZIMUTH + math.pi / 2)
     collections.find_or_make(scene, VIEW).objects.link(thing)
     scene.camera = thing
-    scene.render.resolution_x, scene.render.resolution_y = 1600, 900
+    bpy.context.view_layer.update()
+    outline = shapely.get_coordinates(model.region.convex_hull.buffer(FRAME))
+    corners = np.column_stack([outline, np.zeros(len(outline))])
+    thing.location, _ = thing.camera_fit_coords(bpy.context.evaluated_depsgraph_get(), corners.ravel().tolist())
     scene.view_settings.view_transform = "Standard"
     shading = scene.display.shading
     shading.light, shading.color_type = "STUDIO", "MATERIAL"
     shading.show_shadows = shading.show_cavity = True
-    scene.display.light_direction = (-0.45, -0.40, 0.80)
+    shading.shadow_intensity = 0.35
+    scene.display.light_direction = (-0.45, 0.80, 0.40)  # here y is up
+
+
+def _set_up_views() -> None:
+    """Let every 3D view look through the camera, in the materials' colours and far enough."""
+    views = (area.spaces.active for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    for view in views:
+        view.clip_end = 5000.0
+        view.shading.color_type = "MATERIAL"
+        view.region_3d.view_perspective = "CAMERA"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 PREFIX = "SEIP "
+VIEWPORT_GAMMA = 0.65  # the viewport's studio light is dimmer than the sun
 
 COLOURS = {
     "asphalt": (0.085, 0.087, 0.090),
@@ -31,9 +32,16 @@ COLOURS = {
     "green lamp": (0.020, 0.190, 0.090),
     "bark": (0.160, 0.110, 0.075),
     "leaves": (0.105, 0.210, 0.065),
-    "outline": (0.100, 0.450, 0.900),
+    "region veil": (0.100, 0.450, 0.900),
+    "weighted veil": (0.950, 0.600, 0.100),
+    "forbidden veil": (0.900, 0.100, 0.100),
+    "mandatory veil": (0.100, 0.700, 0.250),
+    "candidate veil": (0.650, 0.650, 0.600),
 }
-"""Linear RGB of each material that the solids of `core.street_furniture` name."""
+"""Linear RGB of each material that the solids of `core.streetscape.street_furniture` name."""
+
+VEIL_OPACITY = 0.25
+"""Of areas that mean something and are not there to be seen in a render."""
 
 ROUGHNESS = {"glass": 0.15, "steel": 0.4}
 
@@ -45,9 +53,11 @@ def material(name: str) -> bpy.types.Material:
         return existing
     made = bpy.data.materials.new(PREFIX + name)
     colour = (*COLOURS[name], 1.0)
-    made.diffuse_color = colour
+    opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
+    made.diffuse_color = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
     made.roughness = ROUGHNESS.get(name, 0.9)
-    made.use_nodes = True
+    if made.node_tree is None:  # from Blender 5.0 on nodes are always there
+        made.use_nodes = True
     surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     surface.inputs["Base Color"].default_value = colour
     surface.inputs["Roughness"].default_value = made.roughness

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..core.arrays import Float
 from ..core.candidates import plan_outline
 from ..core.errors import SeipError
-from ..core.scene_geometry import Float, Mesh, NamedArea, Pole, SceneGeometry
+from ..core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 from . import collections as names
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}

@@ -12,28 +12,26 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from ..core.errors import SeipError
-from ..core.labelled_view import save_labelled_view
-from ..core.viewpoint import Viewpoint, frame
+from ..core.pictures.labelled_view import Sight, save_labelled_view
+from ..core.pictures.viewpoint import Viewpoint, frame
 from . import collections as contract
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
-    from ..core.deployment import Deployment
+    from ..core.results.deployment import Deployment
     from ..core.site import Site
 
-    Float = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1440, 810  # pixels
-SAMPLES = 16
-AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(48.0)  # of the camera, seen from the region
+SAMPLES = 12
+AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, seen from the region
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
+SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
 SUN_DIRECTION = (math.radians(38.0), math.radians(-18.0), math.radians(20.0))
 AREAS = {
     contract.REGION,
@@ -72,8 +70,8 @@ def save_rendered_view(
         _set_up(stage, raw)
         with _silence():
             bpy.ops.render.render(scene=stage.name, write_still=True)
-        sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
-        save_labelled_view(path, raw, site, deployment, viewpoint.project(sensors))
+        sight = _sight(stage, viewpoint, site, deployment)
+        save_labelled_view(path, raw, site, deployment, sight)
 
 
 @contextmanager
@@ -172,4 +170,17 @@ def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
     stage.cycles.seed = 0
     stage.cycles.use_adaptive_sampling = False
     stage.cycles.use_denoising = False
-    stage.cycles.max_bounces = 3
+    stage.cycles.max_bounces = 2
+
+
+def _sight(stage: bpy.types.Scene, viewpoint: Viewpoint, site: Site, deployment: Deployment) -> Sight:
+    """Return where sensors and targets are on the picture, and which sensors something stands in front of."""
+    sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
+    layer = stage.view_layers[0]
+    layer.update()
+    start = Vector(viewpoint.place)
+    ways = [Vector(sensor) - start for sensor in sensors]
+    hidden = [
+        stage.ray_cast(layer.depsgraph, start, way.normalized(), distance=way.length - SENSOR_ROOM)[0] for way in ways
+    ]
+    return Sight(viewpoint.project(sensors), np.array(hidden, dtype=bool), viewpoint.project(site.targets.xyz))

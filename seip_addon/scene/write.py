@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core.palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
+from ..core.arrays import Float
+from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
 from . import collections as contract
 
 if TYPE_CHECKING:
@@ -16,15 +17,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..core.deployment import Deployment, Sensor
+    from ..core.results.deployment import Deployment, Sensor
     from ..core.site import Site, Targets
 
-    Float = NDArray[np.float64]
 
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
 
-LIFT = 0.03  # metres above the road, against flicker
+LIFT = 0.08  # metres above the road, against flicker in a viewport that shows the whole site
 BODY_RADIUS, BODY_HEIGHT = 0.12, 0.22  # metres; somewhat larger than life
 POST_RADIUS, BRACKET_RADIUS = 0.06, 0.03  # metres
 SIDES = 16

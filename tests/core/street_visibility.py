@@ -6,6 +6,9 @@ import numpy as np
 
 from seip_addon.core.placement import PlacementProblem
 
+SIGHT = 110.0
+"""Metres beyond which no sensor of these streets sees."""
+
 
 def street_problem(
     positions: int, targets: int, seed: int = 0, heights: int = 3, blocks: int = 3, **limits: object
@@ -21,7 +24,7 @@ def street_problem(
         [_on_kerbs(rng, 12 * blocks * blocks, extent, pitch, width * 0.5), rng.uniform(0.8, 2.5, 12 * blocks * blocks)]
     )
     distance = np.hypot(*(posts[:, None] - points[None]).transpose(2, 0, 1))
-    hidden = _behind_boxes(posts, points, buildings) | _behind_discs(posts, points, trees)
+    hidden = _hidden(posts, points, buildings, trees)
     visible, xyz = [], []
     for level in range(heights):
         height = 3.5 + 2.25 * level
@@ -67,28 +70,32 @@ def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float
     return np.array(boxes)
 
 
-def _behind_boxes(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    hidden = np.zeros((len(posts), len(points)), bool)
-    for row, post in zip(hidden, posts, strict=True):
-        step = points - post
-        step = np.where(np.abs(step) < 1e-9, 1e-9, step)
-        for box in boxes:
-            first, second = (box[:2] - post) / step, (box[2:] - post) / step
-            enter = np.minimum(first, second).max(axis=1)
-            leave = np.maximum(first, second).min(axis=1)
-            row |= (enter < leave) & (leave > 0) & (enter < 1)
+def _hidden(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray, discs: np.ndarray) -> np.ndarray:
+    """Return whether a building or a tree stands between post and point; beyond `SIGHT` everything is hidden."""
+    hidden = np.ones((len(posts), len(points)), bool)
+    for index, post in enumerate(posts):
+        near = np.flatnonzero(np.hypot(*(points - post).T) < SIGHT)
+        step = points[near] - post
+        step[np.abs(step) < 1e-9] = 1e-9
+        hidden[index, near] = _behind_boxes(step, boxes - np.tile(post, 2)) | _behind_discs(step, discs - [*post, 0.0])
     return hidden
 
 
-def _behind_discs(posts: np.ndarray, points: np.ndarray, discs: np.ndarray) -> np.ndarray:
-    hidden = np.zeros((len(posts), len(points)), bool)
-    for row, post in zip(hidden, posts, strict=True):
-        step = points - post
-        length = (step**2).sum(axis=1)
-        for x, y, radius in discs:
-            centre = np.array([x, y]) - post
-            if np.hypot(*centre) < radius + 0.5:
-                continue
-            share = np.clip(step @ centre / length, 0, 1)
-            row |= np.hypot(*(share[:, None] * step - centre).T) < radius
+def _behind_boxes(step: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    hidden = np.zeros(len(step), bool)
+    for box in boxes[(np.minimum(np.abs(boxes[:, :2]), np.abs(boxes[:, 2:])) < SIGHT).all(axis=1)]:
+        first, second = box[:2] / step, box[2:] / step
+        enter = np.minimum(first, second).max(axis=1)
+        leave = np.maximum(first, second).min(axis=1)
+        hidden |= (enter < leave) & (leave > 0) & (enter < 1)
+    return hidden
+
+
+def _behind_discs(step: np.ndarray, discs: np.ndarray) -> np.ndarray:
+    hidden = np.zeros(len(step), bool)
+    length = (step**2).sum(axis=1)
+    distance = np.hypot(discs[:, 0], discs[:, 1])
+    for x, y, radius in discs[(distance > discs[:, 2] + 0.5) & (distance < SIGHT)]:
+        share = np.clip(step @ [x, y] / length, 0, 1)
+        hidden |= np.hypot(*(share[:, None] * step - [x, y]).T) < radius
     return hidden

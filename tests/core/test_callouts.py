@@ -2,10 +2,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.callouts import place_callouts
+from seip_addon.core.pictures.callouts import place_callouts
 
 BOUNDS = (0.0, 0.0, 1000.0, 800.0)
 CLEARANCE = 8.0
+NOWHERE = np.empty((0, 2))
 
 
 def overlap(low_a, high_a, low_b, high_b):
@@ -18,7 +19,7 @@ def test_with_room_no_label_hides_an_anchor_or_another_label_or_leaves_the_pictu
     random = np.random.default_rng(seed)
     anchors = random.uniform((100, 100), (900, 700), (count, 2))
     sizes = random.uniform((60, 15), (100, 25), (count, 2))
-    centres = place_callouts(anchors, sizes, BOUNDS, CLEARANCE)
+    centres = place_callouts(anchors, sizes, BOUNDS, CLEARANCE, NOWHERE)
     low, high = centres - sizes / 2, centres + sizes / 2
     assert np.all((low >= (0, 0)) & (high <= (1000, 800)))
     for i in range(count):
@@ -31,16 +32,24 @@ def test_with_room_no_label_hides_an_anchor_or_another_label_or_leaves_the_pictu
 def test_without_room_labels_stay_in_the_picture():
     anchors = np.full((40, 2), 50.0)
     sizes = np.full((40, 2), 60.0)
-    centres = place_callouts(anchors, sizes, (0.0, 0.0, 100.0, 100.0), CLEARANCE)
+    centres = place_callouts(anchors, sizes, (0.0, 0.0, 100.0, 100.0), CLEARANCE, NOWHERE)
     assert np.all((centres >= 30) & (centres <= 70))
 
 
 def test_a_label_goes_outwards():
     anchors = np.array([(300.0, 400.0), (700.0, 400.0)])
-    centres = place_callouts(anchors, np.full((2, 2), 40.0), BOUNDS, CLEARANCE)
+    centres = place_callouts(anchors, np.full((2, 2), 40.0), BOUNDS, CLEARANCE, NOWHERE)
     assert centres[0, 0] < 300
     assert centres[1, 0] > 700
 
 
+def test_a_label_keeps_off_the_subject_where_there_is_room_next_to_it():
+    x, y = np.meshgrid(np.arange(0.0, 500.0, 5.0), np.arange(0.0, 800.0, 5.0))
+    subject = np.column_stack((x.ravel(), y.ravel()))
+    anchors = np.array([(480.0, 400.0), (900.0, 400.0)])  # outwards is over the subject
+    centres = place_callouts(anchors, np.full((2, 2), 40.0), BOUNDS, CLEARANCE, subject)
+    assert centres[0, 0] - 20.0 > 495.0
+
+
 def test_nothing_to_label():
-    assert place_callouts(np.empty((0, 2)), np.empty((0, 2)), BOUNDS, CLEARANCE).shape == (0, 2)
+    assert place_callouts(np.empty((0, 2)), np.empty((0, 2)), BOUNDS, CLEARANCE, NOWHERE).shape == (0, 2)

@@ -3,7 +3,7 @@ import csv
 import numpy as np
 import pytest
 
-from seip_addon.core.candidate_table import COLUMNS, save_candidate_table
+from seip_addon.core.results.candidate_table import COLUMNS, save_candidate_table
 from tests.small_junction import make_example
 
 

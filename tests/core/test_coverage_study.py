@@ -7,8 +7,8 @@ import pytest
 from small_junction import make_example
 
 from seip_addon.core.coverage_study import NUMBERS, WEIGHTS, CoverageStudy, coverage_study, judge
+from seip_addon.core.pictures.study_charts import save_claims, save_height_chart, save_study_table, save_weight_chart
 from seip_addon.core.progress import finish
-from seip_addon.core.study_charts import save_claims, save_height_chart, save_study_table, save_weight_chart
 
 
 @pytest.fixture(scope="module")

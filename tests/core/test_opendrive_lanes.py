@@ -251,6 +251,32 @@ def test_an_area_never_loses_a_road_that_meets_it(folder, shape, x, y, size):
     assert bool(lane_surfaces(road_map, area=area)) == meets
 
 
+def test_an_area_far_from_the_reference_line_meets_a_wide_lane(folder):
+    wide = road(geometry(length=5.0), section(lane(1, 60.0)))
+    assert len(surfaces(folder, wide, area=shapely.box(0, 55, 1, 56))) == 1
+    assert surfaces(folder, wide, area=shapely.box(0, 61, 1, 62)) == ()
+
+
+CUBIC = 'aU="0" bU="{}" cU="0" dU="0" aV="0" bV="0" cV="{}" dV="0"'
+
+
+@pytest.mark.parametrize(
+    ("shape", "end"),
+    [
+        ("<line/>", (20, 0)),
+        ('<arc curvature="0.05"/>', (20 * math.sin(1), 20 - 20 * math.cos(1))),
+        ('<spiral curvStart="0.05" curvEnd="0.05"/>', (20 * math.sin(1), 20 - 20 * math.cos(1))),
+        ('<poly3 a="0" b="0.75" c="0" d="0"/>', (16, 12)),
+        (f"<paramPoly3 {CUBIC.format(18, 7)}/>", (18, 7)),
+        (f'<paramPoly3 pRange="normalized" {CUBIC.format(18, 7)}/>', (18, 7)),
+        (f'<paramPoly3 pRange="arcLength" {CUBIC.format(0.9, 0.02)}/>', (18, 8)),
+    ],
+)
+def test_each_geometry_ends_where_its_numbers_say(folder, shape, end):
+    (surface,) = surfaces(folder, road(geometry(shape, 20.0)))
+    np.testing.assert_allclose(surface.left[-1], [*end, 0], atol=1e-8)
+
+
 def test_the_area_of_a_junction_is_the_union_of_its_lanes(folder):
     both = section(lane(1), lane(-1))
     found = surfaces(

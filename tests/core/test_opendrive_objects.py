@@ -98,6 +98,17 @@ def test_the_outline_moves_along_with_each_copy(tmp_path, corner):
     np.testing.assert_allclose([copy.outlines[0].base for copy in copies], expected)
 
 
+def test_a_row_has_from_its_object_what_it_does_not_say(tmp_path):
+    text = (
+        '<object id="1" s="30" t="2" zOffset="0.5" height="4" width="1" length="3" radius="0.5">'
+        '<repeat length="10" distance="10"/></object>'
+    )
+    first, last = objects(tmp_path, text)
+    np.testing.assert_allclose([first.position, last.position], [[30, 2, 0.5], [40, 2, 0.5]])
+    for copy in (first, last):
+        assert (copy.height, copy.width, copy.length, copy.radius) == (4, 1, 3, 0.5)
+
+
 def test_a_row_ends_with_its_road(tmp_path):
     text = '<object id="1" s="0" t="0"><repeat s="90" length="1000" distance="4"/></object>'
     assert [thing.position[0] for thing in objects(tmp_path, text)] == pytest.approx([90, 94, 98])

@@ -1,11 +1,22 @@
 """What a file may look like, and what is said of one that cannot be read."""
 
+import re
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from opendrive_text import document, geometry, lane, read_text, road, section
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.opendrive import find_junction, lane_surfaces, nearest_junctions, read_map
+from seip_addon.core.opendrive import (
+    find_junction,
+    lane_surfaces,
+    nearest_junctions,
+    placed_objects,
+    placed_signals,
+    read_map,
+)
 
 
 def test_the_header_is_kept_and_not_applied(tmp_path):
@@ -180,3 +191,52 @@ def test_the_nearest_junctions_come_first(three_junctions):
     assert [junction.id for junction, _ in found] == ["701", "702"]
     assert [distance for _, distance in found] == pytest.approx([np.hypot(30, 4), np.hypot(50, 4)])
     assert len(nearest_junctions(*three_junctions, 0.0, 0.0, 99)) == 3
+
+
+EVERYTHING = document(
+    road(
+        geometry('<poly3 a="0.1" b="0.1" c="0.001" d="-0.0001"/>', 30.0)
+        + geometry(
+            '<paramPoly3 pRange="arcLength" aU="0" bU="1" cU="0" dU="-0.001" aV="0" bV="0.2" cV="0.01" dV="0"/>',
+            20.0,
+            s=30.0,
+            x=30.0,
+        )
+        + geometry('<spiral curvStart="0.1" curvEnd="-0.02"/>', 30.0, s=50.0, x=50.0)
+        + geometry('<arc curvature="0.05"/>', 20.0, s=80.0, x=80.0),
+        section(
+            lane(1, inside='<height sOffset="0" inner="0.1" outer="0.2"/><height sOffset="10" inner="0" outer="0"/>'),
+            lane(-1, None, inside='<border sOffset="0" a="3" b="0.1" c="0" d="0"/>'),
+            lane(-2, level="true"),
+        )
+        + section(lane(1), s=40.0),
+        offset='<laneOffset s="0" a="0" b="0.1" c="0" d="0"/>',
+        elevation='<elevation s="0" a="0" b="0.1" c="0.001" d="0"/>',
+        lateral='<superelevation s="0" a="0.1" b="0.001" c="0" d="0"/><crossfall s="0" side="left" a="0.02"/>'
+        '<shape s="0" t="-4" a="0" b="0.1" c="0" d="0"/><shape s="30" t="-4" a="0" b="0.1" c="0" d="0"/>',
+        objects='<object id="1" s="5" t="9" zOffset="0" hdg="1" pitch="0" roll="0" length="4" width="2" height="3">'
+        '<repeat s="5" length="40" distance="8" tStart="9" tEnd="12" zOffsetStart="0" zOffsetEnd="1"/>'
+        '<repeat s="5" length="40" distance="0" widthStart="1" widthEnd="2" heightStart="1" heightEnd="2"/>'
+        '<outline closed="true"><cornerLocal u="1" v="2" z="3"/><cornerRoad s="7" t="8" dz="0.5" height="2"/></outline>'
+        "</object>",
+        signals='<signal id="1" s="10" t="-5" zOffset="2" hOffset="0.1" height="1" width="1"/>',
+    )
+)
+VALUES = [match.span(1) for match in re.finditer(r'(?<![a-z])[a-zA-Z]+="([^"]*)"', EVERYTHING)]
+
+WRONG = ["0", "-1", "0.5", "3", "1e5", "1e9", "-1e9", "1e-300", "1e300", "nan", "-inf", "x", ""]
+
+
+@given(st.sampled_from(VALUES), st.sampled_from(WRONG))
+@settings(max_examples=200)
+def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, value):
+    text = EVERYTHING[: span[0]] + value + EVERYTHING[span[1] :]
+    folder = tmp_path_factory.getbasetemp()
+    try:
+        road_map = read_text(folder, text, "mutant.xodr")
+        surfaces = lane_surfaces(road_map)
+        things = (*placed_objects(road_map), *placed_signals(road_map))
+    except SeipError:
+        return
+    assert all(np.isfinite(surface.triangles).all() for surface in surfaces)
+    assert all(np.isfinite(thing.position).all() for thing in things)

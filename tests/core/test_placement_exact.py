@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,16 +12,17 @@ from hypothesis import strategies as st
 from placement_oracle import all_placements, covered, merit, small_problems
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, solve, solve_greedy
+from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, solve, solve_greedy, ties
 from seip_addon.core.progress import finish
 
 thorough = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 quick = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 
 
+@pytest.mark.parametrize("listed", [1, ties.MANY], ids=["ties by programs", "ties listed"])
 @thorough
 @given(st.data())
-def test_equals_exhaustive_search_in_every_stage(data: st.DataObject) -> None:
+def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObject) -> None:
     problem = accepted(data, small_problems())
     feasible = all_placements(problem)
     if not feasible:
@@ -28,7 +30,8 @@ def test_equals_exhaustive_search_in_every_stage(data: st.DataObject) -> None:
             finish(solve(problem))
         return
     best = min(feasible, key=lambda choice: merit(problem, choice))
-    found = finish(solve(problem))
+    with patch.object(ties, "MANY", listed):
+        found = finish(solve(problem))
     assert found.status == "optimal"
     assert merit(problem, tuple(found.chosen)) == merit(problem, best)
     assert found.objective == found.bound == pytest.approx(covered(problem, best))

@@ -1,6 +1,5 @@
 import json
 import math
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -8,7 +7,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement_record import (
+from seip_addon.core.placement import Placement
+from seip_addon.core.results.placement_record import (
     Run,
     comparable,
     degrees,
@@ -23,15 +23,9 @@ from tests.small_junction import Example, make_example
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
 
 
-@dataclass(frozen=True)
-class Solution:
-    chosen: np.ndarray
-    objective: float
-    bound: float
-    gap: float
-    status: str = "feasible"
-    solver: str = "highs 1.15.1"
-    notes: tuple[str, ...] = ("asked for 4, 3 suffice",)
+def solution(chosen, **values) -> Placement:
+    more = {"status": "feasible", "solver": "HiGHS", "seconds": 0.5, "covered": values["objective"], "price": 0.0}
+    return Placement(chosen=np.array(chosen), seen_by=np.zeros(0, np.int64), notes=("3 suffice",), **{**more, **values})
 
 
 @pytest.fixture(scope="module")
@@ -52,10 +46,10 @@ def run() -> Run:
 
 
 def make_record(example, run, **changes):
-    values = {"chosen": np.array([s.pose for s in example.deployment.sensors]), "objective": 512.0, "bound": 530.5}
-    solution = Solution(**{**values, "gap": 18.5 / 512.0, **changes})
-    greedy = Solution(np.array([1, 2, 3]), objective=500.0, bound=531.0, gap=0.05)
-    return placement_record(example.site, example.deployment, solution, run, weighted=False, greedy=greedy)
+    values = {"objective": 512.0, "bound": 530.5, "gap": 18.5 / 512.0, **changes}
+    best = solution([sensor.pose for sensor in example.deployment.sensors], **values)
+    greedy = solution([1, 2, 3], objective=500.0, bound=531.0, gap=0.05)
+    return placement_record(example.site, example.deployment, best, run, weighted=False, greedy=greedy)
 
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
@@ -124,7 +118,7 @@ def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(SeipError, match="nothing.json"):
+    with pytest.raises(SeipError, match="No such file"):
         load_placement_record(tmp_path / "nothing.json")
 
 

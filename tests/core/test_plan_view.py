@@ -1,13 +1,14 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
+import shapely
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from seip_addon.core.deployment import deploy
-from seip_addon.core.drawing import markers_of, percent, summary
-from seip_addon.core.palette import SEEN_COLOURS
-from seip_addon.core.plan_view import draw_plan, save_plan_view
+from seip_addon.core.pictures.drawing import markers_of, percent, summary
+from seip_addon.core.pictures.palette import SEEN_COLOURS
+from seip_addon.core.pictures.plan_view import draw_plan, save_plan_view
+from seip_addon.core.results.deployment import deploy
 from tests.small_junction import make_example
 
 
@@ -71,6 +72,17 @@ def test_any_number_of_sensors_can_be_drawn(example, tmp_path, count):
     figure = draw_plan(example.geometry, example.site, deployment)
     panel = figure.axes[1]
     assert all(panel.get_ylim()[1] <= text.get_position()[1] <= panel.get_ylim()[0] for text in panel.texts)
+
+
+@pytest.mark.parametrize("size", [(600, 40), (100, 100), (40, 600)])
+def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(example, size):
+    region = shapely.box(0, 0, *size)
+    site = type(example.site)(**{**vars(example.site), "region": region})
+    plan = draw_plan(example.geometry, site, example.deployment).axes[0]
+    box = plan.get_window_extent()
+    (left, right), (bottom, top) = plan.get_xlim(), plan.get_ylim()
+    assert box.width / (right - left) == pytest.approx(box.height / (top - bottom))
+    assert shapely.box(left, bottom, right, top).contains(region)
 
 
 def test_names_are_taken_as_they_are(example, tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.viewpoint import frame
+from seip_addon.core.pictures.viewpoint import frame
 
 SLOPES = np.array((0.3, 0.2))
 

@@ -9,12 +9,13 @@ import sys
 import time
 from pathlib import Path
 
+from headless import place
+
 import bpy
 import pytest
 
-from headless import place
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement_record import comparable, load_placement_record
+from seip_addon.core.results.placement_record import comparable, load_placement_record
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "scenes" / "junction.blend"

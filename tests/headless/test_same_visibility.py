@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from headless import build_scene, session
+from headless.benchmark import visibility_costs
+
 import bpy
 import pytest
 
-from headless import build_scene, session
-from headless.benchmark import visibility_costs
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.site import Site, make_site

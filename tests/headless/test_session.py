@@ -10,6 +10,7 @@ pytest.importorskip("bpy")
 from typing import Never
 
 from headless import session
+
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
 

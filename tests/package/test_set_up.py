@@ -6,11 +6,11 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
+from headless import set_up, system_libraries
+
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-
-from headless import set_up, system_libraries
 
 ROOT = Path(__file__).resolve().parents[2]
 GROUPS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.deployment import deploy
+from seip_addon.core.results.deployment import deploy
 from seip_addon.scene import collections as contract
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.write import clear_result, write_result
@@ -90,7 +90,7 @@ def test_coverage_has_one_square_per_target_with_how_often_it_is_seen(example, s
     mesh.attributes["seip_seen"].data.foreach_get("value", seen)
     assert np.array_equal(seen, example.deployment.seen_by)
     middles = np.array([polygon.center for polygon in mesh.polygons])
-    assert np.allclose(middles, example.site.targets.xyz + (0, 0, 0.03), atol=1e-4)
+    assert np.allclose(middles, example.site.targets.xyz + np.array((0, 0, 0.08)), atol=1e-4)
     classes = np.array([polygon.material_index for polygon in mesh.polygons])
     assert np.array_equal(classes, np.minimum(seen, 2))
     assert mesh.color_attributes.active_color_name == "seip_colour"
@@ -107,8 +107,8 @@ def test_squares_follow_a_slope(example, scene):
     write_result(scene, site, example.deployment)
     corners = np.array([v.co for v in coverage(scene).data.vertices])
     inner = np.abs(corners[:, 0]) < 50
-    assert np.allclose(corners[inner, 2], 0.1 * corners[inner, 0] + 0.03, atol=0.11)
-    assert np.median(np.abs(corners[inner, 2] - 0.1 * corners[inner, 0] - 0.03)) < 1e-4
+    assert np.allclose(corners[inner, 2], 0.1 * corners[inner, 0] + 0.08, atol=0.11)
+    assert np.median(np.abs(corners[inner, 2] - 0.1 * corners[inner, 0] - 0.08)) < 1e-4
 
 
 def test_the_users_objects_are_left_alone(example, scene):
@@ -163,3 +163,21 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
     assert "Fra:" not in capfd.readouterr().out
+
+
+def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path, monkeypatch):
+    seen = {}
+    monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
+    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", lambda *given: seen.update(sight=given[-1]))
+    names = example.site.candidates.position_name[example.site.candidates.position_of].tolist()
+    position = example.site.candidates.position
+    clear = int(np.argmin(np.hypot(*(position[:, :2] - (47.0, 9.0)).T)))  # open to the south
+    shaded = int(np.argmin(np.hypot(*(position[:, :2] - (-13.0, -9.0)).T)))  # north of a building
+    poses = [names.index(example.site.candidates.position_name[place]) for place in (clear, shaded)]
+    deployment = deploy(example.site, example.models, example.visible, poses)
+    write_result(scene, example.site, deployment)
+    save_rendered_view(tmp_path / "view.png", scene, example.site, deployment)
+    hidden = dict(zip([sensor.pose for sensor in deployment.sensors], seen["sight"].hidden.tolist(), strict=True))
+    assert hidden == {poses[0]: False, poses[1]: True}

@@ -8,15 +8,13 @@ from functools import cached_property, partial
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from ..arrays import Float
 from ..errors import SeipError
 from .road_map import Frame, Lane, LaneSection, Road, RoadMap
 from .sampling import sample
-
-Float = NDArray[np.float64]
 
 _SMALLEST_TRIANGLE = 1e-9  # square metres
 

@@ -7,17 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
+from ..arrays import Float
 from ..errors import SeipError
 from .road_map import Corner, Repeat, Road, RoadMap, RoadObject
 from .sampling import sample
 
-Float = NDArray[np.float64]
-
-_MOST_COPIES = 100_000
+_MOST_COPIES = 10_000
 _STRIP_TOLERANCE = 0.02  # metres
 _ENDS = (0.0, 1.0)
 

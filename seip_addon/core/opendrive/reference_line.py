@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from ..arrays import Float
 
 _ROOTS, _ROOT_WEIGHTS = np.polynomial.legendre.leggauss(16)  # type: ignore[no-untyped-call]  # numpy 1.26 has no types here
 # On the unit interval, where 16 nodes integrate every polynomial up to degree 31 exactly.
@@ -53,12 +52,21 @@ class Clothoid:
             # The chord of an arc points half as far round, and np.sinc keeps the straight line exact.
             chord = distance * np.sinc(heading / (2.0 * np.pi))
             return chord * np.cos(heading / 2.0), chord * np.sin(heading / 2.0), heading
-        panels = 1 + int(np.ceil(self.turn(float(np.max(distance, initial=0.0)))))
-        along = (np.arange(panels)[:, None] + _NODES).ravel() / panels
-        weights = np.tile(_WEIGHTS, panels) / panels
-        steps = distance[:, None] * along
-        headings = steps * (self.curvature + steps * self.rate / 2.0)
-        return distance * (np.cos(headings) @ weights), distance * (np.sin(headings) @ weights), heading
+        farthest = float(np.max(distance, initial=0.0))
+        panels = 1 + int(self.turn(farthest))
+        size = farthest / panels or 1.0
+        knots = size * np.arange(panels)
+        panel = np.minimum(distance // size, panels - 1).astype(np.int64)
+        whole = self._displacement(knots, np.full(panels, size))
+        before = np.cumsum(whole, axis=1) - whole
+        x, y = before[:, panel] + self._displacement(knots[panel], distance - knots[panel])
+        return x, y, heading
+
+    def _displacement(self, start: Float, length: Float) -> Float:
+        """Return x and y, (2, k) metres, by which the curve moves on over lengths of at most a radian's turn."""
+        along = start[:, None] + length[:, None] * _NODES
+        heading = along * (self.curvature + along * self.rate / 2.0)
+        return np.stack([length * (np.cos(heading) @ _WEIGHTS), length * (np.sin(heading) @ _WEIGHTS)])
 
     def reach(self, length: float) -> float:
         """Return how far from its start the curve gets at most over a length, metres."""
@@ -191,7 +199,7 @@ class ReferenceLine:
         for i in np.unique(index):
             here = index == i
             x0, y0, turned = self.start[i]
-            along, aside, heading[here] = self.pieces[i](np.maximum(s[here] - self.s[i], 0.0))
+            along, aside, heading[here] = self.pieces[i](np.clip(s[here] - self.s[i], 0.0, self.length[i]))
             x[here] = x0 + along * np.cos(turned) - aside * np.sin(turned)
             y[here] = y0 + along * np.sin(turned) + aside * np.cos(turned)
             heading[here] += turned

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely.geometry import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
+from ..arrays import Float
 from .profile import Profile, Shape
 from .reference_line import ReferenceLine
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

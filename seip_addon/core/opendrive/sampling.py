@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Float
 from ..errors import SeipError
 
-Float = NDArray[np.float64]
 Curves = Callable[[Float], Float]
 
 _SHORTEST = 1e-6  # metres; less carries nothing but slivers
 _BEFORE = 1e-9  # metres short of a knot the records before it are still in force
 _LONGEST_STEP = 25.0  # metres, in which no road turns so often that the sampled quarters hide it
 _SHORTEST_STEP = 1e-3  # metres
-_MOST_SAMPLES = 100_000
+_MOST_SPLITS = 10_000  # at once; a winding mountain road of 100 km in one piece asks for fewer
 _QUARTERS = np.linspace(0.0, 1.0, 5)
 # The greatest deviation of a cubic from its chord is at most 1.03 times the greatest one at the quarters.
 _MARGIN = 0.9
@@ -49,7 +49,7 @@ def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str)
     long_enough = end - begin > _SHORTEST
     begin, end = begin[long_enough], end[long_enough] - _BEFORE
     if not begin.size:
-        return np.empty((0, 0, 3))
+        return curves(begin)
     s = np.unique(np.concatenate([_refined(curves, begin, end, tolerance, place), end]))
     points = curves(s)
     return points[_distinct(s, points)]
@@ -57,7 +57,7 @@ def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str)
 
 def _refined(curves: Curves, begin: Float, end: Float, tolerance: float, place: str) -> Float:
     """Return the starts of all steps by which intervals are to be walked."""
-    begin, end = _in_steps(begin, end, place)
+    begin, end = _in_steps(begin, end)
     finished = [np.empty(0)]
     while begin.size:
         s = begin[:, None] + (end - begin)[:, None] * _QUARTERS
@@ -68,16 +68,14 @@ def _refined(curves: Curves, begin: Float, end: Float, tolerance: float, place: 
         finished.append(begin[~split])
         begin, middle, end = begin[split], s[split, 2], end[split]
         begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
-        if begin.size > _MOST_SAMPLES:
+        if begin.size > _MOST_SPLITS:
             raise SeipError(f"{place} winds too tightly to be followed; correct its geometry and profiles in the map")
     return np.concatenate(finished)
 
 
-def _in_steps(begin: Float, end: Float, place: str) -> tuple[Float, Float]:
+def _in_steps(begin: Float, end: Float) -> tuple[Float, Float]:
     """Cut intervals into steps that are not too long."""
     count = np.maximum(np.ceil((end - begin) / _LONGEST_STEP), 1.0).astype(np.int64)
-    if count.sum() > _MOST_SAMPLES:
-        raise SeipError(f"{place} is too long to be followed; split the road in the map")
     first = np.repeat(np.cumsum(count) - count, count)
     place_in_row = np.arange(count.sum()) - first
     step = np.repeat((end - begin) / count, count)

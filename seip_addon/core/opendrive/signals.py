@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.errors import SeipError
-
+from ..arrays import Float
+from ..errors import SeipError
 from .lanes import ground_elevation
 from .road_map import MapPlace, Road, RoadMap, RoadPlace, RoadSignal
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +32,8 @@ class PlacedSignal:
     position : (3,) float64, metres
         In map coordinates.
     yaw : float, radians
-        Direction of the traffic that it is meant for, counter-clockwise from +x.
+        By the standard the direction of the traffic that it is meant for,
+        counter-clockwise from +x; some exporters give the one it faces.
     height, width : float, metres
         Zero where the file says nothing.
     s, t, z_offset : float, metres

@@ -33,6 +33,9 @@ SHRINK = 0.7
 DEFLECTION = 0.85
 SMALLEST_STEP = 1e-3
 
+PRICES = 200
+"""Multipliers of the price that are tried for a bound on it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Selection:
@@ -170,6 +173,25 @@ def lagrangian_bound(
                 targets, groups, current = best.targets, best.groups, best
                 direction[:], group_direction[:] = 0.0, 0.0
     return bound_from(instance, best.targets, best.groups, exact=True)
+
+
+def least_price(instance: Instance, bound: Bound, goal: float) -> float:
+    r"""Return a price below which no placement covers ``goal``.
+
+    With the bound's multipliers and a multiplier :math:`\mu > 0` of the
+    price, a placement of price C covers at most :math:`L(\lambda, \mu) +
+    \mu C`, so that :math:`C \ge (goal - L(\lambda, \mu)) / \mu`.
+    """
+    score = bound.selection.net + bound.selection.multiplier * instance.price
+    fixed = bound.value - bound.selection.value
+    worth = np.unique(score[instance.price > 0] / instance.price[instance.price > 0])
+    worth = worth[worth > 0]
+    tried = worth[np.linspace(0, len(worth) - 1, min(len(worth), PRICES)).astype(np.int64)]
+    gained = [_select(instance, score, multiplier) for multiplier in tried]
+    prices = [
+        (goal - fixed - math.fsum(selection.net[selection.picked])) / selection.multiplier for selection in gained
+    ]
+    return max([0.0, *prices])
 
 
 def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:

@@ -11,19 +11,23 @@ import numpy as np
 from ..arrays import Integer
 from ..progress import Progress
 from .bounds import Bound, can_reach, lagrangian_bound
+from .branch_and_bound import best_reaching, is_worthwhile
 from .clock import Clock
 from .feasibility import starting_choice
 from .greedy import exchange, greedy, greedy_and_exchange, without_idle
 from .instance import SLACK, Instance, make_instance
-from .integer_program import CoverProgram, check_solver
+from .integer_program import check_solver, reaching
 from .problem import Placement, PlacementProblem, placement
 from .ties import canonical_optimum
 
-KERNEL = 6
-"""Candidates per sensor in the first, small integer program: those with the best scores under the bound."""
+KERNELS = ((6, 0.15), (12, 0.3))
+"""Small programs over the candidates of best scores: how many per sensor, and what share of the time left."""
 
-KERNEL_SHARE = 0.15
-"""Share of the time left that this first program may take."""
+BRANCHING = 0.6
+"""Share of the time for branch and bound, where that is worthwhile, before programs are tried."""
+
+LARGEST = 1_000_000
+"""Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +51,8 @@ def solve(
 
     Reductions that lose nothing come first; a greedy choice improved by
     exchanges gives an incumbent, a Lagrangian relaxation a bound; candidates
-    that the bound rules out are dropped, and an integer program decides among
-    the rest.
+    that the bound rules out are dropped. Among the rest branch and bound
+    decides for few sensors, an integer program for many.
 
     Parameters
     ----------
@@ -77,13 +81,12 @@ def solve(
     instance, factor = make_instance(problem)
     start = starting_choice(problem, instance, solver)
     proof = yield from prove(instance, greedy_and_exchange(instance, start), solver, clock)
-    chosen, notes = proof.chosen, []
+    chosen, notes = without_idle(instance, proof.chosen, instance.covered(proof.chosen)), []
     if proof.optimal:
-        chosen, settled = yield from canonical_optimum(instance, without_idle(instance, chosen), solver, clock)
+        chosen, settled = yield from canonical_optimum(instance, chosen, solver, clock)
         if not settled:
             notes.append("the time was too short to break all ties: another placement may cover as much")
     else:
-        chosen = without_idle(instance, chosen)
         notes.append(
             "the time was too short to prove this placement optimal: the gap says by how much it may fall short"
         )
@@ -145,18 +148,51 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
 
 
 def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Generator[Progress, None, Proof]:
-    """Improve an incumbent and the bound on it until they meet or the time is up."""
+    """Improve an incumbent and the bound on it until they meet or the time is up.
+
+    Parameters
+    ----------
+    instance : Instance
+    chosen : (k,) int64
+        A placement to begin from.
+    solver : str
+    clock : Clock
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Proof
+    """
     bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
-    if bound.value > instance.covered(chosen) + SLACK:
-        chosen = max(chosen, _from_relaxation(instance, bound, chosen), key=instance.covered)
-        yield Progress(0, 1, "improving the placement among the best candidates")
-        chosen = _within_kernel(instance, bound, chosen, solver, clock)
-    goal = instance.covered(chosen)
-    if bound.value <= goal + SLACK:
-        return Proof(chosen, goal, optimal=True)
-    keep = can_reach(instance, bound, goal)
+    chosen = max(chosen, _from_relaxation(instance, bound, chosen), key=instance.covered)
+    keep = can_reach(instance, bound, _better(instance, chosen))
+    if len(keep) and is_worthwhile(instance, keep):
+        part = instance.part(keep)
+        found = yield from best_reaching(part, _better(instance, chosen), clock, BRANCHING * clock.left)
+        chosen = keep[found.placements[0]] if found.placements else chosen
+        if found.finished:
+            return Proof(chosen, instance.covered(chosen), optimal=True)
+    for factor, share in KERNELS:
+        size = factor * max(len(chosen), 1)
+        if len(keep) <= size or clock.left <= 0:
+            break
+        yield Progress(0, 1, f"improving the placement among the {size} best candidates")
+        chosen = _within_kernel(instance, bound, size, chosen, solver, share * clock.left)
+        keep = can_reach(instance, bound, _better(instance, chosen))
+    if bound.value < _better(instance, chosen) - SLACK or len(keep) == 0:
+        return Proof(chosen, instance.covered(chosen), optimal=True)
+    if clock.left <= 0 or np.count_nonzero(instance.visible[keep]) > LARGEST:
+        return Proof(chosen, bound.value, optimal=False)
     yield Progress(0, 1, f"proving with {len(keep)} of {len(instance)} candidates")
-    return _decide(instance, keep, bound, chosen, solver, clock)
+    return _decide(instance, keep, bound.value, chosen, solver, clock.left)
+
+
+def _better(instance: Instance, chosen: Integer) -> float:
+    """Return the covered weight that a strictly better placement reaches at least."""
+    return instance.covered(chosen) + instance.step
 
 
 def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Integer:
@@ -165,30 +201,22 @@ def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Integ
     return exchange(instance, picked) if instance.feasible(picked) else chosen
 
 
-def _within_kernel(instance: Instance, bound: Bound, chosen: Integer, solver: str, clock: Clock) -> Integer:
+def _within_kernel(
+    instance: Instance, bound: Bound, size: int, chosen: Integer, solver: str, seconds: float
+) -> Integer:
     """Return the best placement among the candidates of best scores, at least as good as the one given."""
-    size = KERNEL * max(len(chosen), 1)
-    best = np.argsort(-bound.selection.net, kind="stable")[:size]
-    keep = np.union1d(best, chosen)
-    program = CoverProgram(instance.part(keep))
-    outcome = program.maximise(program.covered, solver, KERNEL_SHARE * clock.left)
-    if outcome.chosen is None or instance.covered(keep[outcome.chosen]) <= instance.covered(chosen):
-        return chosen
-    return exchange(instance, keep[outcome.chosen])
+    keep = np.sort(np.argsort(-bound.selection.net, kind="stable")[:size])
+    outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    return chosen if outcome.chosen is None else exchange(instance, keep[outcome.chosen])
 
 
-def _decide(instance: Instance, keep: Integer, bound: Bound, chosen: Integer, solver: str, clock: Clock) -> Proof:
-    """Solve the integer program over the candidates that some optimum may contain."""
-    if clock.left <= 0:
-        return Proof(chosen, bound.value, optimal=False)
-    keep = np.union1d(keep, chosen)
-    program = CoverProgram(instance.part(keep))
-    outcome = program.maximise(program.covered, solver, clock.left)
-    if outcome.chosen is not None and instance.covered(keep[outcome.chosen]) > instance.covered(chosen):
-        chosen = keep[outcome.chosen]
+def _decide(instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float) -> Proof:
+    """Look for a better placement among the candidates that one may contain; that there is none is the proof."""
+    outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    chosen = chosen if outcome.chosen is None else keep[outcome.chosen]
     value = instance.covered(chosen)
-    proven = value if outcome.finished else max(value, min(bound.value, outcome.bound))
-    return Proof(chosen, proven, optimal=outcome.finished or proven <= value + SLACK)
+    bound = value if outcome.finished else max(value, min(bound, outcome.bound))
+    return Proof(chosen, bound, optimal=bound < _better(instance, chosen) - SLACK)
 
 
 def _surplus(asked: int, used: int) -> str:
@@ -196,18 +224,10 @@ def _surplus(asked: int, used: int) -> str:
 
 
 def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
-    if (
-        len(instance.mandatory)
-        or problem.min_distance > 0
-        or (problem.count is not None and problem.budget is not None)
-    ):
+    single = len(np.unique(instance.clique)) == len(instance)
+    both = problem.count is not None and problem.budget is not None
+    if len(instance.mandatory) or problem.min_distance > 0 or both or (problem.budget is not None and not single):
         return "greedy has no guarantee under these constraints beyond the bound given"
     if problem.budget is not None:
-        share = "(1 - 1/e)/2 (32 %)" if len(np.unique(instance.clique)) == len(instance) else ""
-        return (
-            f"greedy covers at least {share} of the optimum"
-            if share
-            else ("greedy has no guarantee under a budget with several poses per position beyond the bound given")
-        )
-    share = "1 - 1/e (63 %)" if len(np.unique(instance.clique)) == len(instance) else "one half"
-    return f"greedy covers at least {share} of the optimum"
+        return "greedy covers at least (1 - 1/e)/2 (32 %) of the optimum"
+    return f"greedy covers at least {'1 - 1/e (63 %)' if single else 'one half'} of the optimum"

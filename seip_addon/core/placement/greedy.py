@@ -11,6 +11,9 @@ from .bounds import select
 from .instance import SLACK, Instance
 from .problem import TIE
 
+SINGLE = 1e-6
+"""Relative error of a sum of positive numbers in single precision, with room to spare."""
+
 
 def greedy(
     instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf
@@ -49,10 +52,6 @@ def greedy(
         chosen = np.append(chosen, best)
 
 
-SINGLE = 1e-6
-"""Relative error of a sum of positive numbers in single precision, with room to spare."""
-
-
 def greedy_and_exchange(instance: Instance, start: Integer) -> Integer:
     """Return the best of the greedy choices after exchanges, ascending."""
     by_price = [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
@@ -70,22 +69,25 @@ def exchange(instance: Instance, chosen: Integer) -> Integer:
         chosen = swapped
 
 
-def without_idle(instance: Instance, chosen: Integer) -> Integer:
-    """Take away sensors, the dearest first, that neither coverage nor a mandatory group needs."""
-    covered = instance.covered(chosen)
+def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
+    """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != candidate]
-        needed = not instance.mandatory[:, rest].any(axis=1).all()
-        if not needed and instance.covered(rest) >= covered - SLACK:
+        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - SLACK:
             chosen = rest
     return chosen
+
+
+def without_weakest(instance: Instance, chosen: Integer) -> Integer:
+    """Take away the sensor that is missed least."""
+    return max((chosen[chosen != candidate] for candidate in chosen), key=instance.covered)
 
 
 def addable(instance: Instance, chosen: Integer) -> Boolean:
     """Return which candidates can join the chosen ones within all constraints, (c,) bool."""
     if len(chosen) >= instance.count:
         return np.zeros(len(instance), bool)
-    room = ~instance.conflict[chosen].any(axis=0)
+    room: Boolean = ~instance.conflict[chosen].any(axis=0)
     room[chosen] = False
     room &= instance.affordable(math.fsum(instance.price[chosen]) + instance.price)
     unserved = ~instance.mandatory[:, chosen].any(axis=1)

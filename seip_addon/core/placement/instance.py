@@ -19,6 +19,9 @@ SCALE = 1e4
 SLACK = TIE * SCALE
 """Scaled weights that differ by less count as equal."""
 
+SOLVER_SLACK = 2e-6 * SCALE
+"""What a solver's tolerance of 1e-6 on every variable may add up to, doubled."""
+
 
 @dataclass(frozen=True, eq=False)
 class Instance:
@@ -80,7 +83,24 @@ class Instance:
                     members.append(int(np.argmax(common)))
                     common &= self.conflict[members[-1]]
                 clique[members] = first
-        return np.unique(clique, return_inverse=True)[1]
+        numbered: Integer = np.unique(clique, return_inverse=True)[1]
+        return numbered
+
+    @cached_property
+    def step(self) -> float:
+        """Smallest difference between two covered weights: unit weights allow no value between two counts."""
+        times = self.weight / self.weight.min()
+        whole = bool(np.abs(times - np.rint(times)).max() < 1e-6)
+        return max(2 * SLACK, float(self.weight.min()) if whole else 0.0)
+
+    @property
+    def margin(self) -> float:
+        """How far a coverage to reach is lowered for a solver, which may miss each target by its tolerance."""
+        return max(self.step / 2, SOLVER_SLACK)
+
+    def attainable(self, goal: float) -> float:
+        """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
+        return math.ceil((goal - SLACK) / self.step) * self.step if self.step > 2 * SLACK else goal
 
     def covered(self, chosen: Integer) -> float:
         """Return the scaled weight that the chosen candidates cover."""
@@ -175,10 +195,10 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
 
 
 def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
-    conflict = positions[:, None] == positions[None, :]
+    conflict: Boolean = positions[:, None] == positions[None, :]
     if min_distance > 0:
-        for row, xy in zip(conflict, xyz[:, :2], strict=True):
-            row |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance
+        for index, xy in enumerate(xyz[:, :2]):
+            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance
     np.fill_diagonal(conflict, val=False)
     return conflict
 
@@ -192,7 +212,7 @@ def _superfluous(instance: Instance, positions: Integer) -> Boolean:
     cheaper (or costs the same and comes first) can always give way to it:
     coverage, number, price, double coverage and order all stay or improve.
     """
-    superfluous = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
+    superfluous: Boolean = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
     excluded = instance.conflict | np.eye(len(instance), dtype=bool)
     by_position = np.argsort(positions, kind="stable")
     for group in np.split(by_position, np.flatnonzero(np.diff(positions[by_position])) + 1):
@@ -211,4 +231,5 @@ def _superfluous(instance: Instance, positions: Integer) -> Boolean:
 def _within(rows: Boolean) -> Boolean:
     """Return for each pair of rows whether the first is a subset of the second, (k, k) bool."""
     overlap = rows.astype(np.float32) @ rows.T.astype(np.float32)
-    return overlap == overlap.diagonal()[:, None]
+    subset: Boolean = overlap == overlap.diagonal()[:, None]
+    return subset

@@ -22,7 +22,7 @@ from pulp.apis.coin_api import pulp_cbc_path
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from .instance import Instance
+from .instance import SLACK, Instance
 from .problem import TIE
 
 SOLVERS = ("highs", "cbc", "gurobi")
@@ -64,6 +64,7 @@ class CoverProgram:
         self.instance = instance
         self.model = pulp.LpProblem("placement", pulp.LpMaximize)
         self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
+        self._checks: list[Callable[[Integer], bool]] = [instance.feasible]
         self._constrain()
 
     @cached_property
@@ -101,9 +102,27 @@ class CoverProgram:
         """Return the (weighted) number of sensors among some candidates."""
         return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
 
-    def require(self, constraint: Any) -> None:  # noqa: ANN401 -- PuLP's constraints are untyped
-        """Add a constraint for this and all later solves."""
+    def require(self, constraint: Any, check: Callable[[Integer], bool] | None = None) -> None:  # noqa: ANN401
+        """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
         self.model += constraint
+        if check is not None:
+            self._checks.append(check)
+
+    def require_coverage(self, goal: float) -> None:
+        """Require a covered weight, but for `SLACK`."""
+        instance = self.instance
+        self.require(self.covered >= goal - instance.margin, lambda c: instance.covered(c) >= goal - SLACK)
+
+    def require_double_coverage(self, goal: float) -> None:
+        """Require a doubly covered weight, but for `SLACK`."""
+        instance = self.instance
+        self.require(self.doubly_covered >= goal - instance.margin, lambda c: instance.doubly(c) >= goal - SLACK)
+
+    def require_price(self, price: float) -> None:
+        """Require a total price of at most ``price``, but for `TIE`."""
+        limit = price * (1 + TIE)
+        prices = self.instance.price
+        self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
 
     def maximise(self, objective: Any, solver: str, seconds: float) -> Outcome:  # noqa: ANN401 -- as above
         """Solve for the largest objective within a time limit; the last requirement stays."""
@@ -111,16 +130,22 @@ class CoverProgram:
         ends = time.perf_counter() + seconds
         while True:
             outcome = self._solve(solver, ends - time.perf_counter())
-            if outcome.chosen is None or self.instance.feasible(outcome.chosen):
+            chosen = outcome.chosen
+            if chosen is None or all(check(chosen) for check in self._checks):
                 return outcome
-            # solvers take a budget with a tolerance of their own: forbid what overruns it in exact arithmetic
-            self.require(self.number_among(outcome.chosen) <= len(outcome.chosen) - 1)
+            # solvers have tolerances of their own: forbid exactly what fails in exact arithmetic
+            others = np.setdiff1d(np.arange(len(self.x)), chosen)
+            self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
+
+    def maximise_coverage(self, solver: str, seconds: float) -> Outcome:
+        """Solve for the largest covered weight within a time limit."""
+        return self.maximise(self.covered, solver, seconds)
 
     def _solve(self, solver: str, seconds: float) -> Outcome:
         with _engine(solver, max(seconds, 0.01)) as engine:
             try:
                 self.model.solve(engine)
-            except pulp.PulpSolverError as error:
+            except (pulp.PulpSolverError, OSError) as error:
                 raise SeipError(
                     f"the solver {solver} stopped with an error ({error}); choose another solver"
                 ) from error
@@ -149,6 +174,13 @@ class CoverProgram:
             self.model += self.number_among(np.flatnonzero(group)) >= 1
         for clique in cover_by_cliques(instance.conflict):
             self.model += self.number_among(clique) <= 1
+
+
+def reaching(instance: Instance, goal: float) -> CoverProgram:
+    """Return the program of an instance whose placements cover at least ``goal``."""
+    program = CoverProgram(instance)
+    program.require_coverage(goal)
+    return program
 
 
 def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
@@ -192,9 +224,11 @@ def check_solver(solver: str) -> str:
     """
     if solver not in SOLVERS:
         raise SeipError(f"unknown solver {solver!r}; choose among {', '.join(_available())}")
-    if not _AVAILABLE[solver]():
+    if not is_available(solver):
         raise SeipError(f"the solver {solver} is not available here; choose among {', '.join(_available())}")
-    return f"{_VERSION[solver]()} with PuLP {importlib.metadata.version('pulp')}"
+    if solver == "cbc":
+        return f"CBC of PuLP {pulp.__version__}"
+    return f"{_PULP_NAME[solver]} {importlib.metadata.version(_PACKAGE[solver])}, PuLP {pulp.__version__}"
 
 
 def _linear(variables: list[Any], factors: Float) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
@@ -241,35 +275,17 @@ def _executable_cbc() -> Iterator[str]:
         yield str(copy)
 
 
+def is_available(solver: str) -> bool:
+    """Return whether a known solver can run here."""
+    if solver == "cbc":
+        return os.access(pulp_cbc_path, os.R_OK)
+    return _PULP_NAME[solver] in pulp.listSolvers(onlyAvailable=True)
+
+
+_PULP_NAME = {"highs": "HiGHS", "gurobi": "GUROBI"}
+
+_PACKAGE = {"highs": "highspy", "gurobi": "gurobipy"}
+
+
 def _available() -> list[str]:
-    return [name for name in SOLVERS if _AVAILABLE[name]()]
-
-
-def _has_highs() -> bool:
-    return bool(pulp.HiGHS(msg=False).available())
-
-
-def _has_cbc() -> bool:
-    return os.access(pulp_cbc_path, os.R_OK)
-
-
-def _has_gurobi() -> bool:
-    return "GUROBI" in pulp.listSolvers(onlyAvailable=True)
-
-
-_AVAILABLE: dict[str, Callable[[], bool]] = {"highs": _has_highs, "cbc": _has_cbc, "gurobi": _has_gurobi}
-
-
-def _highs_version() -> str:
-    return f"HiGHS {importlib.metadata.version('highspy')}"
-
-
-def _cbc_version() -> str:
-    return "CBC"
-
-
-def _gurobi_version() -> str:
-    return f"Gurobi {importlib.metadata.version('gurobipy')}"
-
-
-_VERSION: dict[str, Callable[[], str]] = {"highs": _highs_version, "cbc": _cbc_version, "gurobi": _gurobi_version}
+    return [name for name in SOLVERS if is_available(name)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 
 TIE = 1e-9
-"""Two placements count as equal when they differ by less than this fraction of all weight (or of the price)."""
+"""Placements count as equal when they differ by less than this fraction of all weight, or of the price."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,8 @@ class PlacementProblem:
         cheapest = float(self.prices[self.allowed].min())
         if self.budget is not None and not self.budget >= cheapest:
             raise SeipError(
-                f"the budget of {self.budget:g} is below the cheapest sensor, which costs {cheapest:g}; raise the budget"
+                f"the budget of {self.budget:g} is below the cheapest sensor, which costs {cheapest:g}; "
+                "raise the budget"
             )
 
 
@@ -179,15 +180,12 @@ class Placement:
     seen_by: Integer
     notes: tuple[str, ...] = ()
 
-    def with_notes(self, *notes: str) -> Placement:
-        """Return the same placement with further notes."""
-        return replace(self, notes=self.notes + notes)
-
 
 def canonical_order(problem: PlacementProblem) -> Integer:
     """Return the indices that sort the candidates by x, y, z and label, (c,) int64."""
     x, y, z = problem.xyz.T
-    return np.lexsort((problem.prices, problem.labels, z, y, x))
+    order: Integer = np.lexsort((problem.prices, problem.labels, z, y, x))
+    return order
 
 
 def placement(  # noqa: PLR0913 -- the fields of one record

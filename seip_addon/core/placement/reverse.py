@@ -11,14 +11,15 @@ import numpy as np
 from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from .bounds import can_reach, lagrangian_bound
+from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .clock import Clock
 from .exact import prove, solve
 from .feasibility import starting_choice
-from .greedy import greedy, greedy_and_exchange
+from .greedy import greedy, greedy_and_exchange, without_idle
 from .instance import SLACK, Instance, make_instance
-from .integer_program import CoverProgram, check_solver
+from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, placement
+from .ties import fewest
 
 FINISH = 1.0
 """Seconds that choosing among equally cheap placements may take when the time limit is used up."""
@@ -62,9 +63,9 @@ def cheapest_for_coverage(
     check_solver(solver)
     instance, factor = make_instance(problem)
     whole = math.fsum(problem.weights) * factor
-    goal = coverage * whole
+    goal = instance.attainable(coverage * whole)
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
-    cheapest, bound = yield from _cheapest(instance, _pruned(instance, chosen, goal), goal, solver, clock)
+    cheapest, bound = yield from _cheapest(instance, without_idle(instance, chosen, goal), goal, solver, clock)
     best = yield from solve(_no_dearer(problem, instance, cheapest), solver=solver, time_limit=max(clock.left, FINISH))
     reached = best.covered * factor >= goal - SLACK
     chosen = best.chosen if reached else instance.original[cheapest]
@@ -95,38 +96,32 @@ def _reaching(
     )
 
 
-def _pruned(instance: Instance, chosen: Integer, goal: float) -> Integer:
-    """Take away sensors, the dearest first, that the goal does not need."""
-    for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
-        rest = chosen[chosen != candidate]
-        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - SLACK:
-            chosen = rest
-    return chosen
-
-
 def _cheapest(
     instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, float]]:
     """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
     price = math.fsum(instance.price[chosen])
-    cheaper = replace(instance, budget=price * (1 - 3 * TIE))
-    if np.ptp(instance.price) == 0:
-        cheaper = replace(instance, count=len(chosen) - 1)
-    if price == 0 or cheaper.count == 0:
+    if price == 0:
         return chosen, price
-    bound = yield from lagrangian_bound(cheaper, goal, clock)
-    keep = can_reach(cheaper, bound, goal)
-    if bound.value < goal - SLACK or len(keep) == 0:
+    bound = yield from lagrangian_bound(replace(instance, budget=min(price, instance.budget)), goal, clock)
+    least = min(price, max(least_price(instance, bound, goal), float(instance.price.min())))
+    if np.ptp(instance.price) == 0:
+        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        price = math.fsum(instance.price[chosen])
+        single = float(instance.price[0])
+        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
+    cheaper = replace(instance, budget=price * (1 - 3 * TIE))
+    keep = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    if len(keep) == 0:
         return chosen, price
     yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = CoverProgram(cheaper.part(keep))
-    program.require(program.covered >= goal - SLACK)
+    program = reaching(cheaper.part(keep), goal)
     outcome = program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
     if outcome.finished:
         return chosen, price
-    return chosen, min(price, max(-outcome.bound / program.price_scale, float(instance.price.min())))
+    return chosen, min(price, max(least, -outcome.bound / program.price_scale))
 
 
 def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:

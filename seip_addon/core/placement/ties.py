@@ -7,6 +7,7 @@ canonical order of candidates.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
@@ -16,10 +17,17 @@ import numpy as np
 from ..arrays import Integer
 from ..progress import Progress
 from .bounds import can_reach, lagrangian_bound
+from .branch_and_bound import all_reaching, best_reaching, is_worthwhile
 from .clock import Clock
+from .greedy import exchange, without_idle, without_weakest
 from .instance import SLACK, Instance
-from .integer_program import CoverProgram
-from .problem import TIE
+from .integer_program import reaching
+
+MANY = 20_000
+"""Ties that branch and bound lists."""
+
+SOME = 12
+"""Ties that are listed by one program each; beyond, each stage is a program of its own."""
 
 BLOCK = 10
 """Candidates whose order is settled by one program: powers of two up to 512 stay far above all tolerances."""
@@ -50,42 +58,84 @@ def canonical_optimum(
         Whether every stage came to its end.
     """
     goal = instance.covered(chosen)
-    chosen, settled = yield from _fewest(instance, chosen, goal, solver, clock)
+    chosen, settled = yield from fewest(instance, chosen, goal, solver, clock)
     if not settled:
         return chosen, False
     same_number = replace(instance, count=len(chosen))
     bound = yield from lagrangian_bound(same_number, goal, clock)
     keep = np.union1d(can_reach(same_number, bound, goal), chosen)
     yield Progress(0, 1, f"breaking ties among {len(keep)} candidates")
-    part = same_number.part(keep)
-    stages = _Stages(part, goal, np.searchsorted(keep, chosen), solver, clock)
-    _break_ties(part, stages)
-    return keep[stages.chosen], stages.settled
+    part, within = same_number.part(keep), np.searchsorted(keep, chosen)
+    if is_worthwhile(same_number, keep):
+        listed = yield from all_reaching(part, goal, MANY, clock, clock.left / 2)
+        if listed.finished:
+            return keep[min(listed.placements, key=lambda choice: _merit(part, choice))], True
+    equal, all_found = _all_equal(part, within, goal, solver, clock)
+    best = min(equal, key=lambda choice: _merit(part, choice))
+    if all_found or len(equal) < SOME:
+        return keep[best], all_found
+    best, settled = _settle(part, goal, best, solver, clock)
+    return keep[best], settled
 
 
-def _fewest(
+def fewest(
     instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, bool]]:
-    fewer = replace(instance, count=len(chosen) - 1)
-    if fewer.count == 0:
-        return chosen, True
-    bound = yield from lagrangian_bound(fewer, goal, clock)
-    keep = can_reach(fewer, bound, goal)
-    if bound.value < goal - SLACK or len(keep) == 0:
-        return chosen, True
-    yield Progress(0, 1, f"looking for fewer sensors among {len(keep)} candidates")
-    program = CoverProgram(fewer.part(keep))
-    program.require(program.covered >= goal - SLACK)
-    outcome = program.maximise(-1 * program.number, solver, clock.left)
-    return (chosen if outcome.chosen is None else keep[outcome.chosen]), outcome.finished
+    """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
+    while len(chosen) > 1:
+        fewer = replace(instance, count=len(chosen) - 1)
+        exchanged = exchange(fewer, without_weakest(instance, chosen))
+        if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - SLACK:
+            chosen = without_idle(fewer, exchanged, goal)
+            continue
+        bound = yield from lagrangian_bound(fewer, goal, clock)
+        keep = can_reach(fewer, bound, goal)
+        if bound.value < goal - SLACK or len(keep) == 0:
+            break
+        yield Progress(0, 1, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
+        if is_worthwhile(fewer, keep):
+            found = yield from best_reaching(fewer.part(keep), goal, clock, clock.left / 2)
+            if found.placements:
+                chosen = without_idle(fewer, keep[found.placements[0]], goal)
+                continue
+            if found.finished:
+                break
+        outcome = reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
+        if outcome.chosen is None:
+            return chosen, outcome.finished
+        chosen = without_idle(fewer, keep[outcome.chosen], goal)
+    return chosen, True
+
+
+def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock: Clock) -> tuple[list[Integer], bool]:
+    """Return the placements that reach the goal, `SOME` at most, and whether these are all.
+
+    Each is found by maximising coverage once more with those before forbidden:
+    that prunes far better than any other objective under a coverage to reach.
+    """
+    program = reaching(part, goal)
+    found = [chosen]
+    while len(found) < SOME:
+        program.require(program.number_among(found[-1]) <= len(chosen) - 1)
+        outcome = program.maximise_coverage(solver, clock.left)
+        if outcome.chosen is None:
+            return found, outcome.finished
+        found.append(outcome.chosen)
+    return found, False
+
+
+def _merit(part: Instance, chosen: Integer) -> tuple[float, float, list[int]]:
+    """Return price, double coverage and order as a key, smallest first, rounded to what counts as equal."""
+    price = math.fsum(part.price[chosen])
+    dearest = float(part.price.max()) or 1.0
+    return round(price / dearest, 8), -round(part.doubly(chosen) / SLACK / 10), chosen.tolist()
 
 
 class _Stages:
     """One program, solved for one objective after another; a stage that runs out of time ends them all."""
 
     def __init__(self, part: Instance, goal: float, chosen: Integer, solver: str, clock: Clock) -> None:
-        self.program = CoverProgram(part)
-        self.program.require(self.program.covered >= goal - SLACK)
+        self.program = reaching(part, goal)
         self.chosen = chosen
         self.settled = True
         self._solver = solver
@@ -99,28 +149,21 @@ class _Stages:
                 self.chosen = outcome.chosen
 
 
-def _break_ties(part: Instance, stages: _Stages) -> None:
-    if len(part) == len(stages.chosen):
-        return
-    program, first = stages.program, stages.chosen
-    stages.maximise(-1 * program.number_among(first))
-    if np.array_equal(stages.chosen, first):
-        return  # no other placement is as good
+def _settle(part: Instance, goal: float, chosen: Integer, solver: str, clock: Clock) -> tuple[Integer, bool]:
+    """Settle price, double coverage and order by integer programs: for ties too many to list."""
+    stages = _Stages(part, goal, chosen, solver, clock)
+    program = stages.program
     if np.ptp(part.price) > 0:
         stages.maximise(-1 * program.price)
-        price = float(part.price[stages.chosen].sum())
-        program.require(program.price <= price * program.price_scale * (1 + TIE))
-    if len(first) > 1:
+        program.require_price(math.fsum(part.price[stages.chosen]))
+    if len(chosen) > 1:
         stages.maximise(program.doubly_covered)
-        program.require(program.doubly_covered >= part.doubly(stages.chosen) - SLACK)
-    _first_in_order(part, stages)
-
-
-def _first_in_order(part: Instance, stages: _Stages) -> None:
-    """Maximise the indicator of the choice as a binary number, a block of digits at a time."""
+        program.require_double_coverage(part.doubly(stages.chosen))
     for block in np.array_split(np.arange(len(part)), range(BLOCK, len(part), BLOCK)):
-        stages.maximise(stages.program.number_among(block, 2.0 ** np.arange(len(block))[::-1]))
+        # the indicator of the choice, read as a binary number, a block of digits at a time
+        stages.maximise(program.number_among(block, 2.0 ** np.arange(len(block))[::-1]))
         for candidate in block:
-            stages.program.require(stages.program.x[candidate] == int(candidate in stages.chosen))
-        if stages.chosen.max(initial=-1) <= block[-1]:
-            return
+            program.require(program.x[candidate] == int(candidate in stages.chosen))
+        if stages.chosen.max() <= block[-1]:
+            break
+    return stages.chosen, stages.settled

@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Boolean, Float
 from .callouts import place_callouts
 from .palette import INK, PAPER, SOFT_INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
-    from .deployment import Deployment
-    from .site import Site
+    from ..results.deployment import Deployment
+    from ..site import Site
 
-    Float = NDArray[np.float64]
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
+HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
 MOST_LABELLED = 40
 """More sensors than these get no labels on the picture."""
@@ -32,7 +32,9 @@ def markers_of(deployment: Deployment) -> dict[str, str]:
     return {key: MARKERS[index % len(MARKERS)] for index, key in enumerate(keys)}
 
 
-def draw_sensors(axes: Axes, deployment: Deployment, points: Float, zorder: float) -> None:
+def draw_sensors(
+    axes: Axes, deployment: Deployment, points: Float, road: Float, *, zorder: float, hidden: Boolean | None = None
+) -> None:
     """Mark each sensor and write its label, type and height next to it, no label on another.
 
     Parameters
@@ -42,15 +44,21 @@ def draw_sensors(axes: Axes, deployment: Deployment, points: Float, zorder: floa
     deployment : Deployment
     points : (k, 2) float64
         Where each sensor is, in data coordinates.
+    road : (t, 2) float64
+        Where each target is; labels keep off them where they can.
     zorder : float
         Of the marks; labels and their lines lie below.
+    hidden : (k,) bool, optional
+        Sensors behind something, which are marked by an outline alone.
     """
     if 0 < len(points) <= MOST_LABELLED:
         words = [f"{s.label}  {s.model.key} · {s.height:.3g} m" for s in deployment.sensors]
-        _draw_callouts(axes, points, words, zorder - 0.5)
+        _draw_callouts(axes, points, words, road, zorder - 0.5)
     markers = markers_of(deployment)
-    for sensor, point in zip(deployment.sensors, points, strict=True):
-        axes.plot(*point, marker=markers[sensor.model.key], zorder=zorder, **SENSOR_MARK)
+    hidden = np.zeros(len(points), dtype=bool) if hidden is None else hidden
+    for sensor, point, behind in zip(deployment.sensors, points, hidden, strict=True):
+        style = SENSOR_MARK | HIDDEN_MARK if behind else SENSOR_MARK
+        axes.plot(*point, marker=markers[sensor.model.key], zorder=zorder, **style)
 
 
 def draw_title(figure: Figure, site: Site, deployment: Deployment, left: float) -> None:
@@ -80,7 +88,7 @@ def percent(share: float) -> str:
     return f"{min(share, 1.0 if share == 1.0 else 0.999):.1%}"
 
 
-def _draw_callouts(axes: Axes, points: Float, words: list[str], zorder: float) -> None:
+def _draw_callouts(axes: Axes, points: Float, words: list[str], road: Float, zorder: float) -> None:
     boxed = {"boxstyle": f"round,pad={LABEL_PADDING}", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6}
     texts = [
         axes.text(0, 0, label, ha="center", va="center", size=LABEL_SIZE, color=INK, bbox=boxed, zorder=zorder)
@@ -91,7 +99,7 @@ def _draw_callouts(axes: Axes, points: Float, words: list[str], zorder: float) -
     sizes = np.array([(extent.width, extent.height) for extent in extents]) + 2 * LABEL_PADDING * LABEL_SIZE * point
     anchors = axes.transData.transform(points)
     bounds = axes.get_window_extent().padded(-4.0 * point).extents
-    centres = axes.transData.inverted().transform(place_callouts(anchors, sizes, bounds, MARK_RADIUS * point))
-    for text, start, end in zip(texts, points, centres, strict=True):
+    centres = place_callouts(anchors, sizes, bounds, MARK_RADIUS * point, axes.transData.transform(road))
+    for text, start, end in zip(texts, points, axes.transData.inverted().transform(centres), strict=True):
         text.set_position(end)
         axes.plot(*zip(start, end, strict=True), color=INK, linewidth=0.9, zorder=zorder - 0.1)

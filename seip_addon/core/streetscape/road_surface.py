@@ -7,14 +7,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from .opendrive import LaneSurface
+from ..arrays import Float
+from ..opendrive import LaneSurface
 from .terrain import Terrain, cut
-
-Float = NDArray[np.float64]
 
 GROUPS = {
     "driving": "driving", "entry": "driving", "exit": "driving", "onRamp": "driving", "offRamp": "driving",
@@ -35,6 +33,7 @@ CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
 LONGEST_STEP = 10.0
 CORNER_NOTCH = 3.0
 """Notches up to twice this (metres) at the corners of a junction are pavement."""
+JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
@@ -103,19 +102,21 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
 def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
     """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
 
-    The lanes that cross each other in a junction are made one layer: where
-    driving lanes overlap the longest one counts, and other groups give way to
-    driving lanes. Between roads, whose lanes meet edge to edge, nothing is cut.
+    Lanes that cross each other in a junction differ in height by some
+    centimetres: there the group is laid anew as one layer at their mean
+    height, and groups other than driving lanes give way to these. Elsewhere
+    lanes meet edge to edge and stay as they are.
     """
     lanes = in_groups(surfaces, [name])
     pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
     for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
         own = [lane for lane in lanes if lane.junction_id == junction]
-        driving = [] if name == "driving" else in_groups(surfaces, ["driving"])
-        covered = _plan([lane for lane in driving if lane.junction_id == junction])
-        for lane in sorted(own, key=lambda lane: -lane.polygon.area):
-            pieces.append(cut(lane.triangles, covered))
-            covered = covered.union(_plan([lane]), grid_size=GRID)
+        area = outline(own)
+        if name != "driving":
+            driving = in_groups(surfaces, ["driving"])
+            area = without_crumbs(area.difference(_plan([lane for lane in driving if lane.junction_id == junction])))
+        terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
+        pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
     return cut(np.concatenate(pieces), beyond)
 

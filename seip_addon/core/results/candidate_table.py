@@ -9,11 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ..lidar import LidarModel
+from ..site import Site
+from ..storage import whole_file
 from .deployment import Deployment, weighted_share
-from .lidar import LidarModel
 from .placement_record import degrees
-from .site import Site
-from .storage import whole_file
 
 COLUMNS = (
     "pose",

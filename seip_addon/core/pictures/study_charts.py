@@ -7,13 +7,12 @@ import os
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from .coverage_study import NUMBERS, WEIGHTS, Case, Claim, CoverageStudy
+from ..coverage_study import NUMBERS, WEIGHTS, Case, Claim, CoverageStudy
+from ..storage import whole_file
 from .palette import INK, PAPER, SOFT_INK
-from .storage import whole_file
 
 SERIES = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Colours of sensor types, told apart by colour-blind people (Okabe and Ito 2008)."""
@@ -144,4 +143,4 @@ def _dress(panel: Axes) -> None:
 
 def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
     with whole_file(path) as temporary:
-        FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
+        figure.savefig(temporary, format="png", metadata={"Software": None})

@@ -7,10 +7,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-Float = NDArray[np.float64]
+from ..arrays import Float
 
 LEAST_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""
+GRID = 1e-6
+"""Grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated."""
 
 
 class Terrain:
@@ -37,21 +39,25 @@ class Terrain:
         Returns
         -------
         (n,) float64, metres
-            Beside all triangles: the height at the nearest point of one.
+            The mean of the triangles there; beside all, the height at the nearest point of one.
         """
         points = shapely.points(xy)
         nearest = self._tree.nearest(points)
         on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
-        return plane_height(self._triangles[nearest], on_triangle)
+        height = plane_height(self._triangles[nearest], on_triangle)
+        point, triangle = self._tree.query(points, predicate="intersects")
+        found = np.bincount(point, minlength=len(xy))
+        total = np.bincount(point, plane_height(self._triangles[triangle], xy[point]), minlength=len(xy))
+        return np.where(found > 0, total / np.maximum(found, 1), height)
 
     def drape(self, area: BaseGeometry, *, spacing: float, above: float = 0.0) -> Float:
-        """Return an area in plan as triangles that lie on the terrain at their corners.
+        """Return an area in plan as triangles that lie on the terrain at their corners, without cracks.
 
         Parameters
         ----------
         area : shapely geometry
         spacing : float, metres
-            Longest edge along the area's outline.
+            Side of the square grid along which the area is divided.
         above : float, metres
             Height over the terrain.
 
@@ -60,15 +66,31 @@ class Terrain:
         (n, 3, 3) float64, metres
             Normals up.
         """
-        plan = triangulate(shapely.segmentize(area, spacing))
+        plan = triangulate(_cells(area, spacing))
         corners = plan.reshape(-1, 2)
         if len(corners) == 0:
             return np.empty((0, 3, 3))
         return _raised(corners, self.height(corners) + above)
 
 
-def triangulate(area: BaseGeometry) -> Float:
-    """Return (n, 3, 2) counter-clockwise triangles that fill an area in plan, with no corners of their own."""
+def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
+    """Return the polygons that a square grid through the origin divides an area into."""
+    if area.is_empty:
+        return np.array([], dtype=object)
+    low = np.floor(np.array(area.bounds[:2]) / spacing)
+    count = np.ceil(np.array(area.bounds[2:]) / spacing) - low
+    column, row = np.meshgrid(low[0] + np.arange(count[0]), low[1] + np.arange(count[1]), indexing="ij")
+    x, y = column.ravel() * spacing, row.ravel() * spacing
+    shapely.prepare(area)
+    squares = shapely.box(x, y, x + spacing, y + spacing)
+    met = squares[shapely.intersects(area, squares)]
+    parts = shapely.get_parts(shapely.intersection(met, area, grid_size=GRID))
+    kept: NDArray[np.object_] = parts[shapely.area(parts) > LEAST_AREA]
+    return kept
+
+
+def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
+    """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, with no corners of their own."""
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
     edges = corners[:, 1:] - corners[:, :1]
@@ -85,7 +107,7 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
     plan = shapely.polygons(triangles[:, :, :2])
     shapely.prepare(away)
     touched = shapely.intersects(away, plan)
-    rests = shapely.difference(plan[touched], away)
+    rests = shapely.difference(plan[touched], away, grid_size=GRID)
     pieces = [triangles[~touched]]
     for triangle, rest in zip(triangles[touched], rests, strict=True):
         if rest.area > LEAST_AREA:

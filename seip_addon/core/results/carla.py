@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..lidar import LidarModel
+from ..storage import whole_file
 from .deployment import Deployment, Sensor
-from .lidar import LidarModel
-from .storage import whole_file
 
 BLUEPRINT = "sensor.lidar.ray_cast"
 EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from ..arrays import Float
+
+Bounds = tuple[float, float, float, float]
 
 DIRECTIONS = 16
 REACH = (1.0, 1.6, 2.3, 3.2, 4.4, 6.0)  # how far out a label is tried, in multiples of the nearest
+FAR = 0.35 * np.repeat(np.array(REACH) - 1.0, DIRECTIONS)
+"""What distance costs, where hiding as much of the subject as any place would costs 1."""
 
 
-def place_callouts(anchors: Float, sizes: Float, bounds: tuple[float, float, float, float], clearance: float) -> Float:
+def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: float, subject: Float) -> Float:
     """Return the centre of each label's box.
 
-    Labels are set one after the other, each as near to its anchor as it can be
-    without leaving the picture or touching an anchor or an earlier label, and
-    preferably outwards from the middle of all anchors. A label for which there
-    is no room goes to the nearest place inside the picture.
+    Labels are set one after the other without leaving the picture or touching
+    an anchor or an earlier label: near their anchors, off the subject of the
+    picture, and outwards from the middle of all anchors. A label for which
+    there is no room goes to the nearest place inside the picture.
 
     Parameters
     ----------
@@ -29,6 +32,8 @@ def place_callouts(anchors: Float, sizes: Float, bounds: tuple[float, float, flo
         Of the picture, in the unit of the anchors.
     clearance : float
         To keep between a label and everything else.
+    subject : (m, 2) float64
+        Evenly spread points of what labels had better not hide.
 
     Returns
     -------
@@ -47,8 +52,9 @@ def place_callouts(anchors: Float, sizes: Float, bounds: tuple[float, float, flo
         apart = np.any(
             (tried_low[:, None] - clearance >= taken_high) | (tried_high[:, None] + clearance <= taken_low), axis=2
         ).all(axis=1)
-        good = np.flatnonzero(inside & apart)
-        centre = tried[good[0]] if len(good) else np.clip(tried[0], low + half, high - half)
+        cost = np.where(inside & apart, _hidden(tried_low, tried_high, subject) + FAR, np.inf)
+        best = int(np.argmin(cost))
+        centre = tried[best] if np.isfinite(cost[best]) else np.clip(tried[0], low + half, high - half)
         centres[index] = centre
         taken_low = np.vstack((taken_low, centre - half))
         taken_high = np.vstack((taken_high, centre + half))
@@ -62,3 +68,10 @@ def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
     angle = start + np.pi * 2.0 / DIRECTIONS * ((turn + 1) // 2) * np.where(turn % 2, 1.0, -1.0)
     round_anchor = np.stack((np.cos(angle), np.sin(angle)), axis=1) * reach
     return np.concatenate([anchor + factor * round_anchor for factor in REACH])
+
+
+def _hidden(low: Float, high: Float, subject: Float) -> Float:
+    """Return how much of the subject each box hides, the most of them 1."""
+    inside = np.all((subject > low[:, None]) & (subject < high[:, None]), axis=2).sum(axis=1)
+    share: Float = inside / max(1, inside.max())
+    return share

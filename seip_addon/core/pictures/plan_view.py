@@ -14,38 +14,38 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
+from ..arrays import Float
+from ..storage import whole_file
 from .drawing import SENSOR_MARK, draw_sensors, draw_title, markers_of, percent
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .storage import whole_file
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from .deployment import Deployment
-    from .scene_geometry import Mesh, SceneGeometry
-    from .site import Site
+    from ..results.deployment import Deployment
+    from ..scene_geometry import Mesh, SceneGeometry
+    from ..site import Site
 
-    Float = NDArray[np.float64]
     Style = dict[str, Any]
 
 DPI = 160
-MAP_WIDTH, PANEL_WIDTH, MARGIN, HEAD = 9.6, 3.7, 0.3, 0.95  # inches
+PANEL_WIDTH, MARGIN, HEAD = 3.7, 0.3, 0.95  # inches
+NARROWEST_MAP, WIDEST_MAP = 9.6, 15.0  # inches
 SHORTEST_MAP, TALLEST_MAP = 6.6, 10.5  # inches
 AROUND = 0.06  # of the region's size, shown around it
 
-LAND, GROUND, PAVEMENT, ROAD, KERB = "#f3f4f1", "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
+LAND, PAVEMENT, ROAD, KERB = "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
 HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
 WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
 ROW, LINE = 0.42, 0.24  # inches that a sensor and a line of the legend take in the panel
 CRACK = 0.06  # metres
 FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
 
-BACK, SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(9)
+SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
 def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment) -> None:
@@ -71,12 +71,11 @@ def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: 
 
 def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Figure:
     """Return the plan as a figure."""
-    window = _window(site.region)
-    width, height = window[2] - window[0], window[3] - window[1]
-    map_height = MAP_WIDTH * height / width
-    figure = Figure((MAP_WIDTH + PANEL_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
+    map_width, map_height = _map_size(site.region)
+    window = _window(site.region, map_height / map_width)
+    figure = Figure((map_width + PANEL_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)  # measures text
-    plan = _axes(figure, MARGIN, MARGIN, MAP_WIDTH, map_height)
+    plan = _axes(figure, MARGIN, MARGIN, map_width, map_height)
     plan.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
     shown = shapely.box(*window)
 
@@ -85,26 +84,38 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     norm = _draw_obstacles(plan, geometry.occluders, site, shown)
     _draw_areas(plan, geometry, site.region)
     _draw_candidates(plan, site)
-    draw_sensors(plan, deployment, np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2), SENSOR)
-    _draw_scale(plan, width)
-    _draw_north(plan)
+    sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
+    draw_sensors(plan, deployment, sensors, site.targets.xyz[:, :2], zorder=SENSOR)
+    inch = (window[2] - window[0]) / map_width
+    _draw_scale(plan, inch)
+    _draw_north(plan, inch)
     draw_title(figure, site, deployment, MARGIN)
-    panel = _axes(figure, MAP_WIDTH + 2 * MARGIN, MARGIN, PANEL_WIDTH, map_height)
+    panel = _axes(figure, map_width + 2 * MARGIN, MARGIN, PANEL_WIDTH, map_height)
     panel.set(xlim=(0.0, PANEL_WIDTH), ylim=(map_height, 0.0), facecolor=PAPER)
     panel.axis("off")
     _Panel(panel).draw(geometry, site, deployment, norm, map_height)
     return figure
 
 
-def _window(region: BaseGeometry) -> tuple[float, float, float, float]:
-    """Return the part of the plane to show: the region with some room, of a shape that fits the page."""
-    left, bottom, right, top = region.bounds
-    around = AROUND * max(right - left, top - bottom)
-    width, height = right - left + 2 * around, top - bottom + 2 * around
-    shape = min(max(height / width, SHORTEST_MAP / MAP_WIDTH), TALLEST_MAP / MAP_WIDTH)
+def _map_size(region: BaseGeometry) -> tuple[float, float]:
+    """Return width and height of the map on the page in inches, as near to the region's shape as fits."""
+    _, _, width, height = _bounds(region)
+    map_height = min(max(NARROWEST_MAP * height / width, SHORTEST_MAP), TALLEST_MAP)
+    return min(max(map_height * width / height, NARROWEST_MAP), WIDEST_MAP), map_height
+
+
+def _window(region: BaseGeometry, shape: float) -> tuple[float, float, float, float]:
+    """Return the part of the plane to show: the region with some room, and ``shape`` times as high as wide."""
+    x, y, width, height = _bounds(region)
     width, height = max(width, height / shape), max(height, width * shape)
-    x, y = (left + right) / 2, (bottom + top) / 2
     return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def _bounds(region: BaseGeometry) -> tuple[float, float, float, float]:
+    """Return the middle, width and height of the region with some room around it."""
+    left, bottom, right, top = region.bounds
+    around = 2 * AROUND * max(right - left, top - bottom)
+    return (left + right) / 2, (bottom + top) / 2, right - left + around, top - bottom + around
 
 
 def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
@@ -118,8 +129,6 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
-    for mesh in geometry.ground:
-        _draw_area(plan, _footprint(mesh, shown), facecolor=GROUND, edgecolor="none", zorder=BACK)
     pavement = shapely.intersection(geometry.candidate_areas, shown)
     _draw_area(plan, _healed(pavement), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
@@ -179,7 +188,7 @@ def _road_level(site: Site, points: Float) -> Float:
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
-    _draw_area(plan, region, facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    _draw_area(plan, _healed(region), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
         (geometry.forbidden_areas, FORBIDDEN, "////"),
         (geometry.mandatory_areas, MANDATORY, "...."),
@@ -220,11 +229,10 @@ SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "
 POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
 
 
-def _draw_scale(plan: Axes, width: float) -> None:
-    """Draw a bar of a round length, about a fifth of the picture."""
-    decade = 10.0 ** math.floor(math.log10(width / 5))
-    length = max(step * decade for step in (1, 2, 5) if step * decade <= width / 5)
-    inch = width / MAP_WIDTH
+def _draw_scale(plan: Axes, inch: float) -> None:
+    """Draw a bar of a round length, at most two inches of so many metres."""
+    decade = 10.0 ** math.floor(math.log10(2 * inch))
+    length = max(step * decade for step in (1, 2, 5) if step * decade <= 2 * inch)
     left, bottom = plan.get_xlim()[0] + 0.25 * inch, plan.get_ylim()[0] + 0.25 * inch
     plan.add_patch(
         Rectangle(
@@ -254,10 +262,9 @@ def _draw_scale(plan: Axes, width: float) -> None:
         plan.text(left + at, bottom + 0.13 * inch, words, ha="center", va="bottom", size=8, color=INK, zorder=TEXT)
 
 
-def _draw_north(plan: Axes) -> None:
+def _draw_north(plan: Axes, inch: float) -> None:
     """Draw an arrow along +y, which is north in map coordinates."""
-    (left, right), (_, top) = plan.get_xlim(), plan.get_ylim()
-    inch = (right - left) / MAP_WIDTH
+    right, top = plan.get_xlim()[1], plan.get_ylim()[1]
     x, y = right - 0.38 * inch, top - 0.82 * inch
     plan.add_patch(
         Rectangle(
@@ -288,12 +295,15 @@ class _Panel:
         """Write all parts, with as many sensors as there is room for in the height."""
         weights = sorted({area.weight for area in geometry.weighted_regions})
         below = 3.72 + LINE * (3 + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas))
-        self._sensors(deployment, rows=max(1, int((height - below) / ROW)))
+        self._sensors(deployment, height - below)
         self._targets(site, deployment)
         self._map(geometry, site, weights)
         self._heights(heights)
 
-    def _sensors(self, deployment: Deployment, rows: int) -> None:
+    def _sensors(self, deployment: Deployment, room: float) -> None:
+        """List the sensors, without their positions where room is short, and as many as fit."""
+        detailed = len(deployment.sensors) * ROW <= room
+        rows = max(1, int(room / (ROW if detailed else LINE)))
         self._heading("Sensors")
         markers = markers_of(deployment)
         for sensor in deployment.sensors[:rows]:
@@ -301,13 +311,13 @@ class _Panel:
             self._text(0.34, sensor.label, weight="bold")
             self._text(0.70, f"{_short(sensor.model.name, 28)}, {sensor.height:.3g} m")
             self._text(PANEL_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
-            self.y += ROW - LINE
-            self._text(0.70, _short(sensor.position_name, 40), color=SOFT_INK, size=8)
-            self.y += LINE
+            if detailed:
+                self._text(0.70, _short(sensor.position_name, 40), y=self.y + ROW - LINE, color=SOFT_INK, size=8)
+            self.y += ROW if detailed else LINE
         if len(deployment.sensors) > rows:
             self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
             self.y += LINE
-        self._text(0.0, "Per cent of the road that each sees alone", color=SOFT_INK, size=8)
+        self._text(0.0, "Share of the road that each sees by itself", color=SOFT_INK, size=8)
         self.y += 0.38
 
     def _targets(self, site: Site, deployment: Deployment) -> None:

@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .street_furniture import Solid
-
-Float = NDArray[np.float64]
 
 
 class Role(Enum):

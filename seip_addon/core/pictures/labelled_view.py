@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,32 +11,43 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 
+from ..arrays import Boolean, Float
+from ..storage import whole_file
 from .drawing import draw_sensors, draw_title, percent
-from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
-from .storage import whole_file
+from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 
 if TYPE_CHECKING:
     import os
 
-    from numpy.typing import NDArray
+    from ..results.deployment import Deployment
+    from ..site import Site
 
-    from .deployment import Deployment
-    from .site import Site
-
-    Float = NDArray[np.float64]
 
 DPI = 160
 HEAD, FOOT, MARGIN = 0.86, 0.42, 0.2  # inches
-LEGEND_STEP = 2.6  # inches
+LEGEND_STEP = 2.35  # inches
 HAZE = "#e9edf0"
 
 
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Where things are on a picture, in shares of its width and height from the lower left.
+
+    Parameters
+    ----------
+    sensors : (k, 2) float64
+    hidden : (k,) bool
+        Sensors that something stands in front of.
+    targets : (t, 2) float64
+    """
+
+    sensors: Float
+    hidden: Boolean
+    targets: Float
+
+
 def save_labelled_view(
-    path: str | os.PathLike[str],
-    picture: str | os.PathLike[str],
-    site: Site,
-    deployment: Deployment,
-    anchors: Float,
+    path: str | os.PathLike[str], picture: str | os.PathLike[str], site: Site, deployment: Deployment, sight: Sight
 ) -> None:
     """Write title, labels and legend on a picture of the scene, as PNG.
 
@@ -48,8 +60,8 @@ def save_labelled_view(
     site : Site
     deployment : Deployment
         The chosen sensors and what they see.
-    anchors : (k, 2) float64
-        Where each sensor is on the picture, in shares of its width and height from the lower left.
+    sight : Sight
+        Where they are on the picture.
     """
     pixels = imread(str(picture))
     height, width = pixels.shape[0] / DPI, pixels.shape[1] / DPI
@@ -61,15 +73,16 @@ def save_labelled_view(
     view.spines[:].set_visible(False)
     view.imshow(pixels, extent=(0.0, width, 0.0, height), interpolation="nearest", aspect="auto")
     view.set(xlim=(0.0, width), ylim=(0.0, height))
-    draw_sensors(view, deployment, anchors * (width, height), zorder=2)
+    size = np.array((width, height))
+    draw_sensors(view, deployment, sight.sensors * size, sight.targets * size, zorder=2, hidden=sight.hidden)
     draw_title(figure, site, deployment, MARGIN)
-    _draw_legend(figure, deployment)
+    _draw_legend(figure, deployment, any_hidden=bool(sight.hidden.any()))
     with whole_file(path) as temporary:
         figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
-def _draw_legend(figure: Figure, deployment: Deployment) -> None:
-    """Write at the foot of the picture what the colours on the road mean."""
+def _draw_legend(figure: Figure, deployment: Deployment, *, any_hidden: bool) -> None:
+    """Write at the foot of the picture what the colours on the road and the marks mean."""
     width, page = figure.get_size_inches()
     foot = figure.add_axes((0.0, 0.0, 1.0, FOOT / page))
     foot.set(xlim=(0.0, width), ylim=(0.0, FOOT))
@@ -79,3 +92,8 @@ def _draw_legend(figure: Figure, deployment: Deployment) -> None:
         share = np.count_nonzero(np.minimum(deployment.seen_by, SEEN_TWICE) == times) / len(deployment.seen_by)
         foot.add_patch(Rectangle((x, FOOT / 2 - 0.07), 0.2, 0.14, facecolor=SEEN_COLOURS[times]))
         foot.text(x + 0.3, FOOT / 2, f"{SEEN_WORDS[times]}  {percent(share)}", va="center", size=9, color=INK)
+    if any_hidden:
+        x = width - MARGIN
+        foot.text(
+            x, FOOT / 2, "outlined sensors stand behind something", ha="right", va="center", size=8, color=SOFT_INK
+        )

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from . import road_surface, street_furniture
-from .errors import SeipError
-from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
-from .opendrive import (
+from ..arrays import Float
+from ..errors import SeipError
+from ..opendrive import (
     LaneSurface,
     RoadMap,
     find_junction,
@@ -23,11 +21,11 @@ from .opendrive import (
     placed_objects,
     placed_signals,
 )
-from .site_description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
-from .site_parts import Part, Role
+from . import road_surface, street_furniture
+from .description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
+from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
+from .parts import Part, Role
 from .terrain import Terrain
-
-Float = NDArray[np.float64]
 
 MARGIN = 40.0
 """How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
@@ -39,8 +37,15 @@ VERGE_BELOW = 0.03
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
 VERGE_SPACING = 12.0
-REGION_ABOVE = 0.05
-REGION_SPACING = 10.0
+VEIL_SPACING = 10.0
+VEILS = {
+    Role.REGION: (0.05, "region veil"),
+    Role.WEIGHTED_REGIONS: (0.08, "weighted veil"),
+    Role.FORBIDDEN_AREAS: (0.11, "forbidden veil"),
+    Role.MANDATORY_AREAS: (0.14, "mandatory veil"),
+    Role.CANDIDATE_AREAS: (0.05, "candidate veil"),
+}
+"""Height above the ground (metres) and material of areas that are not there to be seen."""
 
 SURFACES = {
     "driving": ("Driving lanes", "asphalt", Role.ROADS),
@@ -114,21 +119,17 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
     region = _region(road_map, surfaces, description, centre)
     origin = _origin(surfaces, centre)
     street = _street(surfaces, origin, _shifted(region, -origin))
-    signals = placed_signals(road_map, area=_shifted(street.extent, origin))
-    objects = placed_objects(road_map, area=_shifted(street.extent, origin))
-    furniture = [
-        *object_parts(objects, origin, street.carriageway),
-        *signal_parts(signals, origin, street.carriageway, street.terrain),
-        *_described_parts(description, street),
-    ]
+    around = _shifted(street.extent, origin)
+    objects = object_parts(placed_objects(road_map, area=around), origin, street.carriageway)
+    signals = signal_parts(placed_signals(road_map, area=around), origin, street.carriageway, street.terrain)
+    furniture = [*objects, *signals, *_described_parts(description, street)]
     pavement, notes = _pavement_parts(street)
     weighted = _weighted_areas(road_map, surfaces, description, centre)
-    has_signals = any(Role.POLES in part.roles and part.name.startswith("Signal") for part in furniture)
     parts = [
         *_surface_parts(street),
         *pavement,
         _verge_part(street, furniture),
-        _marking_part(street, stop_lines=has_signals),
+        _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
         _region_part(street),
         *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
@@ -249,8 +250,7 @@ def _verge_strip(street: _Street) -> Part:
     inner, outer = VERGE_STRIP
     strip = street.carriageway.buffer(outer).difference(street.carriageway.buffer(inner))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
-    triangles = street.terrain.drape(near, spacing=REGION_SPACING)
-    return Part("Verge strip", _solid(triangles, "verge"), (Role.CANDIDATE_AREAS,))
+    return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
 def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
@@ -273,7 +273,7 @@ def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
 
 
 def _region_part(street: _Street) -> Part:
-    return Part("Region of interest", _draped(street.region, street), (Role.REGION,))
+    return _area_part("Region of interest", street.region, Role.REGION, street)
 
 
 def _weighted_areas(
@@ -299,7 +299,7 @@ def _weighted_parts(
     for name, area, weight in areas:
         local = _shifted(area, -street.origin)
         if local.intersects(street.region):
-            yield Part(name, _draped(local, street), (Role.WEIGHTED_REGIONS,), weight=weight)
+            yield _area_part(name, local, Role.WEIGHTED_REGIONS, street, weight=weight)
         elif described:
             raise SeipError(
                 f"the weighted region {name!r} lies outside the region of interest; move it or widen the region"
@@ -329,7 +329,7 @@ def _area_parts(description: SiteDescription, street: _Street) -> list[Part]:
         (description.mandatory_areas, Role.MANDATORY_AREAS),
     )
     return [
-        Part(area.name, _draped(_shifted(area.polygon, -street.origin), street), (role,))
+        _area_part(area.name, _shifted(area.polygon, -street.origin), role, street)
         for areas, role in kinds
         for area in areas
     ]
@@ -377,8 +377,11 @@ def _on_ground(plan: Float, street: _Street) -> Float:
     return np.column_stack([local, street.terrain.height(local)])
 
 
-def _draped(area: BaseGeometry, street: _Street) -> street_furniture.Solid:
-    return _solid(street.terrain.drape(area, spacing=REGION_SPACING, above=REGION_ABOVE), "outline")
+def _area_part(name: str, area: BaseGeometry, role: Role, street: _Street, *, weight: float | None = None) -> Part:
+    """Return an area in plan as a veil over the ground."""
+    above, material = VEILS[role]
+    triangles = street.terrain.drape(area, spacing=VEIL_SPACING, above=above)
+    return Part(name, _solid(triangles, material), (role,), weight=weight)
 
 
 def _solid(faces: Float, material: str) -> street_furniture.Solid:

@@ -8,16 +8,14 @@ from collections.abc import Iterable
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from ..arrays import Float
+from ..opendrive import Outline, PlacedObject, PlacedSignal
 from . import street_furniture
-from .opendrive import Outline, PlacedObject, PlacedSignal
-from .site_parts import Part, Role
+from .parts import Part, Role
 from .street_furniture import Solid
 from .terrain import Terrain
-
-Float = NDArray[np.float64]
 
 FLAT_KINDS = {"crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
 PLANT_KINDS = {"tree", "vegetation"}

@@ -6,14 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .lidar import LidarModel
-from .site import Site
-
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
+from ..arrays import Boolean, Float, Integer
+from ..lidar import LidarModel
+from ..site import Site
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from ..arrays import Float
 
 POST_SIDES = 6
 TRUNK_SIDES = 6
@@ -103,12 +102,11 @@ def fence(base: Float, height: Float, thickness: float, *, side: str) -> Solid:
 def windows(outline: Float, base: float, height: float) -> Solid:
     """Return the panes of a block: one in each bay of each storey, wide ones on the ground floor."""
     ring = outline[::-1] if _signed_area(outline) < 0 else outline
-    storeys = max(1, int(height / STOREY))
+    storeys = int(height / STOREY + 0.1)  # a low top storey has windows too
     panes = [
         _panes(start, stop, base + storey * STOREY, shop=storey == 0)
         for start, stop in zip(ring, np.roll(ring, -1, axis=0), strict=True)
         for storey in range(storeys)
-        if height - storey * STOREY > 0.9 * STOREY
     ]
     quads = np.concatenate([np.empty((0, 4, 3)), *panes])
     faces = tuple(map(tuple, np.arange(4 * len(quads)).reshape(-1, 4).tolist()))
@@ -167,7 +165,8 @@ def tree(height: float, crown_diameter: float, variant: int) -> Solid:
     bumps = 1.0 - 0.22 * random.random(len(directions))
     half = np.array([crown_diameter, crown_diameter, crown_height]) / 2
     shape = directions * bumps[:, None]
-    shape /= np.abs(shape).max(axis=0)  # the crown is as wide and as high as asked for
+    low, high = shape.min(axis=0), shape.max(axis=0)
+    shape = 2 * (shape - low) / (high - low) - 1  # the crown is as wide and as high as asked for
     crown = Solid(shape * half + [0, 0, middle], faces, ("leaves",) * len(faces))
     return join(trunk, crown)
 

@@ -15,20 +15,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float
+from ..errors import SeipError
+from ..placement import Placement
+from ..site import Site
+from ..storage import whole_file
 from .deployment import Deployment, Sensor
-from .errors import SeipError
-from .placement import Placement
-from .site import Site
-from .storage import whole_file
 
-Float = NDArray[np.float64]
 Record = dict[str, Any]
 
 SCHEMA = "seip-placement/1"
 LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
-MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
+MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
 
 @dataclass(frozen=True)
@@ -197,7 +196,8 @@ def _greedy(greedy: Placement, placement: Placement) -> Record:
     lost = placement.objective - greedy.objective
     return {
         "value": _significant(greedy.objective),
-        "bound": _significant(greedy.bound),
+        # The better of the two bounds: once the optimum is proven, it no longer hangs on a platform's rounding.
+        "bound": _significant(min(greedy.bound, placement.bound)),
         "gap_to_placement": _share(lost / placement.objective) if placement.objective > 0.0 else 0.0,
         "poses": [int(pose) for pose in greedy.chosen],
         "notes": list(greedy.notes),

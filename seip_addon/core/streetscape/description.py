@@ -1,6 +1,6 @@
 """The site description: what a map does not say about a place, read from a small TOML file.
 
-The keys are explained in docs/formats-site.md. Coordinates are map
+The keys are explained in docs/site-description.md. Coordinates are map
 coordinates in metres; headings are degrees in the file and radians here.
 """
 
@@ -15,13 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.validation import explain_validity
 
-from .errors import SeipError
-
-Float = NDArray[np.float64]
+from ..arrays import Float
+from ..errors import SeipError
 
 DEFAULT_RADIUS = 80.0
 DEFAULT_WEIGHT = 2.0

@@ -1,0 +1,1 @@
+"""Plans, labelled views and charts, drawn with matplotlib."""

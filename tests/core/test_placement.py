@@ -1,0 +1,272 @@
+"""Placement: users' mistakes, limits of time and of numbers, and what the answer says."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pulp.apis.coin_api
+import pytest
+from street_visibility import street_problem
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, integer_program, solve, solve_greedy
+from seip_addon.core.placement.instance import make_instance, merge_targets
+from seip_addon.core.placement.integer_program import cover_by_cliques
+from seip_addon.core.progress import finish
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def row_problem(visible: list[list[int]], **changes: object) -> PlacementProblem:
+    """Poses 10 m apart on a line, one at each position, all of one type."""
+    number, targets = np.shape(visible)
+    problem = PlacementProblem(
+        visible=np.array(visible, bool),
+        weights=np.ones(targets),
+        prices=np.full(number, 6000.0),
+        positions=np.arange(number),
+        xyz=np.column_stack([10.0 * np.arange(number), np.zeros(number), np.full(number, 5.0)]),
+        labels=np.full(number, "type1"),
+    )
+    return replace(problem, **changes)  # type: ignore[arg-type]
+
+
+halves = [[1, 1, 0, 0], [0, 0, 1, 1], [0, 1, 1, 0], [0, 0, 0, 1]]
+
+
+def test_two_suffice_where_four_are_asked_for() -> None:
+    placement = finish(solve(row_problem(halves, count=4)))
+    assert placement.chosen.tolist() == [0, 1]
+    assert placement.status == "optimal"
+    assert any("asked for 4 sensors, 2 suffice" in note for note in placement.notes)
+
+
+def test_of_equal_placements_the_cheapest_then_the_most_doubly_seen() -> None:
+    visible = [[1, 1, 1, 0], [0, 0, 0, 1], [0, 0, 1, 1], [0, 1, 1, 1]]
+    cheap_second = row_problem(visible, count=2, prices=np.array([5.0, 1.0, 2.0, 2.0]))
+    assert finish(solve(cheap_second)).chosen.tolist() == [0, 1]
+    assert finish(solve(row_problem(visible, count=2))).chosen.tolist() == [0, 3]
+
+
+def test_a_bound_that_only_a_better_placement_meets_proves_nothing() -> None:
+    visible = [[1, 1, 1, 1, 1, 0, 0], [1, 1, 1, 0, 0, 0, 1], [1, 1, 1, 1, 0, 1, 0], [1] * 7]
+    problem = row_problem(visible, positions=np.array([0, 1, 2, 2]), mandatory=np.array([[0, 1, 1, 0]], bool), count=2)
+    assert finish(solve(problem)).chosen.tolist() == [1, 3]
+
+
+def test_seen_by_counts_the_chosen_sensors() -> None:
+    placement = finish(solve(row_problem(halves, count=3, mandatory=np.array([[0, 0, 1, 0]], bool))))
+    assert placement.seen_by.tolist() == [1, 2, 2, 1]
+    assert placement.covered == 4
+    assert placement.price == 18000
+
+
+def test_a_budget_buys_the_best_mix() -> None:
+    problem = row_problem(halves, prices=np.array([3.0, 3.0, 1.0, 1.0]), budget=4.0)
+    placement = finish(solve(problem))
+    assert placement.covered == 3
+    assert placement.chosen.tolist() == [2, 3]
+    assert finish(solve(replace(problem, budget=6.0))).covered == 4
+
+
+def test_sensors_keep_their_distance() -> None:
+    placement = finish(solve(row_problem(halves, min_distance=10.5)))
+    assert np.diff(placement.chosen).min() > 1
+    assert finish(solve(row_problem(halves, min_distance=10.0))).covered == 4
+
+
+def test_duplicates_and_blind_candidates_change_nothing() -> None:
+    plain = finish(solve(row_problem(halves, count=2)))
+    more = finish(solve(row_problem([*halves, *halves, [0, 0, 0, 0]], count=2)))
+    assert (more.objective, more.chosen.tolist()) == (plain.objective, plain.chosen.tolist())
+
+
+def test_targets_that_nothing_sees_count_against_coverage_only() -> None:
+    problem = row_problem([[1, 0, 0], [0, 1, 0]])
+    assert finish(solve(problem)).objective == 2
+    with pytest.raises(SeipError, match=r"100\.00% cannot be reached: no placement covers more than 66\.67%"):
+        finish(cheapest_for_coverage(problem, 1.0))
+
+
+def test_reverse_with_equal_prices_takes_the_fewest() -> None:
+    placement = finish(cheapest_for_coverage(row_problem(halves), 1.0))
+    assert (placement.chosen.tolist(), placement.objective, placement.bound) == ([0, 1], 12000, 12000)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_scaling_all_weights_changes_nothing(scale: float) -> None:
+    problem = street_problem(20, 300, blocks=1, count=3)
+    plain = finish(solve(problem))
+    scaled = finish(solve(replace(problem, weights=problem.weights * scale)))
+    np.testing.assert_array_equal(scaled.chosen, plain.chosen)
+    assert scaled.objective == pytest.approx(plain.objective * scale, rel=1e-12)
+
+
+def test_weights_of_very_different_size() -> None:
+    weights = np.array([1e9, 1e-9, 1.0, 1.0])
+    placement = finish(solve(row_problem([[1, 0, 0, 0], [0, 1, 1, 1]], weights=weights, count=1)))
+    assert placement.chosen.tolist() == [0]
+
+
+@pytest.mark.parametrize("limit", [0.0, 0.01, 0.3])
+def test_a_short_time_limit_gives_an_incumbent_and_a_valid_bound(limit: float) -> None:
+    problem = street_problem(66, 1000, blocks=3, count=5)
+    short, greedy = finish(solve(problem, time_limit=limit)), solve_greedy(problem)
+    best = finish(solve(problem, time_limit=3.0))
+    assert greedy.objective <= short.objective <= best.bound
+    assert short.bound >= best.objective
+    assert short.gap == pytest.approx((short.bound - short.objective) / short.objective)
+    if short.status == "feasible":
+        assert any("too short to prove" in note for note in short.notes)
+
+
+def test_a_short_time_limit_on_the_reverse_problem() -> None:
+    placement = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=0.01))
+    assert placement.covered >= 800
+    best = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=10.0))
+    assert 6000 <= placement.bound <= best.price <= placement.objective == placement.price
+
+
+def test_solvers_agree_on_a_street() -> None:
+    problem = street_problem(25, 400, blocks=2, count=3, min_distance=30.0)
+    by_highs, by_cbc = finish(solve(problem)), finish(solve(problem, solver="cbc"))
+    assert by_highs.status == by_cbc.status == "optimal"
+    np.testing.assert_array_equal(by_highs.chosen, by_cbc.chosen)
+    assert by_highs.solver.startswith("HiGHS")
+    assert by_cbc.solver.startswith("CBC")
+
+
+def test_cbc_without_its_run_bit_is_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / "cbc"
+    shutil.copyfile(pulp.apis.coin_api.pulp_cbc_path, broken)
+    broken.chmod(stat.S_IRUSR)
+    monkeypatch.setattr(integer_program, "pulp_cbc_path", str(broken))
+    assert finish(solve(row_problem(halves, count=2), solver="cbc")).covered == 4
+    assert not os.access(broken, os.X_OK)
+
+
+def test_merging_targets_keeps_weight_and_does_not_depend_on_order() -> None:
+    rng = np.random.default_rng(3)
+    visible, weight = rng.random((4, 300)) < 0.5, rng.random(300)
+    order = rng.permutation(300)
+    merged, sums = merge_targets(visible, weight)
+    again, same = merge_targets(visible[:, order], weight[order])
+    assert len(np.unique(merged, axis=1).T) == len(sums) == 15
+    assert sums.sum() == pytest.approx(weight[visible.any(axis=0)].sum())
+    np.testing.assert_array_equal(merged, again)
+    np.testing.assert_array_equal(sums, same)
+
+
+def test_of_many_pairs_that_see_all_the_one_that_sees_most_twice() -> None:
+    problem = street_problem(60, 1000, blocks=2, count=6)
+    visible = problem.visible.copy()
+    visible[7] = np.arange(1000) > 0
+    visible[9] = np.arange(1000) % 2 == 0
+    visible[100] = np.arange(1000) % 2 == 1
+    visible[11, 0] = True
+    problem = replace(problem, visible=visible)
+    numbers = visible.astype(np.float64)
+    pairs = ((1 - numbers) @ (1 - numbers).T == 0) & (problem.positions[:, None] != problem.positions)
+    placement = finish(solve(problem))
+    assert pairs.sum() > 40
+    assert pairs[tuple(placement.chosen)]
+    assert (placement.seen_by > 1).sum() == (numbers @ numbers.T)[pairs].max()
+    assert len(placement.notes) == 1
+
+
+def test_dominated_candidates_at_one_position_are_dropped() -> None:
+    problem = row_problem([[1, 1, 0], [1, 0, 0], [0, 0, 1]], positions=np.array([0, 0, 1]))
+    instance, _ = make_instance(problem)
+    assert instance.original.tolist() == [0, 2]
+    elsewhere, _ = make_instance(replace(problem, positions=np.arange(3)))
+    assert elsewhere.original.tolist() == [0, 1, 2]
+
+
+def test_cliques_cover_every_conflict_and_nothing_else() -> None:
+    rng = np.random.default_rng(5)
+    conflict = np.triu(rng.random((20, 20)) < 0.3, 1)
+    conflict |= conflict.T
+    covered = np.zeros_like(conflict)
+    for clique in cover_by_cliques(conflict):
+        covered[np.ix_(clique, clique)] = True
+    np.fill_diagonal(covered, val=False)
+    np.testing.assert_array_equal(covered, conflict)
+
+
+nowhere = np.array([[0, 0, 0, 0]], bool)
+first_two = np.array([[1, 0, 0, 0], [0, 1, 0, 0]], bool)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"count": 0}, "asked for 0 sensors; ask for at least 1"),
+        ({"count": 5}, "asked for 5 sensors, but there are 4 positions"),
+        ({"count": 4, "forbidden": np.array([True, False, False, False])}, "there are 3 positions"),
+        ({"budget": 5000.0}, "budget of 5000 is below the cheapest sensor, which costs 6000"),
+        ({"budget": float("nan")}, "below the cheapest sensor"),
+        ({"weights": np.array([1.0, -1.0, 1.0, 1.0])}, "every weight must be"),
+        ({"weights": np.array([1.0, np.nan, 1.0, 1.0])}, "every weight must be"),
+        ({"weights": np.zeros(4)}, "every target weighs 0"),
+        ({"prices": np.array([1.0, np.inf, 1.0, 1.0])}, "every price must be"),
+        ({"forbidden": np.ones(4, bool)}, "every candidate is forbidden"),
+        ({"xyz": np.full((4, 3), np.nan)}, "coordinates are not finite"),
+        ({"min_distance": -1.0}, "minimum distance is -1.0 m"),
+        ({"mandatory": nowhere}, "mandatory group 1 must carry a sensor"),
+        (
+            {"mandatory": first_two, "mandatory_names": np.array(["A", "B"]), "forbidden": first_two[1]},
+            "B must carry a sensor, but every candidate there is forbidden",
+        ),
+        ({"visible": np.zeros((4, 4), bool)}, "no candidate sees any target"),
+        ({"mandatory": first_two, "count": 1}, "cannot all carry a sensor with 1 sensors; ask for at least 2"),
+        ({"mandatory": first_two, "budget": 6000.0}, "within the budget of 6000; raise it to at least 12000"),
+        ({"mandatory": first_two, "min_distance": 15.0}, "at least 15 m apart; lower the minimum distance"),
+        ({"mandatory": first_two, "positions": np.zeros(4, np.int64)}, "compete for the same positions"),
+        (
+            {"mandatory": first_two, "min_distance": 15.0, "count": 1, "budget": 6000.0},
+            "within the number, budget and minimum distance together",
+        ),
+    ],
+)
+def test_mistakes_are_named_in_one_sentence(changes: dict[str, object], sentence: str) -> None:
+    with pytest.raises(SeipError, match=sentence.replace("(", r"\(")):
+        finish(solve(row_problem(**({"visible": halves} | changes))))  # type: ignore[arg-type]
+
+
+def test_no_candidates_and_no_targets() -> None:
+    with pytest.raises(SeipError, match="no candidate to choose from"):
+        replace(row_problem(halves), visible=np.zeros((0, 4), bool))
+    with pytest.raises(SeipError, match="no target to see"):
+        row_problem([[], []])
+
+
+@pytest.mark.parametrize("coverage", [0.0, -0.5, 1.01, float("nan")])
+def test_a_coverage_is_a_share(coverage: float) -> None:
+    with pytest.raises(SeipError, match="give a share above 0"):
+        finish(cheapest_for_coverage(row_problem(halves), coverage))
+
+
+def test_coverage_out_of_reach_of_the_limits() -> None:
+    with pytest.raises(SeipError, match=r"75\.00% cannot be reached: no placement covers more than 50\.00%"):
+        finish(cheapest_for_coverage(row_problem(halves, count=1), 0.75))
+
+
+def test_unknown_and_missing_solvers_name_the_others() -> None:
+    with pytest.raises(SeipError, match="unknown solver 'cplex'; choose among highs, cbc"):
+        finish(solve(row_problem(halves), solver="cplex"))
+    if not integer_program.is_available("gurobi"):
+        with pytest.raises(SeipError, match="gurobi is not available here; choose among highs, cbc"):
+            finish(solve(row_problem(halves), solver="gurobi"))
+
+
+def test_greedy_states_its_guarantee() -> None:
+    assert "1 - 1/e" in solve_greedy(row_problem(halves, count=2)).notes[0]
+    assert "one half" in solve_greedy(row_problem(halves, count=2, positions=np.array([0, 0, 1, 1]))).notes[0]
+    assert "(1 - 1/e)/2" in solve_greedy(row_problem(halves, budget=12000.0)).notes[0]
+    assert "no guarantee" in solve_greedy(row_problem(halves, count=2, min_distance=5.0)).notes[0]

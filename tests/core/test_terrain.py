@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.streetscape.terrain import Terrain, cut, plane_height, triangulate
+
+SQUARE = np.array([[[0, 0, 1], [4, 0, 1], [4, 4, 3]], [[0, 0, 1], [4, 4, 3], [0, 4, 3]]], dtype=float)
+"""The plane z = 1 + y / 2 over a square of side 4."""
+
+L_SHAPE = shapely.Polygon([(0, 0), (9, 0), (9, 3), (3, 3), (3, 9), (0, 9)])
+
+
+def plan_area(triangles):
+    edges = triangles[:, 1:, :2] - triangles[:, :1, :2]
+    return (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
+
+
+@given(st.floats(0, 4), st.floats(0, 4))
+def test_height_on_a_plane_is_the_planes(x, y):
+    assert Terrain(SQUARE).height(np.array([[x, y]]))[0] == pytest.approx(1 + y / 2)
+
+
+def test_height_beside_is_that_of_the_nearest_point():
+    np.testing.assert_allclose(Terrain(SQUARE).height(np.array([[2.0, 100.0], [2.0, -7.0], [9.0, 2.0]])), [3, 1, 2])
+
+
+def test_overlapping_triangles_count_equally():
+    lower = SQUARE - [0, 0, 0.4]
+    inside = np.array([[1.0, 2.0]])
+    assert Terrain(np.concatenate([SQUARE, lower])).height(inside)[0] == pytest.approx(1.8)
+
+
+def test_upright_triangles_are_no_ground():
+    upright = np.array([[[1, 1, 50], [2, 2, 50], [1.5, 1.5, 90]]], dtype=float)
+    assert Terrain(np.concatenate([SQUARE, upright])).height(np.array([[1.5, 1.5]]))[0] == pytest.approx(1.75)
+
+
+def test_triangles_fill_an_area_once_and_face_up():
+    holed = L_SHAPE.difference(shapely.box(1, 1, 2, 2))
+    area = plan_area(triangulate(holed))
+    assert (area > 0).all()
+    assert area.sum() == pytest.approx(holed.area)
+
+
+@given(st.floats(0.7, 20), st.floats(-50, 50), st.floats(-50, 50))
+def test_draping_keeps_the_area_wherever_the_grid_falls(spacing, x, y):
+    area = shapely.affinity.translate(L_SHAPE, x, y)
+    ground = SQUARE * [100, 100, 1] - [200, 200, 0]
+    triangles = Terrain(ground).drape(area, spacing=spacing, above=0.25)
+    assert plan_area(triangles).sum() == pytest.approx(area.area, abs=1e-3)
+    expected = 1 + (triangles[..., 1] + 200) / 200 + 0.25
+    np.testing.assert_allclose(triangles[..., 2], expected, atol=1e-9)
+
+
+def test_a_draped_area_has_no_cracks():
+    """Each inner edge belongs to exactly two triangles: what is left over is the outline."""
+    triangles = Terrain(SQUARE).drape(L_SHAPE, spacing=2.0)
+    corners = np.round(triangles, 9)
+    edges = {}
+    for a, b, c in corners:
+        for start, stop in ((a, b), (b, c), (c, a)):
+            key = (tuple(start), tuple(stop))
+            edges[key] = edges.get(key, 0) + 1
+    assert set(edges.values()) == {1}
+    open_edges = [(start, stop) for start, stop in edges if (stop, start) not in edges]
+    length = sum(np.hypot(stop[0] - start[0], stop[1] - start[1]) for start, stop in open_edges)
+    assert length == pytest.approx(L_SHAPE.length)
+
+
+@given(st.floats(-1, 5), st.floats(0.1, 3))
+def test_cutting_leaves_the_rest_on_its_plane(x, size):
+    hole = shapely.box(x, 1, x + size, 1 + size)
+    rest = cut(SQUARE, hole)
+    assert plan_area(rest).sum() == pytest.approx(16 - hole.intersection(shapely.box(0, 0, 4, 4)).area, abs=1e-4)
+    np.testing.assert_allclose(rest[..., 2], 1 + rest[..., 1] / 2, atol=1e-9)
+
+
+def test_cutting_everything_leaves_nothing():
+    assert cut(SQUARE, shapely.box(-1, -1, 5, 5)).shape == (0, 3, 3)
+    assert cut(np.empty((0, 3, 3)), shapely.box(0, 0, 1, 1)).shape == (0, 3, 3)
+
+
+def test_plane_height_extends_the_triangle():
+    assert plane_height(SQUARE[:1], np.array([[-3.0, 10.0]]))[0] == pytest.approx(6.0)

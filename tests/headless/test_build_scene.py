@@ -1,0 +1,110 @@
+"""The command as a user runs it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from headless import build_scene
+
+import bpy
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.scene import collections as names
+
+ROOT = Path(__file__).resolve().parents[2]
+MAP = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="6" name="street"/>
+<road id="1" length="200" junction="-1"><planView>
+<geometry s="0" x="1000" y="2000" hdg="0" length="200"><line/></geometry>
+</planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+<lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+<lane id="-2" type="sidewalk" level="false"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>
+</right></laneSection></lanes></road></OpenDRIVE>"""
+
+
+@pytest.fixture
+def road(tmp_path):
+    path = tmp_path / "street.xodr"
+    path.write_text(MAP, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def site(tmp_path, road):
+    path = tmp_path / "site.toml"
+    path.write_text(
+        f'name = "Kerbside"\nmap = "{road.name}"\nnear = [1100, 2000]\nradius = 30\n'
+        "[[tree]]\nposition = [1100, 2005]\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+def opened(path):
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene
+
+
+@pytest.mark.parametrize("form", [["-m", "headless.build_scene"], ["headless/build_scene.py"]])
+def test_the_command_runs_as_a_module_and_as_a_file(road, tmp_path, form):
+    output = tmp_path / "site.blend"
+    done = subprocess.run(  # noqa: S603  # our own interpreter and command
+        [sys.executable, *form, str(road), "--near", "1100", "2000", "--radius", "30", "-o", str(output)],
+        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "region of interest" in done.stdout
+    assert list(opened(output)[names.ORIGIN]) == [1100, 2000, 0]
+
+
+def test_a_mistake_ends_with_one_line_and_no_file(road, tmp_path):
+    output = tmp_path / "site.blend"
+    done = subprocess.run(  # noqa: S603  # as above
+        [sys.executable, "-m", "headless.build_scene", str(road), "--near", "0", "0", "-o", str(output)],
+        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: there is no driving lane within 80 m of (0, 0)")
+    assert done.stderr.count("\n") == 1
+    assert not output.exists()
+
+
+def test_a_site_file_alone_is_enough(site, tmp_path):
+    build_scene.main([str(site), "-o", str(tmp_path / "site.blend")])
+    scene = opened(tmp_path / "site.blend")
+    assert scene[names.TITLE] == "Kerbside"
+    assert scene[names.MAP] == "street.xodr"
+    assert "Tree 1" in bpy.data.objects
+
+
+def test_the_command_line_goes_before_the_site_file(site, road, tmp_path):
+    arguments = [str(road), "--site", str(site), "--near", "1150", "2000", "-o", str(tmp_path / "site.blend")]
+    build_scene.main(arguments)
+    assert list(opened(tmp_path / "site.blend")[names.ORIGIN]) == [1150, 2000, 0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["{road}", "-o", "{out}.blend"], "no place is named"),
+        (["{road}", "--junction", "7", "-o", "{out}.blend"], "no junction '7'"),
+        (["{road}", "--near", "1100", "2000", "--radius", "-3", "-o", "{out}.blend"], "--radius must be above 0"),
+        (["{road}", "--near", "1100", "2000", "--radius", "nan", "-o", "{out}.blend"], "--radius must be above 0"),
+        (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "--near"),
+        (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"let it end in \.blend"),
+        (["{out}.xodr", "--near", "0", "0", "-o", "{out}.blend"], r"out\.xodr"),
+        (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave --site out"),
+        (["{road}", "--near", "1100", "2000", "-o", "{road}/out.blend"], "cannot write"),
+    ],
+)
+def test_mistakes_are_named(road, site, tmp_path, arguments, complaint):
+    filled = [each.format(road=road, site=site, out=tmp_path / "out") for each in arguments]
+    with pytest.raises(SeipError, match=complaint):
+        build_scene.main(filled)
+
+
+def test_a_site_file_without_a_map_says_so(tmp_path):
+    site = tmp_path / "bare.toml"
+    site.write_text("near = [0, 0]", encoding="utf-8")
+    with pytest.raises(SeipError, match="names no map"):
+        build_scene.main([str(site), "-o", str(tmp_path / "site.blend")])

@@ -1,0 +1,125 @@
+"""The scene that is built keeps the scene contract and says the same as the model."""
+
+import bpy
+import numpy as np
+import pytest
+import shapely
+from mathutils import Vector
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.streetscape.model import SiteModel
+from seip_addon.core.streetscape.parts import Part, Role
+from seip_addon.core.streetscape.street_furniture import block, tree
+from seip_addon.scene import collections as names
+from seip_addon.scene.build import COLLECTIONS, build_scene, save_blend
+from seip_addon.scene.materials import COLOURS
+
+SQUARE = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]], dtype=float)
+ORIGIN = np.array([5_412_345.0, -4_987_654.0, 312.0])
+
+
+@pytest.fixture
+def model():
+    slab = block(SQUARE, np.full(4, 0.1), side="asphalt")
+    parts = (
+        Part("Road", slab, (Role.ROADS,)),
+        Part("Pavement", slab, (Role.GROUND, Role.CANDIDATE_AREAS)),
+        Part("Region", slab, (Role.REGION,)),
+        Part("Middle", slab, (Role.WEIGHTED_REGIONS,), weight=3.0),
+        Part("Tree 1", tree(8, 5, 0), (Role.OCCLUDERS,), (3.0, 4.0, 0.5), 0.7),
+        Part("Tree 2", tree(8, 5, 0), (Role.OCCLUDERS,), (6.0, 4.0, 0.5), 0.9),
+        Part("Panes", slab, (Role.DRESSING,)),
+    )
+    return SiteModel(
+        "A crossing with quite a long name, längs der Straße " * 3,
+        ORIGIN,
+        None,
+        np.arange(4.0),
+        parts,
+        shapely.box(0, 0, 10, 10),
+        (),
+    )
+
+
+def test_each_part_is_in_the_collections_of_its_roles(model):
+    scene = finish(build_scene(model, "map.xodr"))
+    for part in model.parts:
+        homes = {collection.name for collection in bpy.data.objects[part.name].users_collection}
+        assert homes == {COLLECTIONS[role] for role in part.roles}
+    assert {COLLECTIONS[role] for role in Role} <= {child.name for child in scene.collection.children}
+
+
+def test_looks_alone_are_in_no_collection_of_the_contract(model):
+    finish(build_scene(model, "map.xodr"))
+    for name in ("Panes", "Sun", "Overview"):
+        assert not any(c.name.startswith("SEIP") for c in bpy.data.objects[name].users_collection)
+
+
+def test_shapes_arrive_as_they_are(model):
+    finish(build_scene(model, "map.xodr"))
+    bpy.context.view_layer.update()
+    for part in model.parts:
+        thing = bpy.data.objects[part.name]
+        vertices = np.array([vertex.co for vertex in thing.data.vertices])
+        np.testing.assert_allclose(vertices, part.solid.vertices, atol=1e-5)
+        assert [tuple(face.vertices) for face in thing.data.polygons] == list(part.solid.faces)
+        assert tuple(thing.matrix_world.translation) == pytest.approx(part.foot)
+        assert thing.rotation_euler.z == pytest.approx(part.yaw)
+        used = [thing.data.materials[face.material_index].name for face in thing.data.polygons]
+        assert used == [f"SEIP {name}" for name in part.solid.materials]
+
+
+def test_equal_shapes_share_a_mesh(model):
+    finish(build_scene(model, "map.xodr"))
+    assert bpy.data.objects["Tree 1"].data == bpy.data.objects["Tree 2"].data
+    assert len(bpy.data.meshes) == 2
+
+
+def test_the_scene_knows_where_it_is(model):
+    scene = finish(build_scene(model, "map.xodr"))
+    assert list(scene[names.ORIGIN]) == ORIGIN.tolist()
+    assert scene[names.TITLE] == model.name
+    assert scene[names.MAP] == "map.xodr"
+    assert list(scene[names.HEADER_OFFSET]) == [0, 1, 2, 3]
+    assert bpy.data.objects["Middle"][names.WEIGHT] == 3.0
+    assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
+
+
+def test_areas_that_only_mean_something_are_not_rendered(model):
+    finish(build_scene(model, "map.xodr"))
+    for name, is_outline in (("Region", True), ("Middle", True), ("Road", False), ("Pavement", False)):
+        thing = bpy.data.objects[name]
+        assert thing.hide_render == is_outline
+        assert not thing.hide_viewport
+
+
+def test_the_camera_sees_the_whole_region(model):
+    scene = finish(build_scene(model, "map.xodr"))
+    bpy.context.view_layer.update()
+    camera = scene.camera
+    to_camera = camera.matrix_world.inverted()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    projection = camera.calc_matrix_camera(depsgraph, x=1600, y=900)
+    for x, y in shapely.get_coordinates(model.region):
+        seen = projection @ to_camera @ Vector((x, y, 0, 1))
+        assert abs(seen.x / seen.w) < 1
+        assert abs(seen.y / seen.w) < 1
+
+
+def test_a_saved_scene_opens_again_and_leaves_no_other_file(model, tmp_path):
+    finish(build_scene(model, "map.xodr"))
+    save_blend(tmp_path / "deeper" / "site.blend")
+    assert [path.name for path in (tmp_path / "deeper").iterdir()] == ["site.blend"]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "deeper" / "site.blend"))
+    assert list(bpy.context.scene[names.ORIGIN]) == ORIGIN.tolist()
+    assert len(bpy.data.collections[names.OCCLUDERS].objects) == 2
+
+
+def test_a_name_that_is_none_of_a_blend_is_refused(tmp_path):
+    with pytest.raises(SeipError, match=r"let it end in \.blend"):
+        save_blend(tmp_path / "site.txt")
+
+
+def test_every_material_has_a_colour_that_light_can_have():
+    assert all(0 <= value <= 1 for colour in COLOURS.values() for value in colour)
