@@ -8,7 +8,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-
 from .arrays import Boolean, Integer
 from .errors import SeipError
 from .lidar import LidarModel
