@@ -3,10 +3,10 @@
 A target is seen if some return of the scan lies nearer than δ to it. So
 
 1. only rays are cast that can return from near a target (`beam_culling`);
-2. of these first, for each target, the one that should end nearest to it;
-3. a target that is still unseen is done with if the triangle which stopped that ray hides all of its surroundings
-   (`occlusion`);
-4. else the rest of its rays are cast.
+2. of these first, for each sensor and target, the one that should end nearest to it;
+3. then, for what is still unseen, bundles of neighbouring rays, each aimed at one surface about one target. A bundle
+   goes when its target is seen, or when the triangle that stopped a ray beside it is proven to stop all of it
+   (`occlusion`). Of each other bundle the middle ray is cast, and the halves beside it are bundles anew.
 
 No ray is cast twice, neither for two targets nor for two sensors that share it.
 """
@@ -52,7 +52,7 @@ class Place:
     min_intensity: float
 
     def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
-        """Tell which of a sensor's hits count as returns: within its range and strong enough."""
+        """Tell which of a sensor's hits count as returns: within its range and strong enough, (n,) bool."""
         counts = (distance >= model.min_range) & (distance <= model.max_range)
         if self.min_intensity > 0:
             corners = self.caster.triangles[triangle[counts]]
@@ -90,12 +90,13 @@ def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, in
     blocker = np.full(seen.shape, -1)
     blocker[beams.sensor[first.channel], first.target] = triangle
 
+    # every round keeps, beside each bundle, the triangle that stopped the last ray cast for it
     patches, planes = disc_patches(place.origin, surfaces, unseen)
     bundles = near_rays(beams, patches, planes)
     bundles = bundles.pick(np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target]))
     triangle = blocker[beams.sensor[bundles.channel], bundles.target]
     while len(bundles):
-        stopped = triangle >= 0
+        stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
         corners = place.caster.triangles[triangle[stopped]]
         stopped[stopped] = stopped_by(place.origin, corners, beams, bundles.pick(stopped), planes)
         bundles = bundles.pick(~stopped)
@@ -180,11 +181,12 @@ class _Returns:
         """Rows of rays in the arrays, after casting those that are new."""
         ray = self._beams.first_ray[channel] + step
         fresh = np.flatnonzero(self._row[ray] == 0)
-        numbers, which = np.unique(ray[fresh], return_index=True)
-        if len(numbers):
-            directions = self._directions(channel[fresh[which]], step[fresh[which]])
+        if len(fresh):
+            self._row[ray[fresh]] = np.arange(len(fresh))  # of bundles with the same ray the last one stands for all
+            fresh = fresh[self._row[ray[fresh]] == np.arange(len(fresh))]
+            directions = self._directions(channel[fresh], step[fresh])
             distance, triangle = self._place.caster.cast(self._place.origin, directions, self._reach)
-            self._row[numbers] = np.arange(len(numbers)) + len(self._distance)
+            self._row[ray[fresh]] = np.arange(len(fresh)) + len(self._distance)
             self._direction = np.concatenate([self._direction, directions])
             self._distance = np.concatenate([self._distance, distance])
             self._point = np.concatenate([self._point, _points(self._place.origin, directions, distance)])
