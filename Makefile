@@ -3,6 +3,7 @@
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make study       redo the coverage study on the shipped junction
+# make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
 # make clean       remove what was built; make distclean removes the environment and the wheels as well
 #
@@ -15,7 +16,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes study extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes study benchmark extension clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -44,6 +45,9 @@ scenes: environment
 
 study: environment
 	$(PY) -m headless.study scenes/junction.blend -o out/study
+
+benchmark: environment
+	$(PY) -m headless.benchmark scenes/junction.blend -o docs
 
 extension: environment
 	$(PY) -m headless.build_extension --platforms $(PLATFORMS)

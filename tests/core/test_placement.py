@@ -8,10 +8,11 @@ import stat
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from headless.measures.streets import street_problem
+
 import numpy as np
 import pulp.apis.coin_api
 import pytest
-from street_visibility import street_problem
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, integer_program, solve, solve_greedy

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from headless import build_scene, session
-from headless.benchmark import visibility_costs
+from headless.measures.visibility import visibility_costs
 
 import bpy
 import pytest

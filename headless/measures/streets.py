@@ -1,9 +1,10 @@
-"""Synthetic street visibility: junctions, wedges behind buildings, ranges. For tests and measurements."""
+"""Synthetic street visibility: junctions, wedges behind buildings, ranges. For measurements and tests."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.placement import PlacementProblem
 
 SIGHT = 110.0
@@ -45,14 +46,14 @@ def street_problem(
     )
 
 
-def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> np.ndarray:
+def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> Float:
     along = rng.uniform(0, extent, number)
     across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + rng.uniform(-half, half, number)
     flip = rng.random(number) < 0.5
     return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
 
 
-def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> np.ndarray:
+def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> Float:
     along = rng.uniform(0, extent, number)
     side = rng.choice([-1.0, 1.0], number) * offset
     across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + side
@@ -60,7 +61,7 @@ def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float
     return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
 
 
-def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> np.ndarray:
+def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> Float:
     boxes = []
     for i in range(blocks + 1):
         for j in range(blocks + 1):
@@ -70,7 +71,7 @@ def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float
     return np.array(boxes)
 
 
-def _hidden(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray, discs: np.ndarray) -> np.ndarray:
+def _hidden(posts: Float, points: Float, boxes: Float, discs: Float) -> Boolean:
     """Return whether a building or a tree stands between post and point; beyond `SIGHT` everything is hidden."""
     hidden = np.ones((len(posts), len(points)), bool)
     for index, post in enumerate(posts):
@@ -81,7 +82,7 @@ def _hidden(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray, discs: np.
     return hidden
 
 
-def _behind_boxes(step: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+def _behind_boxes(step: Float, boxes: Float) -> Boolean:
     hidden = np.zeros(len(step), bool)
     for box in boxes[(np.minimum(np.abs(boxes[:, :2]), np.abs(boxes[:, 2:])) < SIGHT).all(axis=1)]:
         first, second = box[:2] / step, box[2:] / step
@@ -91,7 +92,7 @@ def _behind_boxes(step: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     return hidden
 
 
-def _behind_discs(step: np.ndarray, discs: np.ndarray) -> np.ndarray:
+def _behind_discs(step: Float, discs: Float) -> Boolean:
     hidden = np.zeros(len(step), bool)
     length = (step**2).sum(axis=1)
     distance = np.hypot(discs[:, 0], discs[:, 1])

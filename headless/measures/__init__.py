@@ -1,0 +1,1 @@
+"""What the benchmark measures: visibility, placement, and how both grow."""

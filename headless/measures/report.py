@@ -1,0 +1,248 @@
+"""The benchmark's findings as one JSON file and one page of Markdown."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from headless.measures.growth import Growth
+from headless.measures.placement import Run
+from headless.measures.visibility import Cost, Harm
+
+from seip_addon.core.storage import whole_file
+
+
+@dataclass(frozen=True)
+class Bar:
+    """What the project holds itself to.
+
+    Parameters
+    ----------
+    what : str
+    asked : str
+    measured : str
+    met : bool
+    """
+
+    what: str
+    asked: str
+    measured: str
+    met: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """All that the benchmark measured.
+
+    Parameters
+    ----------
+    setting : dict
+        What was measured, on how many cores, with which versions.
+    costs : dict of str to Cost
+    harms : dict of str to Harm
+    limits : dict of str to float
+        By engine, how many times the time of one cast per seen target the lazy engine takes.
+    runs : sequence of Run
+    growths : sequence of Growth
+    """
+
+    setting: dict[str, Any]
+    costs: Mapping[str, Cost]
+    harms: Mapping[str, Harm]
+    limits: Mapping[str, float]
+    runs: Sequence[Run]
+    growths: Sequence[Growth]
+
+
+def bars(costs: Mapping[str, Cost], runs: Sequence[Run], names: Sequence[str]) -> list[Bar]:
+    """Hold the measurements against what was asked for.
+
+    Parameters
+    ----------
+    costs : mapping of str to Cost
+    runs : sequence of Run
+    names : three str
+        Instances: the one with few sensors, the one with many, the largest.
+    """
+    pairs = (("lazy bvh", "full bvh", 20), ("lazy embree", "full bvh", 100), ("lazy embree", "full embree", 10))
+    held = [_ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs]
+    by_name = {(run.instance, run.way): run for run in runs}
+    few, many, largest = names
+    us, cbc = by_name[few, "ours"], by_name[few, "PuLP + CBC"]
+    same = us.proven and us.objective >= cbc.objective
+    held.append(_ratio(f"ours against plain PuLP + CBC, {few}", cbc.expense.cpu / us.expense.cpu, 20, holds=same))
+    held += [_small_gap(by_name[many, "ours"], 0.01, 60, None), _small_gap(by_name[largest, "ours"], 0.015, 120, 4096)]
+    return held
+
+
+def save_json(path: str | os.PathLike[str], findings: Findings, held: Sequence[Bar]) -> None:
+    """Write all figures; what is not finite is null."""
+    runs = [asdict(run) | {"gap": run.gap, "own_gap": run.own_gap, "proven": run.proven} for run in findings.runs]
+    growths = [
+        asdict(g) | {"time_exponent": g.time_exponent, "memory_exponent": g.memory_exponent} for g in findings.growths
+    ]
+    record = {
+        "setting": findings.setting,
+        "bars": [asdict(bar) for bar in held],
+        "visibility": {way: asdict(cost) for way, cost in findings.costs.items()},
+        "harm": {name: asdict(harm) for name, harm in findings.harms.items()},
+        "times_the_limit": dict(findings.limits),
+        "placement": runs,
+        "growth": growths,
+    }
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(_finite(record), indent=1) + "\n", encoding="utf-8")
+
+
+def save_page(path: str | os.PathLike[str], findings: Findings, held: Sequence[Bar], pictures: str) -> None:
+    """Write the page; ``pictures`` is the folder of the charts, as seen from the page."""
+    parts = [
+        *_summary(findings.setting, held),
+        *_about_visibility(findings, pictures),
+        *_about_placement(findings, pictures),
+        *_about_growth(findings, pictures),
+    ]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def _summary(setting: Mapping[str, Any], held: Sequence[Bar]) -> list[str]:
+    versions = ", ".join(f"{name} {version}" for name, version in setting["versions"].items())
+    text = (
+        "Written by `make benchmark`. Seconds are of processor time and differ from machine to machine; ratios hardly "
+        "do: what is compared ran in turn in one process. "
+        f"Here: {setting['cores']} cores, {versions}."
+    )
+    rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in held]
+    return ["# Benchmark", text, _table(("", "asked", "measured", ""), rows)]
+
+
+def _about_visibility(findings: Findings, pictures: str) -> list[str]:
+    setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.harms["exact"]
+    text = (
+        f"{setting['scene']}: {setting['targets']:,} targets, {setting['poses']:,} poses, {setting['triangles']:,} "
+        f"triangles. Times are of {setting['places']} places spread evenly over the site, every type at each: the "
+        "plain loop would take hours for all. At each of them each lazy result was compared with its full scan's, bit "
+        "for bit. Errors are of the whole grid: pairs of pose and target that come out wrong, per pair that is seen "
+        f"in truth. The placement is of {setting['count']} {setting['sensor']} sensors, chosen by the simplified grid "
+        "and judged by the exact one."
+    )
+    costs = _table(
+        ("way", "times as quick as the plain loop", "s", "rays", "rays per seen target"),
+        [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
+    )
+    harm = _table(
+        ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept"),
+        [_harm_row(name, harm, exact) for name, harm in findings.harms.items()],
+    )
+    times = "; ".join(f"with {engine} it takes {n:.1f} times that" for engine, n in findings.limits.items())
+    limit = f"The least that any method can do is to cast one ray for each seen target. Of the lazy engine: {times}."
+    picture = f"![processor time against error of visibility]({pictures}/visibility.png)"
+    return ["## Visibility", text, picture, costs, harm, limit]
+
+
+def _about_placement(findings: Findings, pictures: str) -> list[str]:
+    text = (
+        f"Every way had {findings.setting['time_limit']:g} s on the clock, the largest instance twice that. The gap is "
+        "to the least bound that any way proved for the instance; the own gap is what the way proves by itself. A "
+        "plain program has one binary variable for each pose and each target, as in textbooks."
+    )
+    head = ("instance", "way", "ours is … times as quick", "s", "MB", "covers", "gap", "own gap", "")
+    picture = f"![processor time against gap of placement]({pictures}/placement.png)"
+    return ["## Placement", text, picture, _table(head, _run_rows(findings.runs))]
+
+
+def _about_growth(findings: Findings, pictures: str) -> list[str]:
+    text = (
+        "Each size ran in a process of its own. A corridor was looked at from some of its places, which stand for all. "
+        "An exponent b says that twice the size costs 2^b times as much, by least squares over all sizes."
+    )
+    head = ("work", "what grows", "sizes", "s", "exponent", "MB", "exponent of memory")
+    picture = f"![growth of time and memory]({pictures}/growth.png)"
+    return ["## Growth", text, picture, _table(head, [_growth_row(growth) for growth in findings.growths])]
+
+
+def _ratio(what: str, ratio: float, asked: float, *, holds: bool = True) -> Bar:
+    return Bar(
+        what, f"{asked:g}×", f"{ratio:.3g}×" + ("" if holds else ", not the same optimum"), holds and ratio >= asked
+    )
+
+
+def _small_gap(run: Run, gap: float, seconds: float, memory: float | None) -> Bar:
+    asked = f"proven, or a gap under {gap:.1%} in {seconds:g} s" + (f" and {memory / 1024:g} GB" if memory else "")
+    wall = run.expense.wall
+    measured = f"{'proven' if run.proven else f'gap {run.own_gap:.2%}'} in {wall:.0f} s"
+    met = run.own_gap < gap and wall < seconds * 1.1  # the limit is looked at between steps
+    if memory and run.memory:
+        measured += f" and {run.memory / 1024:.1f} GB"
+        met &= run.memory < memory
+    return Bar(f"ours, {run.instance}", asked, measured, met)
+
+
+def _cost_row(way: str, cost: Cost, plain: Cost) -> tuple[str, ...]:
+    return (
+        way,
+        f"{plain.seconds / cost.seconds:.3g}",
+        f"{cost.seconds:.3g}",
+        f"{cost.rays:,}",
+        f"{cost.rays / cost.seen:.1f}" if cost.seen else "–",
+    )
+
+
+def _harm_row(name: str, harm: Harm, exact: Harm) -> tuple[str, ...]:
+    return (
+        name,
+        f"{harm.wrong:.2%}",
+        f"{harm.claimed:.2%}",
+        f"{harm.coverage:.2%}",
+        f"{exact.coverage - harm.coverage:.2%}",
+        f"{harm.kept} of {exact.kept}",
+    )
+
+
+def _run_rows(runs: Sequence[Run]) -> list[tuple[str, ...]]:
+    us = {run.instance: run.expense.cpu for run in runs if run.way == "ours"}
+    return [
+        (
+            run.instance,
+            run.way,
+            f"{run.expense.cpu / us[run.instance]:.3g}",
+            f"{run.expense.cpu:.3g}",
+            "–" if run.memory is None else f"{run.memory:.0f}",
+            f"{run.objective:.0f}" if run.objective else "–",
+            f"{run.gap:.2%}" if run.objective else "–",
+            "proven" if run.proven else f"{run.own_gap:.2%}" if math.isfinite(run.own_gap) else "no bound",
+            run.note,
+        )
+        for run in runs
+    ]
+
+
+def _growth_row(growth: Growth) -> tuple[str, ...]:
+    memory, exponent = growth.memory, growth.memory_exponent
+    return (
+        growth.what,
+        growth.size_of,
+        " ".join(f"{size:,.0f}" for size in growth.size),
+        " ".join(f"{seconds:.3g}" for seconds in growth.seconds),
+        f"{growth.time_exponent:.2f}",
+        " ".join("–" if mega is None else f"{mega:.0f}" for mega in memory),
+        "–" if exponent is None else f"{exponent:.2f}",
+    )
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,198 @@
+"""Other ways to place sensors, as one would first think of them: to hold the project's own against.
+
+They know the plain problem alone: so many sensors, at most one at each position.
+"""
+
+from __future__ import annotations
+
+import heapq
+import importlib
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pulp
+from pulp.apis.coin_api import pulp_cbc_path
+
+from seip_addon.core.arrays import Boolean, Integer
+from seip_addon.core.placement import PlacementProblem, solve, solve_greedy
+from seip_addon.core.progress import finish
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a way found within its time.
+
+    Parameters
+    ----------
+    chosen : (k,) int64 or None
+        None where it found nothing.
+    bound : float
+        No placement covers more; infinite where it does not say.
+    note : str
+        What came out otherwise than asked.
+    """
+
+    chosen: Integer | None
+    bound: float = np.inf
+    note: str = ""
+
+
+def ours(problem: PlacementProblem, seconds: float) -> Found:
+    """Solve as the project does."""
+    placement = finish(solve(problem, time_limit=seconds))
+    return Found(placement.chosen, placement.bound)
+
+
+def plain_greedy(problem: PlacementProblem, _: float) -> Found:
+    """Take what adds most, again and again, with the project's bound."""
+    placement = solve_greedy(problem)
+    return Found(placement.chosen, placement.bound)
+
+
+def lazy_greedy(problem: PlacementProblem, _: float) -> Found:
+    """As greedy, but compute a gain anew only where the old one might still be the largest (Minoux 1978)."""
+    unseen = np.ones(problem.visible.shape[1], dtype=bool)
+    gains = problem.visible @ problem.weights
+    heap = [(-gain, pose, 0) for pose, gain in enumerate(gains.tolist())]
+    heapq.heapify(heap)
+    chosen: list[int] = []
+    while heap and len(chosen) < _count(problem):
+        gain, pose, known_at = heapq.heappop(heap)
+        if problem.positions[pose] in problem.positions[chosen]:
+            continue
+        if known_at < len(chosen):
+            gain = -float(problem.weights[problem.visible[pose] & unseen].sum())
+            heapq.heappush(heap, (gain, pose, len(chosen)))
+        else:
+            chosen.append(pose)
+            unseen &= ~problem.visible[pose]
+    return Found(np.array(chosen))
+
+
+def local_search(problem: PlacementProblem, seconds: float) -> Found:
+    """Improve the greedy choice by the best exchange of one pose for another, until none helps (Teitz, Bart 1968)."""
+    chosen = lazy_greedy(problem, seconds).chosen
+    while chosen is not None:
+        times = problem.visible[chosen].sum(axis=0)
+        best, better = _covered(problem, chosen), None
+        for gone in chosen:
+            rest = chosen[chosen != gone]
+            left = (times - problem.visible[gone]) == 0
+            gain = problem.visible[:, left] @ problem.weights[left]
+            gain[np.isin(problem.positions, problem.positions[rest])] = -1.0
+            new = int(np.argmax(gain))
+            value = _covered(problem, np.append(rest, new))
+            if value > best + 1e-9:
+                best, better = value, np.append(rest, new)
+        if better is None:
+            break
+        chosen = better
+    return Found(chosen)
+
+
+def rounded_relaxation(problem: PlacementProblem, seconds: float) -> Found:
+    """Solve the linear relaxation with HiGHS and take the poses of the largest shares."""
+    model, x = _plain_program(problem, pulp.LpContinuous)
+    model.solve(pulp.HiGHS(msg=False, timeLimit=seconds, threads=1))
+    if model.sol_status != pulp.LpSolutionOptimal:
+        return Found(None, note="the relaxation took too long")
+    share = np.array([variable.value() for variable in x])
+    chosen: list[int] = []
+    for pose in np.argsort(-share, kind="stable").tolist():
+        if len(chosen) == _count(problem):
+            break
+        if problem.positions[pose] not in problem.positions[chosen]:
+            chosen.append(pose)
+    return Found(np.array(chosen), float(pulp.value(model.objective)))
+
+
+def plain_cbc(problem: PlacementProblem, seconds: float) -> Found:
+    """Give the plain program to CBC through PuLP."""
+    model, x = _plain_program(problem, pulp.LpBinary)
+    model.solve(pulp.COIN_CMD(path=pulp_cbc_path, msg=False, timeLimit=seconds, gapRel=0.0, threads=1))
+    return _outcome(model, x)
+
+
+def plain_highs(problem: PlacementProblem, seconds: float) -> Found:
+    """Give the plain program to HiGHS through PuLP."""
+    model, x = _plain_program(problem, pulp.LpBinary)
+    model.solve(pulp.HiGHS(msg=False, timeLimit=seconds, gapRel=0.0, threads=1))
+    return _outcome(model, x)
+
+
+def spopt_mclp(problem: PlacementProblem, seconds: float) -> Found:
+    """Solve with spopt's MCLP and HiGHS; spopt does not know that a position carries one sensor at most."""
+    from spopt.locate import MCLP  # noqa: PLC0415 - of the group 'benchmark', which need not be installed
+
+    hidden = 1.0 - problem.visible.T
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # spopt makes variables as PuLP 4 no longer will
+        mclp = MCLP.from_cost_matrix(hidden, problem.weights, service_radius=0.5, p_facilities=_count(problem))
+        try:
+            mclp.solve(pulp.HiGHS(msg=False, timeLimit=seconds, gapRel=0.0, threads=1))
+        except RuntimeError:
+            return Found(None, note="raises at the time limit")
+    found = _outcome(mclp.problem, mclp.fac_vars)
+    if found.chosen is not None and len(np.unique(problem.positions[found.chosen])) < len(found.chosen):
+        return Found(None, found.bound, "puts two sensors at one position")
+    return found
+
+
+RIVALS: dict[str, Callable[[PlacementProblem, float], Found]] = {
+    "greedy": plain_greedy,
+    "lazy greedy": lazy_greedy,
+    "local search": local_search,
+    "LP rounding": rounded_relaxation,
+    "PuLP + CBC": plain_cbc,
+    "PuLP + HiGHS": plain_highs,
+    "spopt MCLP": spopt_mclp,
+    "ours": ours,
+}
+
+
+def can_run(rival: str) -> bool:
+    """Return whether what a way needs is installed, and load it, so that loading is not measured."""
+    if rival != "spopt MCLP":
+        return True
+    try:
+        importlib.import_module("spopt.locate")
+    except ModuleNotFoundError:
+        return False
+    return True
+
+
+def _plain_program(problem: PlacementProblem, category: str) -> tuple[Any, list[Any]]:
+    """Return the integer program as it stands in textbooks, and its x."""
+    model = pulp.LpProblem("plain", pulp.LpMaximize)
+    x = [model.add_variable(f"x{i}", 0, 1, category) for i in range(len(problem.visible))]
+    y = [model.add_variable(f"y{j}", 0, 1, category) for j in range(len(problem.weights))]
+    model.setObjective(pulp.lpDot(problem.weights.tolist(), y))
+    for y_j, column in zip(y, problem.visible.T, strict=True):
+        model += y_j <= pulp.lpSum(x[i] for i in np.flatnonzero(column))
+    model += pulp.lpSum(x) <= _count(problem)
+    for position in np.unique(problem.positions):
+        model += pulp.lpSum(x[i] for i in np.flatnonzero(problem.positions == position)) <= 1
+    return model, x
+
+
+def _outcome(model: Any, x: list[Any]) -> Found:  # noqa: ANN401 - PuLP's programs are untyped
+    """Read what a solver left in a program; PuLP calls a solution optimal at the time limit as well."""
+    if model.sol_status not in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible):
+        return Found(None, note="nothing found in time")
+    chosen = np.flatnonzero([round(variable.value() or 0.0) for variable in x])
+    proven = model.sol_status == pulp.LpSolutionOptimal
+    return Found(chosen, float(pulp.value(model.objective)) if proven else np.inf)
+
+
+def _covered(problem: PlacementProblem, chosen: Integer) -> float:
+    seen: Boolean = problem.visible[chosen].any(axis=0)
+    return float(problem.weights[seen].sum())
+
+
+def _count(problem: PlacementProblem) -> int:
+    if problem.count is None:
+        raise ValueError("the rivals of the benchmark place a number of sensors")
+    return problem.count

@@ -1,0 +1,134 @@
+"""Charts of what is gained and what is lost by each way to an answer, and of how costs grow."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from ..storage import whole_file
+from ..trade_off import Way, front, growth_exponent
+from .palette import INK, PAPER, SOFT_INK
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
+"""Told apart by colour-blind people (Okabe and Ito 2008), and by their marks on grey paper."""
+
+MARKS = ("D", "o", "s", "^", "v", "P", "*", "X")
+
+
+def save_trade_off_chart(
+    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Way]], title: str, subtitle: str, nought: float
+) -> None:
+    """Draw processor time against error, with the front and the default, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    panels : mapping of str to sequence of Way
+        What the error is, over each panel; the same families in all.
+    title, subtitle : str
+    nought : float
+        Errors up to this are drawn apart from those above, on a linear piece of the axis.
+    """
+    figure = Figure((12.5, 5.6), dpi=150, facecolor=PAPER, layout="constrained")
+    families = list(dict.fromkeys(way.family for ways in panels.values() for way in ways))
+    for panel, (what, ways) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+        _draw_front(panel, ways)
+        for row, family in enumerate(families):
+            own = [way for way in ways if way.family == family]
+            xy = [way.error for way in own], [way.seconds for way in own]
+            panel.plot(*xy, color=COLOURS[row], marker=MARKS[row], linestyle="none", markersize=7, label=family)
+        _mark_default(panel, ways)
+        _name(panel, ways)
+        panel.set_yscale("log")
+        panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
+        panel.set_xlim(-0.35 * nought, 2.5 * max(nought, *(way.error for way in ways)))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
+        panel.set_xlabel(what, color=INK)
+        _dress(panel)
+        panel.set_ylabel("processor time (s)", color=INK)
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
+    figure.suptitle(f"{title}\n{subtitle}", color=INK, fontsize=11)
+    _save(figure, path)
+
+
+def save_growth_chart(
+    path: str | os.PathLike[str],
+    panels: Mapping[str, Sequence[tuple[str, Sequence[float], Sequence[float]]]],
+    title: str,
+) -> None:
+    """Draw costs against sizes on logarithmic axes, with the exponents, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    panels : mapping of str to sequence of (name, sizes, costs)
+        By what is measured. Sizes are drawn as multiples of the smallest.
+    title : str
+    """
+    figure = Figure((12.5, 5.2), dpi=150, facecolor=PAPER, layout="constrained")
+    for panel, (what, lines) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+        for row, (name, size, cost) in enumerate(lines):
+            label = f"{name}: exponent {growth_exponent(size, cost):.2f}"
+            times = [value / size[0] for value in size]
+            panel.plot(times, cost, color=COLOURS[row], marker=MARKS[row], markersize=6, linewidth=1.4, label=label)
+        panel.set_xscale("log", base=2)
+        panel.set_yscale("log")
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda times, _: f"× {times:g}"))
+        panel.set_xlabel("size, in multiples of the smallest", color=INK)
+        panel.set_ylabel(what, color=INK)
+        panel.legend(frameon=False, fontsize=8)
+        _dress(panel)
+    figure.suptitle(title, color=INK, fontsize=11)
+    _save(figure, path)
+
+
+def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
+    best = front(ways)
+    panel.step(
+        [way.error for way in best],
+        [way.seconds for way in best],
+        where="post",
+        color=SOFT_INK,
+        linewidth=1.2,
+        linestyle=(0, (4, 2)),
+        label="front: nothing is both quicker and nearer",
+    )
+
+
+def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
+    own = [way for way in ways if way.default]
+    panel.plot(
+        [way.error for way in own],
+        [way.seconds for way in own],
+        marker="o",
+        linestyle="none",
+        markersize=15,
+        mfc="none",
+        mec=INK,
+        mew=1.6,
+        label="default",
+    )
+
+
+def _name(panel: Axes, ways: Sequence[Way]) -> None:
+    for way in ways:
+        at = (way.error, way.seconds)
+        panel.annotate(way.name, at, (8, 3), textcoords="offset points", fontsize=7.5, color=INK)
+
+
+def _dress(panel: Axes) -> None:
+    panel.grid(color="#e3e6e8", linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.tick_params(colors=SOFT_INK)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})

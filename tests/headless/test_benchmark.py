@@ -1,0 +1,123 @@
+"""The benchmark writes its page, charts and figures; what it compares is what it says."""
+
+import json
+import sys
+from pathlib import Path
+
+from headless import benchmark
+from headless.measures.approximations import bounding_box, decimated, every_other_channel, thinner
+from headless.measures.expense import Expense, peak_memory
+from headless.measures.growth import repeated
+from headless.measures.placement import compare
+from headless.measures.rivals import RIVALS, can_run
+from headless.measures.streets import street_problem
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.scene_geometry import Mesh
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from small_junction import box_triangles, make_example
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+SMALL = benchmark.Scope(
+    layout=CandidateSettings(sensors=("type1",), heights=(3.5,), spacing=24.0),
+    street=(12, 200, 2),
+    counts=(2, 3),
+    largest=(16, 300, 2),
+    places=1,
+    copies=(1, 2),
+    spacings=(8.0, 4.0),
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    pytest.importorskip("embreex", reason="embreex is not installed")
+    folder = tmp_path_factory.mktemp("benchmark")
+    benchmark.main([str(SCENE), "-o", str(folder), "--places", "1", "--time-limit", "5"], SMALL)
+    return folder
+
+
+def test_the_page_shows_charts_that_are_there(folder):
+    page = (folder / "benchmark.md").read_text(encoding="utf-8")
+    for chart in ("visibility", "placement", "growth"):
+        assert f"(benchmark/{chart}.png)" in page
+        assert (folder / "benchmark" / f"{chart}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_figures_hold_every_way(folder):
+    record = json.loads((folder / "benchmark" / "benchmark.json").read_text(encoding="utf-8"))
+    assert {"full bvh", "lazy bvh", "full embree", "lazy embree"} <= set(record["visibility"])
+    assert len(record["visibility"]) == 2 * (2 + len(record["harm"]) - 1)
+    assert record["visibility"]["lazy embree"]["rays"] < record["visibility"]["full embree"]["rays"]
+    assert record["harm"]["exact"]["wrong"] == 0 < record["harm"]["azimuth ÷ 8"]["wrong"]
+    ways = {run["way"] for run in record["placement"]}
+    assert ways == {way for way in RIVALS if can_run(way)}
+    assert len(record["bars"]) == 6
+    assert all(len(growth["seconds"]) == len(growth["size"]) for growth in record["growth"])
+
+
+def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():
+    problem = street_problem(20, 300, blocks=2, count=3)
+    runs = {run.way: run for run in compare("streets", problem, list(RIVALS), 20, lambda _: None)}
+    best = runs["ours"]
+    assert best.proven
+    for run in runs.values():
+        assert run.objective <= best.objective + 1e-6 <= run.bound + 2e-6
+    assert runs["PuLP + CBC"].objective == runs["PuLP + HiGHS"].objective == best.objective
+    assert runs["lazy greedy"].objective == runs["greedy"].objective <= runs["local search"].objective
+
+
+def test_fewer_rays_are_those_that_were_asked_for():
+    model = load_catalogue()["type2"]
+    assert thinner(model, 4).azimuth_count == model.azimuth_count / 4
+    half = every_other_channel(model)
+    assert (half.channels, half.azimuth_count) == (model.channels / 2, model.azimuth_count)
+    np.testing.assert_array_equal(half.elevations, model.elevations[::2])
+
+
+def test_a_box_is_its_own_bounding_box():
+    box = bounding_box(Mesh("box", box_triangles((-1, -2, 0), (3, 4, 5))))
+    edges = box[:, 1:] - box[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
+    assert area.sum() == pytest.approx(2 * (4 * 6 + 4 * 5 + 6 * 5))
+    np.testing.assert_array_equal(box.min(axis=(0, 1)), (-1, -2, 0))
+    np.testing.assert_array_equal(box.max(axis=(0, 1)), (3, 4, 5))
+
+
+def test_decimation_leaves_fewer_faces_and_no_object_behind():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    x, y = np.meshgrid(np.arange(8.0), np.arange(8.0), indexing="ij")
+    corner = np.stack([x.ravel(), y.ravel(), np.sin(x.ravel())], axis=1)
+    steps = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    simpler = decimated(Mesh("slope", corner[:, None] + steps))
+    assert 0 < len(simpler) < len(corner)
+    assert not bpy.data.objects
+    assert not bpy.data.meshes
+
+
+def test_a_repeated_site_is_the_site_beside_itself():
+    site = make_example().site
+    row = repeated(site, 3)
+    pitch = np.ptp(site.triangles[:, :, 0])
+    assert (len(row.targets), len(row.candidates)) == (3 * len(site.targets), 3 * len(site.candidates))
+    last = row.triangles[-len(site.triangles) :] - (2 * pitch, 0, 0)
+    np.testing.assert_allclose(last, site.triangles, atol=1e-9)
+    feet = row.candidates.position[row.candidates.position_of]
+    own = site.candidates.position[site.candidates.position_of]
+    np.testing.assert_allclose(row.candidates.xyz - feet, np.tile(site.candidates.xyz - own, (3, 1)), atol=1e-9)
+
+
+def test_expense_sums_and_memory_counts_what_was_in_use():
+    expense = Expense()
+    assert expense.time(lambda: "result") == "result"
+    assert expense.cpu >= 0
+    assert expense.wall > 0
+    total, grown = peak_memory(lambda: int(np.ones(40_000_000, dtype=np.int8).sum()))
+    assert total == 40_000_000
+    assert grown is None or 35 < grown < 80
