@@ -63,6 +63,8 @@ class Scope:
         As ``street``, with many sensors.
     places : int
         From so many places growth is looked at.
+    multiples : tuple of int
+        Of the places, and of what grows in the streets.
     copies : tuple of int
         Of the scene, in a row.
     spacings : tuple of float, metres
@@ -74,6 +76,7 @@ class Scope:
     counts: tuple[int, int] = (4, 16)
     largest: tuple[int, int, int] = (1000, 20000, 8)
     places: int = 8
+    multiples: tuple[int, ...] = (1, 2, 4, 8)
     copies: tuple[int, ...] = (1, 2, 4, 8, 16)
     spacings: tuple[float, ...] = (4.0, 2.0, 1.0, 0.5)
 
@@ -180,12 +183,13 @@ def growth(geometry: SceneGeometry, settings: VisibilitySettings, time_limit: fl
     every = len(sampled_places(site, len(site.candidates)))
     finer = [make_site(geometry, scope.layout, spacing) for spacing in scope.spacings]
     positions, targets, blocks = scope.street
-    doublings = (1, 2, 4)
+    posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
+    points = [targets * times // 2 for times in scope.multiples]
     found = [
         visibility_growth(
             "visibility",
             "places",
-            [Scaled(n, site, n) for n in (scope.places * times for times in (1, 2, 4, 8))],
+            [Scaled(n, site, n) for n in (scope.places * times for times in scope.multiples)],
             models,
             settings,
         ),
@@ -206,18 +210,8 @@ def growth(geometry: SceneGeometry, settings: VisibilitySettings, time_limit: fl
             models,
             settings,
         ),
-        placement_growth(
-            "poses",
-            [3 * positions * n // 4 for n in doublings],
-            [(positions * n // 4, targets, blocks) for n in doublings],
-            time_limit,
-        ),
-        placement_growth(
-            "targets",
-            [targets * n for n in doublings],
-            [(positions, targets * n, blocks) for n in doublings],
-            time_limit,
-        ),
+        placement_growth("poses", [3 * n for n in posts], [(n, targets, blocks) for n in posts], time_limit),
+        placement_growth("targets", points, [(positions, n, blocks) for n in points], time_limit),
     ]
     for one in found:
         session.say(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")

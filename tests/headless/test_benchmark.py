@@ -26,10 +26,11 @@ from small_junction import box_triangles, make_example
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 SMALL = benchmark.Scope(
     layout=CandidateSettings(sensors=("type1",), heights=(3.5,), spacing=24.0),
-    street=(12, 200, 2),
+    street=(20, 200, 2),
     counts=(2, 3),
     largest=(16, 300, 2),
     places=1,
+    multiples=(1, 2),
     copies=(1, 2),
     spacings=(8.0, 4.0),
 )
