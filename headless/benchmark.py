@@ -46,6 +46,7 @@ from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.scene.read import read_scene
 
 DEFAULT_WAY = "lazy embree"
+ENGINE_NAMES = {"bvh": "BVHTree", "embree": "Embree"}
 
 
 @dataclass(frozen=True)
@@ -226,16 +227,15 @@ def write(folder: Path, findings: Findings) -> None:
         pictures / "visibility.png",
         {
             "wrong pairs of pose and target, per seen pair": [
-                _way(n, c, _harm(harm, n).wrong, n) for n, c in findings.costs.items()
+                _way(n, c, _harm(harm, n).wrong) for n, c in findings.costs.items()
             ],
             "coverage lost by the placement (share of targets)": [
-                _way(n, c, max(0.0, harm["exact"].coverage - _harm(harm, n).coverage), n)
+                _way(n, c, max(0.0, harm["exact"].coverage - _harm(harm, n).coverage))
                 for n, c in findings.costs.items()
             ],
         },
         f"Visibility of {setting['scene']}: processor time of {setting['places']} sampled places against error",
-        "full: every ray cast · lazy: only rays that can matter, the same grid as the full scan's, bit for bit · "
-        "simplifications with Embree",
+        "full: every ray cast · lazy: only rays that can matter, the same grid as the full scan's, bit for bit",
         nought=1e-3,
     )
     instances = dict.fromkeys(run.instance for run in findings.runs)
@@ -259,10 +259,10 @@ def write(folder: Path, findings: Findings) -> None:
     )
 
 
-def _way(name: str, cost: Cost, error: float, label: str) -> Way:
+def _way(name: str, cost: Cost, error: float) -> Way:
     scan, _, what = name.partition(" ")
-    family = {"bvh": "exact", "embree": "exact"}.get(what, "simplified")
-    return Way(label, f"{family}, {scan}", cost.seconds, error, default=name == DEFAULT_WAY)
+    family = f"{'exact' if what in ENGINES else 'simplified, Embree'}, {scan}"
+    return Way(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_WAY)
 
 
 def _harm(harm: Mapping[str, Harm], way: str) -> Harm:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from ..storage import whole_file
 from ..trade_off import Way, front, growth_exponent
+from .callouts import place_callouts
 from .palette import INK, PAPER, SOFT_INK
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
@@ -33,16 +35,18 @@ def save_trade_off_chart(
     nought : float
         Errors up to this are drawn apart from those above, on a linear piece of the axis.
     """
-    figure = Figure((12.5, 5.6), dpi=150, facecolor=PAPER, layout="constrained")
+    figure = Figure((max(12.5, 4.6 * len(panels)), 6.2), dpi=150, facecolor=PAPER, layout="constrained")
     families = list(dict.fromkeys(way.family for ways in panels.values() for way in ways))
-    for panel, (what, ways) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    for panel, (what, ways) in zip(axes, panels.items(), strict=True):
         _draw_front(panel, ways)
         for row, family in enumerate(families):
             own = [way for way in ways if way.family == family]
             xy = [way.error for way in own], [way.seconds for way in own]
-            panel.plot(*xy, color=COLOURS[row], marker=MARKS[row], linestyle="none", markersize=7, label=family)
+            panel.plot(
+                *xy, color=COLOURS[row], marker=MARKS[row], linestyle="none", markersize=7, label=family, zorder=4
+            )
         _mark_default(panel, ways)
-        _name(panel, ways)
         panel.set_yscale("log")
         panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
         panel.set_xlim(-0.35 * nought, 2.5 * max(nought, *(way.error for way in ways)))
@@ -53,6 +57,10 @@ def save_trade_off_chart(
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
     figure.suptitle(f"{title}\n{subtitle}", color=INK, fontsize=11)
+    figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
+    figure.set_layout_engine("none")
+    for panel, ways in zip(axes, panels.values(), strict=True):
+        _name(panel, ways)
     _save(figure, path)
 
 
@@ -92,7 +100,7 @@ def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
     panel.step(
         [way.error for way in best],
         [way.seconds for way in best],
-        where="post",
+        where="pre",  # what costs no more and errs no more is at hand everywhere above the front
         color=SOFT_INK,
         linewidth=1.2,
         linestyle=(0, (4, 2)),
@@ -116,9 +124,17 @@ def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
 
 
 def _name(panel: Axes, ways: Sequence[Way]) -> None:
-    for way in ways:
-        at = (way.error, way.seconds)
-        panel.annotate(way.name, at, (8, 3), textcoords="offset points", fontsize=7.5, color=INK)
+    """Write each way's name beside it, no name on another or on a mark."""
+    texts = [panel.text(0, 0, way.name, size=7.5, color=INK, ha="center", va="center", zorder=3) for way in ways]
+    extents = [text.get_window_extent() for text in texts]
+    sizes = np.array([(extent.width, extent.height) for extent in extents])
+    points = np.array([(way.error, way.seconds) for way in ways])
+    anchors, radius = panel.transData.transform(points), 4.5 * panel.figure.dpi / 72
+    frame = panel.get_window_extent()
+    centres = place_callouts(anchors, sizes, frame.extents, radius, anchors)
+    for text, point, centre in zip(texts, points, panel.transData.inverted().transform(centres), strict=True):
+        text.set_position(centre)
+        panel.plot(*zip(point, centre, strict=True), color="#c3c9ce", linewidth=0.7, zorder=1)
 
 
 def _dress(panel: Axes) -> None:
