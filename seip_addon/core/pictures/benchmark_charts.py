@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +20,7 @@ from .palette import INK, PAPER, SOFT_INK
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
 """Told apart by colour-blind people (Okabe and Ito 2008), and by their marks on grey paper."""
 
+COLUMNS = 2
 MARKS = ("D", "o", "s", "^", "v", "P", "*", "X")
 
 
@@ -35,17 +38,16 @@ def save_trade_off_chart(
     nought : float
         Errors up to this are drawn apart from those above, on a linear piece of the axis.
     """
-    figure = Figure((max(12.5, 4.6 * len(panels)), 6.2), dpi=150, facecolor=PAPER, layout="constrained")
+    rows = math.ceil(len(panels) / COLUMNS)
+    figure = Figure((12.5, 5.0 * rows + 1.2), dpi=150, facecolor=PAPER, layout="constrained")
     families = list(dict.fromkeys(way.family for ways in panels.values() for way in ways))
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    axes = [figure.add_subplot(rows, COLUMNS, number + 1) for number in range(len(panels))]
     for panel, (what, ways) in zip(axes, panels.items(), strict=True):
         _draw_front(panel, ways)
-        for row, family in enumerate(families):
+        for family, colour, mark in zip(families, COLOURS, MARKS, strict=False):  # there are marks to spare
             own = [way for way in ways if way.family == family]
-            xy = [way.error for way in own], [way.seconds for way in own]
-            panel.plot(
-                *xy, color=COLOURS[row], marker=MARKS[row], linestyle="none", markersize=7, label=family, zorder=4
-            )
+            style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "markersize": 7, "zorder": 4}
+            panel.plot([way.error for way in own], [way.seconds for way in own], label=family, **style)
         _mark_default(panel, ways)
         panel.set_yscale("log")
         panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
@@ -125,7 +127,9 @@ def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
 
 def _name(panel: Axes, ways: Sequence[Way]) -> None:
     """Write each way's name beside it, no name on another or on a mark."""
-    texts = [panel.text(0, 0, way.name, size=7.5, color=INK, ha="center", va="center", zorder=3) for way in ways]
+    style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
+    box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
+    texts = [panel.text(0, 0, way.name, bbox=box, **style) for way in ways]
     extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents])
     points = np.array([(way.error, way.seconds) for way in ways])
