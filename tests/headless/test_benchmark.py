@@ -9,6 +9,7 @@ from headless.measures.approximations import bounding_box, decimated, every_othe
 from headless.measures.expense import Expense, peak_memory
 from headless.measures.growth import repeated
 from headless.measures.placement import compare
+from headless.measures.programme import Scope
 from headless.measures.rivals import RIVALS, can_run
 from headless.measures.streets import street_problem
 
@@ -24,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_junction import box_triangles, make_example
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-SMALL = benchmark.Scope(
+SMALL = Scope(
     layout=CandidateSettings(sensors=("type1",), heights=(3.5,), spacing=24.0),
     street=(20, 200, 2),
     counts=(2, 3),
