@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
+from headless.measures.alone import alone
 from headless.measures.expense import Expense, peak_memory
 from headless.measures.rivals import ours
 from headless.measures.streets import street_problem
@@ -24,8 +23,6 @@ from seip_addon.core.visibility.grid import VisibilitySettings
 from seip_addon.core.visibility.needed_triangles import needed_triangles
 from seip_addon.core.visibility.observer import Observer, places
 from seip_addon.core.visibility.ray_casting import make_ray_caster
-
-Result = TypeVar("Result")
 
 STREET_SENSORS = 4
 
@@ -151,12 +148,6 @@ def placement_growth(
     """Measure placement in streets of so many positions, targets and blocks."""
     found = [alone(partial(place, *step, seconds)) for step in steps]
     return _growth(f"placement, N = {STREET_SENSORS}", size_of, size, found)
-
-
-def alone(work: Callable[[], Result]) -> Result:
-    """Return what ``work`` returns in a fresh process, whose memory nothing else has touched."""
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(work).result()
 
 
 def _growth(what: str, size_of: str, size: Sequence[float], found: Sequence[tuple[float, float | None]]) -> Growth:

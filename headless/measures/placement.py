@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from headless.measures.expense import Expense, peak_memory
-from headless.measures.rivals import RIVALS, can_run
+from headless.measures.rivals import RIVALS
 
 from seip_addon.core.placement import PlacementProblem
 
@@ -56,9 +56,7 @@ class Run:
         return self.own_gap < 1e-6
 
 
-def compare(
-    name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float, say: Callable[[str], None]
-) -> list[Run]:
+def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float) -> list[Run]:
     """Solve an instance in several ways in turn, each with the same time limit.
 
     Parameters
@@ -67,10 +65,8 @@ def compare(
         Of the instance.
     problem : PlacementProblem
     ways : sequence of str
-        Keys of `RIVALS`; what is not installed is left out with a line.
+        Keys of `RIVALS`.
     seconds : float
-    say : callable
-        Told each result, for the person who waits.
 
     Returns
     -------
@@ -78,14 +74,10 @@ def compare(
     """
     rows = []
     for way in ways:
-        if not can_run(way):
-            say(f"{name}: {way} is left out; the group 'benchmark' of pyproject.toml is not installed")
-            continue
         expense = Expense()
         found, memory = peak_memory(partial(expense.time, partial(RIVALS[way], problem, seconds)))
         seen = problem.visible[found.chosen].any(axis=0) if found.chosen is not None else problem.weights < 0
         objective = float(problem.weights[seen].sum())
-        say(f"{name}: {way:<13}{objective:>10.0f} ≤ {found.bound:<10.1f}{expense.cpu:>8.2f} s of CPU  {found.note}")
         rows.append((way, expense, memory, objective, found))
     least = min((found.bound for *_, found in rows), default=math.inf)
     best = least if math.isfinite(least) else float(problem.weights.sum())
@@ -93,8 +85,3 @@ def compare(
         Run(name, way, expense, memory, objective, found.bound, best, found.note)
         for way, expense, memory, objective, found in rows
     ]
-
-
-def by_way(runs: Sequence[Run]) -> Mapping[str, Run]:
-    """Return the runs of one instance by their ways."""
-    return {run.way: run for run in runs}

@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib.metadata
 import os
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from headless import session
+from headless.measures.alone import alone
 from headless.measures.approximations import approximations
 from headless.measures.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
 from headless.measures.placement import Run, compare
 from headless.measures.report import Findings
-from headless.measures.rivals import RIVALS
+from headless.measures.rivals import RIVALS, can_run
 from headless.measures.streets import street_problem
 from headless.measures.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
 
@@ -111,19 +113,22 @@ def placements(
         mandatory_names=None,
         forbidden=None,
     )
-    runs = compare(
-        f"{site.name}, {site.candidates.sensor[0]}, N = {COUNT}", problem, list(RIVALS), time_limit, session.say
-    )
+    ways = [way for way in RIVALS if can_run(way)]
+    for way in set(RIVALS).difference(ways):
+        session.say(f"{way} is left out: the group 'benchmark' of pyproject.toml is not installed")
+    runs = _told(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {COUNT}", problem, ways, time_limit))
     names = []
     for count in scope.counts:
         names.append(_street_name(scope.street, count))
         positions, targets, blocks = scope.street
         street = street_problem(positions, targets, blocks=blocks, count=count)
-        runs += compare(names[-1], street, list(RIVALS), time_limit, session.say)
+        runs += _told(compare(names[-1], street, ways, time_limit))
     names.append(_street_name(scope.largest, scope.counts[-1]))
     positions, targets, blocks = scope.largest
     street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
-    runs += compare(names[-1], street, ("greedy", "local search", "ours"), 2 * time_limit, session.say)
+    quick = ("greedy", "local search", "ours")
+    # in a process of its own: its memory is asked for
+    runs += _told(alone(partial(compare, names[-1], street, quick, 2 * time_limit)))
     return runs, (names[0], names[1], names[2])
 
 
@@ -170,6 +175,15 @@ def growth(geometry: SceneGeometry, settings: VisibilitySettings, time_limit: fl
     for one in found:
         session.say(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")
     return found
+
+
+def _told(runs: list[Run]) -> list[Run]:
+    for run in runs:
+        session.say(
+            f"{run.instance}: {run.way:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{run.expense.cpu:>8.2f} s of CPU"
+            f"  {run.note}"
+        )
+    return runs
 
 
 def _street_name(street: tuple[int, int, int], count: int) -> str:

@@ -149,7 +149,9 @@ def _about_placement(findings: Findings, pictures: str) -> list[str]:
     text = (
         f"Every way had {findings.setting['time_limit']:g} s on the clock, the largest instance twice that. The gap is "
         "to the least bound that any way proved for the instance; the own gap is what the way proves by itself. A "
-        "plain program has one binary variable for each pose and each target, as in textbooks."
+        "plain program has one binary variable for each pose and each target, as in "
+        "textbooks. Memory is what the process grew by, beyond what it had kept from before; that of CBC, a program of "
+        "its own, is not in it."
     )
     head = ("instance", "way", "ours is … times as quick", "s", "MB", "covers", "gap", "own gap", "")
     picture = f"![processor time against gap of placement]({pictures}/placement.png)"

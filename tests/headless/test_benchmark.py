@@ -2,9 +2,11 @@
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 from headless import benchmark
+from headless.measures.alone import alone
 from headless.measures.approximations import bounding_box, decimated, every_other_channel, thinner
 from headless.measures.expense import Expense, peak_memory
 from headless.measures.growth import repeated
@@ -66,7 +68,8 @@ def test_the_figures_hold_every_way(folder):
 
 def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():
     problem = street_problem(20, 300, blocks=2, count=3)
-    runs = {run.way: run for run in compare("streets", problem, list(RIVALS), 20, lambda _: None)}
+    ways = [way for way in RIVALS if can_run(way)]
+    runs = {run.way: run for run in compare("streets", problem, ways, 20)}
     best = runs["ours"]
     assert best.proven
     for run in runs.values():
@@ -120,6 +123,6 @@ def test_expense_sums_and_memory_counts_what_was_in_use():
     assert expense.time(lambda: "result") == "result"
     assert expense.cpu >= 0
     assert expense.wall > 0
-    total, grown = peak_memory(lambda: int(np.ones(40_000_000, dtype=np.int8).sum()))
-    assert total == 40_000_000
+    array, grown = alone(partial(peak_memory, partial(np.ones, 40_000_000, dtype=np.int8)))
+    assert array.all()
     assert grown is None or 35 < grown < 80
