@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -66,9 +67,15 @@ def _harm(harm: Mapping[str, Harm], way: str) -> Harm:
     return harm["exact"] if what in ENGINES else harm[what]
 
 
+def _proof(run: Run) -> str:
+    if run.proven:
+        return "proves by itself that nothing is better"
+    return "has a bound of its own" if math.isfinite(run.bound) else "has no bound of its own"
+
+
 def _ways_to_place(runs: Sequence[Run], instance: str) -> list[Way]:
     return [
-        Way(run.way, run.way, run.expense.cpu, run.gap, default=run.way == "ours")
+        Way(run.way, _proof(run), run.expense.cpu, run.gap, default=run.way == "ours")
         for run in runs
         if run.instance == instance and run.objective > 0
     ]

@@ -229,7 +229,7 @@ def _growth_row(growth: Growth) -> tuple[str, ...]:
     return (
         growth.what,
         growth.size_of,
-        " ".join(f"{size:,.0f}" for size in growth.size),
+        " ".join(f"{size:,.0f}" if size > 100 else f"{size:.3g}" for size in growth.size),
         " ".join(f"{seconds:.3g}" for seconds in growth.seconds),
         f"{growth.time_exponent:.2f}",
         " ".join("–" if mega is None else f"{mega:.0f}" for mega in memory),

@@ -57,7 +57,7 @@ def save_trade_off_chart(
         _dress(panel)
         panel.set_ylabel("processor time (s)", color=INK)
     handles, labels = panel.get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=6)
     figure.suptitle(f"{title}\n{subtitle}", color=INK, fontsize=11)
     figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
     figure.set_layout_engine("none")
@@ -80,7 +80,7 @@ def save_growth_chart(
         By what is measured. Sizes are drawn as multiples of the smallest.
     title : str
     """
-    figure = Figure((12.5, 5.2), dpi=150, facecolor=PAPER, layout="constrained")
+    figure = Figure((12.5, 6.4), dpi=150, facecolor=PAPER, layout="constrained")
     for panel, (what, lines) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
         for row, (name, size, cost) in enumerate(lines):
             label = f"{name}: exponent {growth_exponent(size, cost):.2f}"
@@ -91,7 +91,7 @@ def save_growth_chart(
         panel.xaxis.set_major_formatter(FuncFormatter(lambda times, _: f"× {times:g}"))
         panel.set_xlabel("size, in multiples of the smallest", color=INK)
         panel.set_ylabel(what, color=INK)
-        panel.legend(frameon=False, fontsize=8)
+        panel.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.12))
         _dress(panel)
     figure.suptitle(title, color=INK, fontsize=11)
     _save(figure, path)
@@ -144,7 +144,7 @@ def _name(panel: Axes, ways: Sequence[Way]) -> None:
 def _dress(panel: Axes) -> None:
     panel.grid(color="#e3e6e8", linewidth=0.8)
     panel.set_axisbelow(True)
-    panel.tick_params(colors=SOFT_INK)
+    panel.tick_params(which="both", colors=SOFT_INK)
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
 
