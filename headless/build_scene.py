@@ -34,8 +34,8 @@ def main(argv: list[str]) -> None:
         raise SeipError(f'{asked.source} names no map: add map = "file.xodr" to it, or give the map and --site')
     if asked.output.suffix != ".blend":
         raise SeipError(f"{asked.output} is no name for a Blender file; let it end in .blend")
-    model = site_model(read_map(description.map), description)
     with session.progress_bar() as report:
+        model = finish(site_model(read_map(description.map), description), report)
         finish(build_scene(model, description.map.name), report)
     save_blend(asked.output)
     for note in model.notes:

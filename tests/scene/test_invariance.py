@@ -72,7 +72,7 @@ def far_map(tmp_path):
 
 def built(path, near):
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    model = site_model(read_map(path), SiteDescription(map=path, near=near, radius=60.0))
+    model = finish(site_model(read_map(path), SiteDescription(map=path, near=near, radius=60.0)))
     return site_of(finish(build_scene(model, path.name)))
 
 

@@ -46,13 +46,6 @@ class Profile:
         (_, b, c, d), ds = self._in_force(s)
         return np.asarray(b + ds * (2.0 * c + ds * 3.0 * d))
 
-    def bound(self, end: float) -> float:
-        """Return a number that no absolute value before ``end`` exceeds."""
-        if len(self) == 0:
-            return 0.0
-        span = np.maximum(np.append(self.start[1:], end) - self.start, 0.0)
-        return float((np.abs(self.coefficients) * span[:, None] ** np.arange(4)).sum(axis=1).max())
-
     def _in_force(self, s: Float) -> tuple[Float, Float]:
         record = np.maximum(np.searchsorted(self.start, s, side="right") - 1, 0)
         return self.coefficients[record].T, np.maximum(s - self.start[record], 0.0)

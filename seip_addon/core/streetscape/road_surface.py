@@ -173,12 +173,12 @@ def markings(surfaces: Sequence[LaneSurface]) -> Float:
 
 
 def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
-    """Return (n, 4, 3) quads where driving lanes enter a junction; traffic keeps to the right."""
+    """Return (n, 4, 3) quads where driving lanes enter a junction."""
     inside = _junctions(surfaces).buffer(0.3)
     shapely.prepare(inside)
     quads = [np.empty((0, 4, 3))]
     for lane in in_groups(surfaces, ["driving"]):
-        forward = lane.lane_id < 0
+        forward = (lane.lane_id < 0) != lane.keeps_left
         left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
         end = shapely.Point((left[-1, :2] + right[-1, :2]) / 2)
         if lane.junction_id is None and inside.contains(end) and not _is_taper(lane):
