@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import tempfile
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
@@ -16,7 +17,6 @@ from headless.system_libraries import complaint, missing_libraries
 from tqdm import tqdm
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -87,9 +87,22 @@ def check_folder(folder: Path) -> None:
     SeipError
         The folder cannot be made or written.
     """
-    with whole_file(folder / ".writable") as probe:
-        probe.touch()
-    (folder / ".writable").unlink()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Say of an interruption from here on that the folder is incomplete: each file in it is whole, but some lack."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(f"stopped while writing: the results in {folder} are incomplete") from stop
 
 
 def say(text: str) -> None:
@@ -112,8 +125,8 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
         main(arguments())
     except SeipError as error:
         _end(1, f"error: {error}")
-    except KeyboardInterrupt:
-        _end(STOPPED, "stopped, nothing written")
+    except KeyboardInterrupt as stop:
+        _end(STOPPED, str(stop) or "stopped, no result written")
     _end(0)
 
 

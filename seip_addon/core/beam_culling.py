@@ -1,178 +1,360 @@
-r"""Which rays of a scan can matter to which targets.
+r"""Which rays of a scan can return from near which targets.
 
-A return within δ of a target lies on a ray that passes within δ of it. From the
-sensor the ball of radius δ about a target at distance d is the cap of half-angle
-α = arcsin(δ/d), so a ray needs casting only if its angle to the target is at
-most α. In a channel of elevation φ that is one interval of azimuths about the
-target's; its half-width Δ follows from the spherical law of haversines, with e
-the target's elevation:
+Returns within δ of a target lie in its patch: an upright cylinder of radius δ
+about it, between the heights at which there is anything (`near_surfaces`). A
+channel of slope σ = tan φ is between these heights only at distances r in plan
+from r₁ to r₂, and the part of that annulus inside the cylinder, whose axis is L
+away, is an arc of azimuths about the target's. By the law of cosines its
+half-width is
 
 .. math::
 
-    \sin^2\frac{Δ}{2} = \frac{\sin^2\frac{α}{2} - \sin^2\frac{φ - e}{2}}{\cos φ \cos e}
+    Δ = \arccos \frac{L^2 + r^2 - δ^2}{2 L r},
+    \quad r = \operatorname{clip}\left(\sqrt{L^2 - δ^2}, r_1, r_2\right)
+
+That is a first bound, quick for all targets. The second takes each surface about
+a target by itself: the disc that the ball of radius δ cuts out of its plane has a
+cylinder and heights of its own, and a beam that meets the plane n·x = k at a
+distance r from the sensor does so where
+
+.. math::
+
+    n_{xy} \cos(a - a_n) + n_z σ = k / r,
+
+a being the beam's azimuth and n_xy and a_n length and azimuth of the normal in
+plan. With r₁ ≤ r ≤ r₂ that leaves two arcs, one on each side of a_n.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Boolean, Float, Integer
 from .lidar import LidarModel
+from .near_surfaces import NearSurfaces
 
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
+_MARGIN = 1e-9  # radians; a ray too many costs a cast, a ray too few a wrong grid
 
-# How much too wide intervals are, against rounding. A ray too many costs a cast, a ray too few a wrong grid.
-_RELATIVE_MARGIN = 1e-6
-_MARGIN = 1e-9  # radians
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Where returns near targets can lie, as seen from one place.
+
+    Parameters
+    ----------
+    target : (p,) int64
+        Target of each patch, ascending.
+    azimuth : (p,) float64, radians
+        Of the cylinder's axis, counter-clockwise from +x.
+    distance : (p,) float64, metres
+        Of the axis in plan.
+    radius : (p,) float64, metres
+    bottom, top : (p,) float64, metres
+        Heights relative to the place; bottom > top where no return is possible.
+    """
+
+    target: Integer
+    azimuth: Float
+    distance: Float
+    radius: Float
+    bottom: Float
+    top: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """The planes in which returns of patches lie, as seen from one place.
+
+    Parameters
+    ----------
+    normal : (p, 3) float64
+        Unit normals, which point away from the place.
+    distance : (p,) float64, metres
+    tolerance : float, metres
+        How far returns may lie off their plane.
+    """
+
+    normal: Float
+    distance: Float
+    tolerance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """The channels of all sensors at one place, one after the other.
+
+    Parameters
+    ----------
+    sensor : (c,) int64
+        Number of the sensor that has the channel.
+    elevation : (c,) float64, radians
+    zero : (c,) float64, radians
+        Azimuth of step 0.
+    steps : (c,) int64
+        Azimuth steps of a revolution.
+    first_ray : (c,) int64
+        Number of the ray at step 0. Rays of the same direction have the same number.
+    min_range, max_range : (c,) float64, metres
+    rays : int
+        How many numbers there are.
+    """
+
+    sensor: Integer
+    elevation: Float
+    zero: Float
+    steps: Integer
+    first_ray: Integer
+    min_range: Float
+    max_range: Float
+    rays: int
+
+    @classmethod
+    def of(cls, models: Sequence[LidarModel], yaw: float) -> Beams:
+        """Join the channels of models that look along the same yaw.
+
+        Channels coincide whose elevation, azimuth offset and number of steps are the same.
+        """
+        channels = [model.channels for model in models]
+        elevation = np.concatenate([model.elevations for model in models])
+        offset = np.concatenate([model.azimuth_offsets for model in models])
+        steps = np.repeat([model.azimuth_count for model in models], channels)
+        kinds, kind = np.unique(np.column_stack([elevation, offset, steps]), axis=0, return_inverse=True)
+        end = np.cumsum(kinds[:, 2].astype(np.int64))
+        return cls(
+            sensor=np.repeat(np.arange(len(models)), channels),
+            elevation=elevation,
+            zero=yaw + offset,
+            steps=steps,
+            first_ray=(end - kinds[:, 2].astype(np.int64))[kind.ravel()],
+            min_range=np.repeat([model.min_range for model in models], channels),
+            max_range=np.repeat([model.max_range for model in models], channels),
+            rays=int(end[-1]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class NearRays:
-    """The rays that pass within δ of targets, as azimuth intervals of channels.
+    """The rays that can return from near targets: bundles of neighbouring azimuth steps of a channel.
 
     Parameters
     ----------
-    shape : tuple of int
-        Channels and azimuth steps of the scan; ray = channel * steps + step.
     target : (k,) int64
-        Target of each interval, ascending.
+        Target of each bundle.
+    patch : (k,) int64
+        Patch of each bundle.
     channel : (k,) int64
+        Of the beams.
     first : (k,) int64
-        First azimuth step, at least 0 and less than the number of steps.
+        First azimuth step, possibly negative or beyond the revolution, at the end of which step 0 follows.
     width : (k,) int64
-        Number of steps, which may run on past the end of the revolution.
-    likeliest : (k,) int64
-        The ray of the interval that would end nearest the target if the road went on level from there.
+        Number of steps, at least 1.
     miss : (k,) float64, metres
-        Distance from the target at which it would end; infinite if it does not come down.
+        How far before or behind the middle of the patch the channel comes down.
     """
 
-    shape: tuple[int, int]
     target: Integer
+    patch: Integer
     channel: Integer
     first: Integer
     width: Integer
-    likeliest: Integer
     miss: Float
 
-    def rays(self, wanted: Boolean) -> Boolean:
-        """Mark the rays that pass near wanted targets.
+    def __len__(self) -> int:
+        return len(self.target)
+
+    @property
+    def middle(self) -> Integer:
+        """The middle step of each bundle, (k,) int64."""
+        return self.first + (self.width - 1) // 2
+
+    def pick(self, which: Boolean | Integer) -> NearRays:
+        """Return some of the bundles."""
+        return NearRays(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def likeliest(self, sensor: Integer) -> NearRays:
+        """Return for each target and sensor the bundle that should end nearest to the target.
 
         Parameters
         ----------
-        wanted : (t,) bool
-
-        Returns
-        -------
-        (channels * steps,) bool
+        sensor : (c,) int64
+            Which sensor has which channel.
         """
-        channels, steps = self.shape
-        pick = wanted[self.target]
-        channel, first = self.channel[pick], self.first[pick]
-        end = first + self.width[pick]
-        over = end > steps  # the part past the seam starts again at step 0
-        row = channel * (steps + 1)
-        opened = np.concatenate([row + first, row[over]])
-        closed = np.concatenate([row + np.minimum(end, steps), row[over] + end[over] - steps])
-        size = channels * (steps + 1)
-        depth = np.cumsum(np.bincount(opened, minlength=size) - np.bincount(closed, minlength=size))
-        marked: Boolean = depth.reshape(channels, steps + 1)[:, :steps].ravel() > 0
-        return marked
+        number = sensor[self.channel] * (self.target.max(initial=0) + 1) + self.target
+        least = np.full(number.max(initial=0) + 1, np.inf)
+        np.minimum.at(least, number, self.miss)
+        best = np.flatnonzero(self.miss == least[number])
+        return self.pick(best[np.unique(number[best], return_index=True)[1]])
 
-    def likeliest_rays(self, within: float) -> Integer:
-        """Return for each target the ray that should end nearest to it, if nearer than ``within`` metres.
-
-        Returns
-        -------
-        (r,) int64
-            Ascending, each ray once.
-        """
-        if len(self.target) == 0:
-            return np.zeros(0, dtype=np.int64)
-        starts = np.flatnonzero(np.diff(self.target, prepend=-1))
-        least = np.minimum.reduceat(self.miss, starts)
-        best = self.miss == np.repeat(least, np.diff(starts, append=len(self.target)))
-        rays: Integer = np.unique(self.likeliest[best & (self.miss < within)])
-        return rays
+    def beside_middle(self) -> tuple[NearRays, Integer]:
+        """Return what is left and right of the middle rays, and of which bundle each is a part."""
+        before = (self.width - 1) // 2
+        after = self.width - 1 - before
+        right, left = np.flatnonzero(before), np.flatnonzero(after)
+        parent = np.concatenate([right, left])
+        halves = self.pick(parent)
+        first = np.concatenate([self.first[right], (self.first + before + 1)[left]])
+        width = np.concatenate([before[right], after[left]])
+        return replace(halves, first=first, width=width), parent
 
 
-def near_rays(model: LidarModel, yaw: float, offsets: Float, delta: float) -> NearRays:
-    """Find the rays of a scan that pass within ``delta`` of targets.
+def target_patches(origin: Float, surfaces: NearSurfaces) -> Patches:
+    """Look at the surroundings of each target from a place, given as (3,) float64 in metres."""
+    azimuth, distance = _polar(surfaces.xyz - origin)
+    radius = np.full(len(distance), surfaces.radius)
+    everyone = np.arange(len(distance))
+    return Patches(everyone, azimuth, distance, radius, surfaces.low - origin[2], surfaces.high - origin[2])
+
+
+def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tuple[Patches, Planes]:
+    """Look at each surface about wanted targets from a place.
 
     Parameters
     ----------
-    model : LidarModel
-    yaw : float, radians
-        Direction of azimuth zero.
-    offsets : (t, 3) float64, metres
-        Targets less the sensor's position.
-    delta : float, metres
+    origin : (3,) float64, metres
+    surfaces : NearSurfaces
+    wanted : (t,) bool
+    """
+    discs = surfaces.discs
+    pick = np.flatnonzero(wanted[discs.target])
+    centre, normal = discs.centre[pick] - origin, discs.normal[pick]
+    away = (centre * normal).sum(axis=1)
+    normal = np.where(away[:, None] < 0, -normal, normal)
+    azimuth, distance = _polar(centre)
+    bottom, top = discs.low[pick] - origin[2], discs.high[pick] - origin[2]
+    patches = Patches(discs.target[pick], azimuth, distance, discs.radius[pick] + surfaces.tolerance, bottom, top)
+    return patches, Planes(normal, np.abs(away), surfaces.tolerance)
+
+
+def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> NearRays:
+    """Find the rays that can return from patches.
+
+    Parameters
+    ----------
+    beams : Beams
+    patches : Patches
+        As seen from the sensors.
+    planes : Planes, optional
+        Of the patches, where they are known.
 
     Returns
     -------
     NearRays
-        All that pass, and those that miss by up to a millionth of ``delta``.
+        All that can, and few that cannot.
     """
-    level = np.hypot(offsets[:, 0], offsets[:, 1])
-    distance = np.hypot(level, offsets[:, 2])
-    elevation = np.arctan2(offsets[:, 2], level)
-    cap = _cap_half_angle(distance, delta)
-    reachable = (distance - delta <= model.max_range * (1 + _RELATIVE_MARGIN)) & (
-        distance + delta >= model.min_range * (1 - _RELATIVE_MARGIN)
+    arcs = _arcs(beams, patches)
+    if planes is not None:
+        arcs = _cut_by_planes(arcs, planes)
+    step = 2 * math.pi / beams.steps[arcs.channel]
+    azimuth = arcs.azimuth - beams.zero[arcs.channel]
+    first = np.ceil((azimuth - arcs.half_width) / step).astype(np.int64)
+    last = np.floor((azimuth + arcs.half_width) / step).astype(np.int64)
+    rays = NearRays(
+        target=patches.target[arcs.patch],
+        patch=arcs.patch,
+        channel=arcs.channel,
+        first=first,
+        width=np.minimum(last - first + 1, beams.steps[arcs.channel]),
+        miss=np.abs((arcs.begin + arcs.end) / 2 - patches.distance[arcs.patch]),
     )
-
-    order = np.argsort(model.elevations, kind="stable")
-    ascending = model.elevations[order]
-    low = np.searchsorted(ascending, elevation - cap)
-    count = np.where(reachable, np.searchsorted(ascending, elevation + cap, side="right") - low, 0)
-    target = np.repeat(np.arange(len(offsets)), count)
-    within = np.arange(len(target)) - np.repeat(np.cumsum(count) - count, count)
-    channel = order[low[target] + within]
-
-    beam = model.elevations[channel]
-    half_width = _azimuth_half_width(cap[target], beam, elevation[target])
-    step = 2 * math.pi / model.azimuth_count
-    azimuth = np.arctan2(offsets[:, 1], offsets[:, 0])[target] - yaw - model.azimuth_offsets[channel]
-    first = np.ceil((azimuth - half_width) / step).astype(np.int64)
-    last = np.floor((azimuth + half_width) / step).astype(np.int64)
-    nearest = np.clip(np.rint(azimuth / step).astype(np.int64), first, last)
-    miss = _miss_on_level_road(beam, level[target], offsets[target, 2], azimuth - nearest * step)
-
-    some = last >= first
-    steps = model.azimuth_count
-    return NearRays(
-        shape=(model.channels, steps),
-        target=target[some],
-        channel=channel[some],
-        first=first[some] % steps,
-        width=np.minimum(last - first + 1, steps)[some],
-        likeliest=(channel * steps + nearest % steps)[some],
-        miss=miss[some],
-    )
+    return rays.pick(np.flatnonzero(rays.width > 0))
 
 
-def _cap_half_angle(distance: Float, delta: float) -> Float:
-    """Half-angle under which a ball of radius delta is seen; π from within it."""
-    sine = delta / np.maximum(distance, delta)
-    angle = np.arcsin(sine) * (1 + _RELATIVE_MARGIN) + _MARGIN
-    return np.where(distance > delta * (1 + _RELATIVE_MARGIN), angle, math.pi)
+@dataclass(frozen=True, eq=False)
+class _Arcs:
+    """Azimuths about ``azimuth`` and distances in plan at which a channel is within a patch, all (k,)."""
+
+    patch: Integer
+    channel: Integer
+    slope: Float
+    begin: Float
+    end: Float
+    azimuth: Float
+    half_width: Float
+
+    def pick(self, which: Boolean) -> _Arcs:
+        return _Arcs(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
-def _azimuth_half_width(cap: Float, beam: Float, elevation: Float) -> Float:
-    haversine = np.sin(cap / 2) ** 2 - np.sin((beam - elevation) / 2) ** 2
-    flatness = np.maximum(np.cos(beam) * np.cos(elevation), 1e-300)  # a target straight below is near all azimuths
-    half: Float = 2 * np.arcsin(np.sqrt(np.clip(haversine / flatness, 0.0, 1.0))) + _MARGIN
-    return half
+def _arcs(beams: Beams, patches: Patches) -> _Arcs:
+    patch, channel = _channels_at(beams, patches)
+    slope, distance, radius = np.tan(beams.elevation)[channel], patches.distance[patch], patches.radius[patch]
+    begin, end = _between_heights(slope, patches.bottom[patch], patches.top[patch])
+    begin = np.fmax(begin, np.maximum(distance - radius, 0.0))
+    end = np.fmin(end, distance + radius)
+    half_width = _half_width(distance, begin, end, radius)
+    depth = np.maximum(np.abs(patches.bottom), np.abs(patches.top))[patch]
+    in_range = (begin <= beams.max_range[channel]) & (np.hypot(end, depth) >= beams.min_range[channel])
+    return _Arcs(patch, channel, slope, begin, end, patches.azimuth[patch], half_width).pick((begin <= end) & in_range)
 
 
-def _miss_on_level_road(beam: Float, level: Float, rise: Float, aside: Float) -> Float:
-    """Distance between a target and where a beam meets the horizontal plane through it."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        radius = rise / np.tan(beam)
-        miss = np.hypot(radius - level, level * aside)
-    return np.where(radius > 0, miss, np.inf)
+def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
+    """Return pairs of patches and of channels that somewhere in the cylinder are at the patch's height."""
+    near = np.maximum(patches.distance - patches.radius, 0.0)
+    far = patches.distance + patches.radius
+    with np.errstate(divide="ignore"):
+        least = patches.bottom / np.where(patches.bottom < 0, near, far)
+        most = patches.top / np.where(patches.top > 0, near, far)
+    order = np.argsort(beams.elevation, kind="stable")
+    slopes = np.tan(beams.elevation[order])
+    low = np.searchsorted(slopes, least)
+    count = np.searchsorted(slopes, most, side="right") - low
+    count = np.where((patches.bottom <= patches.top) & (near <= beams.max_range.max()), np.maximum(count, 0), 0)
+    return np.repeat(np.arange(len(count)), count), order[_counted(low, count)]
+
+
+def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Float]:
+    """Distances in plan at which a beam enters and leaves heights; NaN where it always is between them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at_bottom, at_top = bottom / slope, top / slope
+    return np.where(slope < 0, at_top, at_bottom), np.where(slope < 0, at_bottom, at_top)
+
+
+def _half_width(distance: Float, begin: Float, end: Float, radius: Float) -> Float:
+    """Half the arc of an annulus within a circle; π from within the circle."""
+    widest = np.clip(np.sqrt(np.maximum(distance**2 - radius**2, 0.0)), begin, end)
+    outside = distance > radius
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cosine = (distance**2 + widest**2 - radius**2) / (2 * distance * widest)
+    return np.where(outside, np.arccos(np.clip(np.where(outside, cosine, 0.0), -1, 1)), math.pi) + _MARGIN
+
+
+def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
+    """Leave of each arc what can meet the patch's plane: all of it, or a part on each side of the normal."""
+    distance, normal = planes.distance[arcs.patch], planes.normal[arcs.patch]
+    direction, level = _polar(normal)
+    level = np.maximum(level, _MARGIN)
+    nearest, farthest = distance - planes.tolerance, distance + planes.tolerance
+    climb = normal[:, 2] * arcs.slope
+    with np.errstate(divide="ignore"):
+        least = nearest / np.where(nearest > 0, arcs.end, arcs.begin)
+        most = farthest / arcs.begin
+    outer = np.arccos(np.clip((least - climb) / level, -1, 1)) + _MARGIN
+    inner = np.arccos(np.clip((most - climb) / level, -1, 1)) - _MARGIN
+    half_width = (outer - inner) / 2
+    # an arc so wide that a part could meet it beyond both of its ends is left whole
+    whole = (half_width > math.pi / 2 - _MARGIN) | (half_width + arcs.half_width >= math.pi)
+    possible = ((most - climb) >= -level) & ((least - climb) <= level)
+    parts = [arcs.pick(whole & possible)]
+    for side in (-1, 1):
+        middle = direction + side * (outer + inner) / 2
+        apart = (middle - arcs.azimuth + math.pi) % (2 * math.pi) - math.pi
+        right = np.maximum(apart - half_width, -arcs.half_width)
+        left = np.minimum(apart + half_width, arcs.half_width)
+        part = replace(arcs, azimuth=arcs.azimuth + (left + right) / 2, half_width=(left - right) / 2)
+        parts.append(part.pick(~whole & possible & (right <= left)))
+    return _Arcs(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(_Arcs)))
+
+
+def _polar(xyz: Float) -> tuple[Float, Float]:
+    """Azimuth and length in plan of vectors (n, 3)."""
+    return np.arctan2(xyz[:, 1], xyz[:, 0]), np.hypot(xyz[:, 0], xyz[:, 1])
+
+
+def _counted(first: Integer, count: Integer) -> Integer:
+    """Return first, first + 1, … for each pair of a first number and a count, one after the other."""
+    numbers: Integer = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
+    return numbers

@@ -7,6 +7,7 @@ drop-off are for scans of traffic, and seeded by the generator that is passed in
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import os
 import tomllib
@@ -132,9 +133,8 @@ class BeamPattern:
     """
 
     def __init__(self, model: LidarModel, yaw: float = 0.0) -> None:
-        step = 2 * math.pi / model.azimuth_count * np.arange(model.azimuth_count)
         self.shape = (model.channels, model.azimuth_count)
-        self._step_cos, self._step_sin = np.cos(step), np.sin(step)
+        self._step_cos, self._step_sin = _turns(model.azimuth_count)
         turn = yaw + model.azimuth_offsets
         level = np.cos(model.elevations)
         self._turn_cos, self._turn_sin = np.cos(turn) * level, np.sin(turn) * level
@@ -159,6 +159,13 @@ class BeamPattern:
         out[:, 1] = sin * turn_cos + cos * turn_sin
         out[:, 2] = self._rise[channel]
         return out
+
+
+@functools.cache
+def _turns(steps: int) -> tuple[Float, Float]:
+    """Cosines and sines of a revolution in equal steps."""
+    angle = 2 * math.pi / steps * np.arange(steps)
+    return np.cos(angle), np.sin(angle)
 
 
 def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:

@@ -157,5 +157,5 @@ def test_control_c_leaves_nothing_half_written(tmp_path):
     process.send_signal(signal.SIGINT)
     _, complaint = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "stopped, nothing written" in complaint
-    assert list(tmp_path.iterdir()) == []
+    assert "stopped, no result written" in complaint
+    assert {path.name for path in tmp_path.iterdir()} <= {"visibility.pieces"}  # to go on from

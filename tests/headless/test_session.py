@@ -67,7 +67,7 @@ def test_control_c_ends_with_130_and_one_line() -> None:
         process.send_signal(signal.SIGINT)
         _, complaint = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert complaint == "stopped, nothing written\n"
+    assert complaint == "stopped, no result written\n"
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no blend"])
