@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import shapely
 
-from seip_addon.scene import collections as contract
+from seip_addon.scene import contract
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

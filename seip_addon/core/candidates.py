@@ -14,6 +14,9 @@ from .errors import SeipError
 from .scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 from .targets import surface_height
 
+_ABOVE_POLE = 0.5
+"""Metres that a sensor may hang above the top of its pole, on a short mast."""
+
 _POST_FOOT = 0.3
 """Metres above the ground from which a post must keep clear: kerbs and plinths are no walls."""
 
@@ -132,20 +135,23 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
         them), or a mandatory place holds none.
     """
     dropped: dict[str, int] = {}
-    foot, axis_offset, name, on_pole = _positions(geometry, settings, dropped)
+    foot, axis_offset, top, name, on_pole = _positions(geometry, settings, dropped)
     heights = np.array(sorted(set(settings.heights)), dtype=np.float64)
     position_of = np.repeat(np.arange(len(foot)), len(heights))
     height = np.tile(heights, len(foot))
     xyz = foot[position_of] + axis_offset[position_of]
     xyz[:, 2] += height
 
-    inside = _inside_any(xyz, geometry.occluders)
+    too_high = height > top[position_of] + _ABOVE_POLE
+    inside = ~too_high
+    inside[inside] = _inside_any(xyz[inside], geometry.occluders)
     blocked = np.zeros(len(xyz), dtype=bool)
     post = ~on_pole[position_of] & ~inside
     blocked[post] = _post_blocked(foot[position_of[post]], height[post], settings.clearance, geometry.occluders)
+    dropped["higher than their pole"] = int(too_high.sum())
     dropped["inside an object"] = int(inside.sum())
     dropped["too close to a wall or object"] = int(blocked.sum())
-    kept = ~inside & ~blocked
+    kept = ~too_high & ~inside & ~blocked
     if not kept.any():
         raise SeipError(_none_left(dropped))
 
@@ -170,21 +176,23 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
 
 def _positions(
     geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]
-) -> tuple[Float, Float, Text, Boolean]:
-    """Foot, offset of the optical axis from it, name and kind of each position, in order of x, y, z."""
+) -> tuple[Float, Float, Float, Text, Boolean]:
+    """Foot, offset of the optical axis from it, top, name and kind of each position, in order of x, y, z."""
     poles = _free_poles(geometry, dropped)
     pole_feet = np.array([pole.base for pole in poles], dtype=np.float64).reshape(-1, 3)
     pavement = _pavement_feet(geometry, settings, pole_feet, dropped)
     foot = np.round(np.concatenate((pavement, pole_feet)), 6)
     offset = np.zeros_like(foot)
+    top = np.full(len(foot), np.inf)
     for row, pole in enumerate(poles, start=len(pavement)):
+        top[row] = np.inf if pole.height is None else pole.height
         offset[row, :2] = settings.bracket * _towards(pole.base[:2], geometry.region)
     on_pole = np.arange(len(foot)) >= len(pavement)
     order = np.lexsort((foot[:, 2], foot[:, 1], foot[:, 0]))
     numbers = iter(range(1, len(pavement) + 1))
     pole_names = [pole.name for pole in poles]
     names = [pole_names[i - len(pavement)] if on_pole[i] else f"sidewalk {next(numbers)}" for i in order]
-    return foot[order], np.round(offset[order], 6), np.array(names, dtype=np.str_), on_pole[order]
+    return foot[order], np.round(offset[order], 6), top[order], np.array(names, dtype=np.str_), on_pole[order]
 
 
 def _free_poles(geometry: SceneGeometry, dropped: dict[str, int]) -> list[Pole]:
@@ -339,7 +347,7 @@ def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[
         if not row.any():
             raise SeipError(
                 f"{title!r} must carry a sensor but holds no candidate position: "
-                "enlarge it, or free it of forbidden areas and obstacles"
+                "enlarge it, free it of forbidden areas and obstacles, or ask for lower heights"
             )
     return groups
 

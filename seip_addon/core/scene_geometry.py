@@ -9,6 +9,9 @@ from shapely.geometry.base import BaseGeometry
 
 from .arrays import Float
 
+DEFAULT_WEIGHT = 2.0
+"""Of a weighted region that does not say its own."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -36,12 +39,15 @@ class Pole:
         The object's name.
     base : (3,) float64, metres
         Foot of the post, local site axes.
+    height : float or None, metres
+        Top of the post above its foot; None where that is not known, and any height will do.
     forbidden, mandatory : bool
         No sensor may hang here; at least one sensor must.
     """
 
     name: str
     base: Float
+    height: float | None = None
     forbidden: bool = False
     mandatory: bool = False
 

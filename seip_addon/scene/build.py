@@ -16,22 +16,22 @@ from ..core.storage import digest, whole_file
 from ..core.streetscape.model import SiteModel
 from ..core.streetscape.parts import Part, Role
 from ..core.streetscape.street_furniture import Solid
-from . import collections
+from . import contract
 from .materials import material
 
 DRESSING = "Dressing"
 VIEW = "View"
 
 COLLECTIONS = {
-    Role.REGION: collections.REGION,
-    Role.ROADS: collections.ROADS,
-    Role.GROUND: collections.GROUND,
-    Role.OCCLUDERS: collections.OCCLUDERS,
-    Role.POLES: collections.POLES,
-    Role.CANDIDATE_AREAS: collections.CANDIDATE_AREAS,
-    Role.WEIGHTED_REGIONS: collections.WEIGHTED_REGIONS,
-    Role.FORBIDDEN_AREAS: collections.FORBIDDEN_AREAS,
-    Role.MANDATORY_AREAS: collections.MANDATORY_AREAS,
+    Role.REGION: contract.REGION,
+    Role.ROADS: contract.ROADS,
+    Role.GROUND: contract.GROUND,
+    Role.OCCLUDERS: contract.OCCLUDERS,
+    Role.POLES: contract.POLES,
+    Role.CANDIDATE_AREAS: contract.CANDIDATE_AREAS,
+    Role.WEIGHTED_REGIONS: contract.WEIGHTED_REGIONS,
+    Role.FORBIDDEN_AREAS: contract.FORBIDDEN_AREAS,
+    Role.MANDATORY_AREAS: contract.MANDATORY_AREAS,
     Role.DRESSING: DRESSING,
 }
 VEILS = {Role.REGION, Role.WEIGHTED_REGIONS, Role.FORBIDDEN_AREAS, Role.MANDATORY_AREAS, Role.CANDIDATE_AREAS}
@@ -71,7 +71,7 @@ def build_scene(model: SiteModel, map_name: str) -> Generator[Progress, None, bp
     scene.name = model.name
     _describe(scene, model, map_name)
     for name in COLLECTIONS.values():
-        collections.find_or_make(scene, name)
+        contract.find_or_make(scene, name)
     meshes: dict[str, bpy.types.Mesh] = {}
     for number, part in enumerate(model.parts):
         if number % STEP == 0:
@@ -101,11 +101,11 @@ def save_blend(path: Path) -> None:
 
 def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     """Write what the scene contract asks for, and metres, into the scene."""
-    scene[collections.TITLE] = model.name
-    scene[collections.ORIGIN] = model.origin.tolist()
-    scene[collections.MAP] = map_name
-    scene[collections.GEO_REFERENCE] = model.geo_reference or ""
-    scene[collections.HEADER_OFFSET] = model.header_offset.tolist()
+    scene[contract.TITLE] = model.name
+    scene[contract.ORIGIN] = model.origin.tolist()
+    scene[contract.MAP] = map_name
+    scene[contract.GEO_REFERENCE] = model.geo_reference or ""
+    scene[contract.HEADER_OFFSET] = model.header_offset.tolist()
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
 
@@ -120,10 +120,10 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     thing.location = part.foot
     thing.rotation_euler = (0.0, 0.0, part.yaw)
     if part.weight is not None:
-        thing[collections.WEIGHT] = part.weight
+        thing[contract.WEIGHT] = part.weight
     thing.hide_render = VEILS.issuperset(part.roles)
     for role in part.roles:
-        collections.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)
+        contract.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)
 
 
 def _mesh(name: str, solid: Solid) -> bpy.types.Mesh:
@@ -146,7 +146,7 @@ def _light(scene: bpy.types.Scene) -> None:
     thing = bpy.data.objects.new("Sun", sun)
     thing.rotation_euler = (math.pi / 2 - SUN_ELEVATION, 0.0, SUN_AZIMUTH)
     thing.location = (0.0, 0.0, 60.0)
-    collections.find_or_make(scene, VIEW).objects.link(thing)
+    contract.find_or_make(scene, VIEW).objects.link(thing)
     world = bpy.data.worlds.new("Sky")
     if world.node_tree is None:  # from Blender 5.0 on nodes are always there
         world.use_nodes = True
@@ -165,7 +165,7 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     camera.clip_end = 5000.0
     thing = bpy.data.objects.new("Overview", camera)
     thing.rotation_euler = (math.pi / 2 - CAMERA_ELEVATION, 0.0, CAMERA_AZIMUTH + math.pi / 2)
-    collections.find_or_make(scene, VIEW).objects.link(thing)
+    contract.find_or_make(scene, VIEW).objects.link(thing)
     scene.camera = thing
     bpy.context.view_layer.update()
     outline = shapely.get_coordinates(model.region.convex_hull.buffer(FRAME))

@@ -6,9 +6,9 @@ import math
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -17,14 +17,9 @@ from mathutils import Matrix, Vector
 from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
-from . import collections as contract
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from ..core.results.deployment import Deployment
-    from ..core.site import Site
-
+from ..core.results.deployment import Deployment
+from ..core.site import Site
+from . import contract
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES = 12
@@ -33,13 +28,6 @@ FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
 SUN_DIRECTION = (math.radians(38.0), math.radians(-18.0), math.radians(20.0))
-AREAS = {
-    contract.REGION,
-    contract.CANDIDATE_AREAS,
-    contract.WEIGHTED_REGIONS,
-    contract.FORBIDDEN_AREAS,
-    contract.MANDATORY_AREAS,
-}
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
 
@@ -111,7 +99,7 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     layers = [scene.view_layers[0].layer_collection]
     while layers:
         layer = layers.pop()
-        if layer.exclude or layer.collection.hide_render or layer.collection.name in AREAS:
+        if layer.exclude or layer.collection.hide_render or contract.kind(layer.collection) in contract.AREAS:
             continue
         layers.extend(layer.children)
         found |= {thing.name_full: thing for thing in layer.collection.objects}

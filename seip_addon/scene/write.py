@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
-from ..core.arrays import Float
+from ..core.arrays import Float, Integer
 from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
-from . import collections as contract
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from ..core.results.deployment import Deployment, Sensor
-    from ..core.site import Site, Targets
-
+from ..core.results.deployment import Deployment, Sensor
+from ..core.site import Site, Targets
+from . import contract
 
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
@@ -48,8 +41,8 @@ def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> 
         The chosen sensors and what they see.
     """
     clear_result(scene)
-    _write_sensors(_collection(scene, contract.SENSORS), deployment.sensors)
-    _write_coverage(_collection(scene, contract.COVERAGE), site.targets, deployment)
+    _write_sensors(contract.find_or_make(scene, contract.SENSORS), deployment.sensors)
+    _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)
 
 
 def clear_result(scene: bpy.types.Scene) -> None:
@@ -59,10 +52,6 @@ def clear_result(scene: bpy.types.Scene) -> None:
         if collection is not None:
             for thing in [thing for thing in collection.objects if MARK in thing]:
                 _remove(thing)
-
-
-def _collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
-    return contract.find_or_make(scene, name)
 
 
 def _remove(thing: bpy.types.Object) -> None:
@@ -175,7 +164,7 @@ def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployme
     collection.objects.link(thing)
 
 
-def _coverage_mesh(targets: Targets, seen_by: NDArray[np.int64]) -> bpy.types.Mesh:
+def _coverage_mesh(targets: Targets, seen_by: Integer) -> bpy.types.Mesh:
     """Return one square per target, with how many sensors see it and the colour of that.
 
     The integers are the attribute ``seip_seen`` of the faces, in the order of

@@ -11,7 +11,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.model import SiteModel
 from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree
-from seip_addon.scene import collections as names
+from seip_addon.scene import contract
 from seip_addon.scene.build import COLLECTIONS, build_scene, save_blend
 from seip_addon.scene.materials import COLOURS
 
@@ -78,11 +78,11 @@ def test_equal_shapes_share_a_mesh(model):
 
 def test_the_scene_knows_where_it_is(model):
     scene = finish(build_scene(model, "map.xodr"))
-    assert list(scene[names.ORIGIN]) == ORIGIN.tolist()
-    assert scene[names.TITLE] == model.name
-    assert scene[names.MAP] == "map.xodr"
-    assert list(scene[names.HEADER_OFFSET]) == [0, 1, 2, 3]
-    assert bpy.data.objects["Middle"][names.WEIGHT] == 3.0
+    assert list(scene[contract.ORIGIN]) == ORIGIN.tolist()
+    assert scene[contract.TITLE] == model.name
+    assert scene[contract.MAP] == "map.xodr"
+    assert list(scene[contract.HEADER_OFFSET]) == [0, 1, 2, 3]
+    assert bpy.data.objects["Middle"][contract.WEIGHT] == 3.0
     assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
 
 
@@ -112,8 +112,8 @@ def test_a_saved_scene_opens_again_and_leaves_no_other_file(model, tmp_path):
     save_blend(tmp_path / "deeper" / "site.blend")
     assert [path.name for path in (tmp_path / "deeper").iterdir()] == ["site.blend"]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "deeper" / "site.blend"))
-    assert list(bpy.context.scene[names.ORIGIN]) == ORIGIN.tolist()
-    assert len(bpy.data.collections[names.OCCLUDERS].objects) == 2
+    assert list(bpy.context.scene[contract.ORIGIN]) == ORIGIN.tolist()
+    assert len(bpy.data.collections[contract.OCCLUDERS].objects) == 2
 
 
 def test_a_name_that_is_none_of_a_blend_is_refused(tmp_path):

@@ -16,7 +16,7 @@ from seip_addon.core.site import make_site
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.visibility import VisibilitySettings, compute_visibility
-from seip_addon.scene import collections as names
+from seip_addon.scene import contract
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
 
@@ -39,8 +39,8 @@ def test_names_and_order_of_objects_change_nothing():
     scene = bpy.context.scene
     before = site_of(scene)
     rng = np.random.default_rng(7)
-    for name in names.INPUTS:
-        collection = names.find(scene, name)
+    for name in contract.INPUTS:
+        collection = contract.find(scene, name)
         members = list(collection.objects) if collection else []
         for item in members:
             collection.objects.unlink(item)

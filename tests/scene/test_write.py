@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.results.deployment import deploy
-from seip_addon.scene import collections as contract
+from seip_addon.scene import contract
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.write import clear_result, write_result
 from tests.scene_by_hand import make_scene

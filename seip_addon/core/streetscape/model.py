@@ -22,8 +22,9 @@ from ..opendrive import (
     placed_signals,
 )
 from ..progress import Progress
+from ..scene_geometry import DEFAULT_WEIGHT
 from . import road_surface, street_furniture
-from .description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
+from .description import Poles, SiteDescription, WeightedRegion
 from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
 from .parts import Part, Role
 from .terrain import Terrain
