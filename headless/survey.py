@@ -16,13 +16,13 @@ import numpy as np
 
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
-from seip_addon.core.needed_triangles import triangles_sentence
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site, make_site
-from seip_addon.core.visibility import VisibilityGrid, VisibilitySettings
-from seip_addon.core.visibility_store import stored_visibility
+from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
+from seip_addon.core.visibility.needed_triangles import triangles_sentence
+from seip_addon.core.visibility.ring_resolution import resolution_warnings
+from seip_addon.core.visibility.store import stored_visibility
 from seip_addon.scene.read import read_scene
 
 Result = TypeVar("Result")

@@ -18,12 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Float, Integer
 from .errors import SeipError
-
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 _REQUIRED = {"name", "manufacturer", "source", "range_m", "points_per_second", "rotation_rate_hz", "price_usd"}
 _UNIFORM = {"channels", "field_of_view_deg"}

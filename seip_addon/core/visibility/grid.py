@@ -21,16 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Boolean, Float, Integer
-from .errors import SeipError
-from .lidar import LidarModel, find_models
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from ..lidar import LidarModel, find_models
+from ..progress import Progress
+from ..site import Site
+from ..storage import digest, whole_file
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
-from .progress import Progress
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import Place, seen_by_all_rays
-from .site import Site
-from .storage import digest, whole_file
 from .work_force import ObserverTask, cluster, threads_of
 
 SCHEMA = "seip.visibility"
