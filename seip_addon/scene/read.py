@@ -85,7 +85,8 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
     roads = _meshes(parts, contract.ROADS)
     if not roads:
         raise SeipError(
-            f"scene {scene.name!r} has no road: put the meshes of the carriageway into the collection {contract.ROADS!r}"
+            f"scene {scene.name!r} has no road: "
+            f"put the meshes of the carriageway into the collection {contract.ROADS!r}"
         )
     # An object that lies in several collections is cast against once.
     taken = {id(part) for part in parts if contract.ROADS in part.collections}

@@ -20,6 +20,7 @@ from ..core.pictures.viewpoint import Viewpoint, frame
 from ..core.results.deployment import Deployment
 from ..core.site import Site
 from . import contract
+from .daylight import add_daylight
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES = 12
@@ -27,7 +28,6 @@ AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, 
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
-SUN_DIRECTION = (math.radians(38.0), math.radians(-18.0), math.radians(20.0))
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
 
@@ -54,7 +54,7 @@ def save_rendered_view(
     with tempfile.TemporaryDirectory(prefix="seip-") as folder, _stage(scene) as stage:
         raw = Path(folder) / "view.png"
         viewpoint = _add_camera(stage, site)
-        _add_light(stage)
+        add_daylight(stage, stage.collection)
         _set_up(stage, raw)
         with _silence():
             bpy.ops.render.render(scene=stage.name, write_still=True)
@@ -121,25 +121,6 @@ def _add_camera(stage: bpy.types.Scene, site: Site) -> Viewpoint:
     stage.collection.objects.link(camera)
     stage.camera = camera
     return Viewpoint(tight.place, tight.axes, slopes)
-
-
-def _add_light(stage: bpy.types.Scene) -> None:
-    sun = bpy.data.lights.new("SEIP view", "SUN")
-    sun.energy = 2.3
-    sun.angle = math.radians(3.0)
-    lamp = bpy.data.objects.new("SEIP view sun", sun)
-    lamp.rotation_euler = SUN_DIRECTION
-    stage.collection.objects.link(lamp)
-    world = bpy.data.worlds.new("SEIP view")
-    if world.node_tree is None:
-        world.use_nodes = True
-    nodes = world.node_tree.nodes
-    nodes.clear()
-    sky = nodes.new("ShaderNodeBackground")
-    sky.inputs["Color"].default_value = (0.80, 0.88, 1.0, 1.0)
-    sky.inputs["Strength"].default_value = 0.42
-    world.node_tree.links.new(sky.outputs["Background"], nodes.new("ShaderNodeOutputWorld").inputs["Surface"])
-    stage.world = world
 
 
 def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
