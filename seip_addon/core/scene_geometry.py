@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -27,6 +29,11 @@ class Mesh:
 
     name: str
     triangles: Float
+
+
+def joined(meshes: Sequence[Mesh]) -> Float:
+    """Return the triangles (n, 3, 3) of all meshes."""
+    return np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
 
 
 @dataclass(frozen=True, eq=False)

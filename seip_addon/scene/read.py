@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Float
-from ..core.candidates import plan_outline
 from ..core.errors import SeipError
-from ..core.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry
+from ..core.plan_geometry import outline
+from ..core.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
 from . import contract
 
 SHAFT_REACH = 0.5
@@ -76,7 +76,7 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
     """
     members = contract.members(scene)
     parts = list(_shown(scene, members))
-    region = plan_outline(_meshes(parts, contract.REGION))
+    region = outline(joined(_meshes(parts, contract.REGION)))
     if region.is_empty:
         raise SeipError(
             f"scene {scene.name!r} has no region of interest: "
@@ -101,7 +101,7 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
         ground=ground,
         occluders=_meshes(free, contract.OCCLUDERS) + _meshes(poles_with_faces, contract.POLES),
         region=region,
-        candidate_areas=plan_outline(_meshes(parts, contract.CANDIDATE_AREAS)),
+        candidate_areas=outline(joined(_meshes(parts, contract.CANDIDATE_AREAS))),
         weighted_regions=_areas(parts, contract.WEIGHTED_REGIONS),
         forbidden_areas=_areas(parts, contract.FORBIDDEN_AREAS),
         mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
@@ -191,10 +191,10 @@ def _areas(parts: list[_Shown], collection: str) -> tuple[NamedArea, ...]:
     for part in parts:
         if collection in part.collections:
             (mesh,) = _meshes([part], collection)
-            outline = plan_outline([mesh])
-            if outline.is_empty:
+            plan = outline(mesh.triangles)
+            if plan.is_empty:
                 raise SeipError(f"object {part.name!r} in {collection!r} covers no area in plan: lay it flat")
-            areas.append(NamedArea(part.name, outline, _weight(part)))
+            areas.append(NamedArea(part.name, plan, _weight(part)))
     return tuple(areas)
 
 

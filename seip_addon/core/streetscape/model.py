@@ -205,7 +205,7 @@ def _region(
     shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
     near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
     if near:
-        region = road_surface.without_crumbs(road_surface.outline(near).intersection(_shifted(within, -shift)))
+        region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(_shifted(within, -shift)))
         if not region.is_empty:
             return _shifted(region, shift)
     where = (
@@ -240,7 +240,7 @@ def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
-    carriageway = road_surface.outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
+    carriageway = road_surface.lane_outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
     shapely.prepare(carriageway)
     return _Street(origin, lanes, region, extent, carriageway, Terrain(triangles))
 
@@ -291,7 +291,7 @@ def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
     ground = street.extent if built_up.is_empty else street.extent.union(built_up.buffer(GARDEN)).convex_hull
-    covered = road_surface.outline(street.lanes).intersection(street.extent)
+    covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     beside = road_surface.without_crumbs(ground.difference(covered.buffer(-road_surface.SEAM, join_style="mitre")))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
