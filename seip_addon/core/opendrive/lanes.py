@@ -118,13 +118,14 @@ def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
 
 
 def _knots(road: Road, section: LaneSection) -> list[float]:
-    """Return the section's ends and the places between them where some record begins."""
+    """Return the section's ends and the places between them where some record begins or a width comes to nothing."""
     lanes = (*section.left, *section.right)
     profiles = (
         *(road.elevation, road.superelevation, road.left_crossfall, road.right_crossfall, road.lane_offset),
         *(of_lane for lane in lanes for of_lane in (lane.width, lane.border, lane.inner_height, lane.outer_height)),
     )
-    starts = np.concatenate([road.reference_line.s, road.shape.s, *(profile.start for profile in profiles)])
+    vanishing = (lane.width.zeros(section.end) for lane in lanes)
+    starts = np.concatenate([road.reference_line.s, road.shape.s, *(p.start for p in profiles), *vanishing])
     inside = starts[(starts > section.start) & (starts < section.end)]
     return [section.start, *inside.tolist(), section.end]
 
