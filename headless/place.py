@@ -96,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="place",
         description="Place roadside LiDARs in a scene.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        formatter_class=survey.HelpWithDefaults,
     )
     survey.add_options(parser)
     goal = parser.add_argument_group("goal")

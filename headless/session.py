@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, NoReturn
 
 from headless.system_libraries import complaint, missing_libraries
 
-from tqdm import tqdm
-
 from seip_addon.core.errors import SeipError
 
 if TYPE_CHECKING:
@@ -26,8 +24,19 @@ if TYPE_CHECKING:
 
 try:
     import bpy
+    import defusedxml  # noqa: F401  # first of what the commands stand on, to be missed here rather than anywhere
+    import highspy  # noqa: F401
+    import matplotlib as mpl  # noqa: F401
+    import pulp  # noqa: F401
+    import shapely  # noqa: F401
+    from tqdm import tqdm
 
     from seip_addon.scene.blend_file import open_blend
+except ModuleNotFoundError as error:
+    sys.exit(
+        f"error: {sys.executable} has no package {error.name!r}: use .venv/bin/python, set up by `make environment`, "
+        "or in Blender install the extension that `make extension` builds"
+    )
 except ImportError:
     missing = missing_libraries()
     if not missing:
@@ -98,7 +107,7 @@ def say(text: str) -> None:
 
 
 def run(main: Callable[[list[str]], None]) -> NoReturn:
-    """Run a command and end the process: 0, or 1 after a user's mistake, or 130 after Ctrl-C.
+    """Run a command and end the process: 0, 1 after a user's mistake, 130 after Ctrl-C, 143 when terminated.
 
     Parameters
     ----------
@@ -107,6 +116,8 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
         `SeipError` and `KeyboardInterrupt` are defects and show their traceback.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
+    for number in (signal.SIGTERM, signal.SIGHUP):  # end in good order: half-written files are removed on the way out
+        signal.signal(number, lambda which, _frame: sys.exit(128 + which))
     try:
         main(arguments())
     except SeipError as error:

@@ -46,7 +46,7 @@ def main(argv: list[str]) -> None:
                 save_plan_view(folder / name, surveyed.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
-        session.say(f"claim {claim.number}: {claim.verdict}: {claim.text} ({claim.evidence})")
+        session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")
     session.say(f"written to {folder}/")
 
 
@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="study",
         description="Redo the study's coverage figures on a scene; name sensor types from the simplest to the best.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        formatter_class=survey.HelpWithDefaults,
     )
     survey.add_options(parser)
     return parser

@@ -16,6 +16,7 @@ import numpy as np
 
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
+from seip_addon.core.placement.integer_program import check_solver
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site, make_site
@@ -26,6 +27,9 @@ from seip_addon.core.visibility.store import stored_visibility
 from seip_addon.scene.read import read_scene
 
 Result = TypeVar("Result")
+
+HIGHEST = 100.0
+"""Metres: the end of a range of heights beyond this is a slip of the keyboard."""
 
 
 @dataclass
@@ -116,6 +120,7 @@ def survey(options: argparse.Namespace, check: Callable[[Site, dict[str, LidarMo
     -------
     Survey
     """
+    check_solver(options.solver)
     models = find_models(load_catalogue(options.catalogue), options.sensor)
     layout = CandidateSettings(
         sensors=tuple(options.sensor),
@@ -162,6 +167,13 @@ def _in_words(site: Site) -> str:
     )
 
 
+class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
+    """Help that names the default of each option that has one."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, []) else super()._get_help_string(action)
+
+
 class _Heights(argparse.Action):
     """Heights as a list, or a range FROM:TO:STEP with both ends."""
 
@@ -177,12 +189,12 @@ class _Heights(argparse.Action):
                 numbers = []
             if len(numbers) == 1:
                 heights += numbers
-            elif len(numbers) == 3 and 0 < numbers[0] <= numbers[1] < np.inf and numbers[2] >= 0.01:
+            elif len(numbers) == 3 and 0 < numbers[0] <= numbers[1] <= HIGHEST and numbers[2] >= 0.01:
                 first, last, step = numbers
                 heights += np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
             else:
                 parser.error(
                     f"argument --heights: {text!r} is neither a height in metres nor a range FROM:TO:STEP "
-                    "in steps of at least 0.01 m"
+                    f"up to {HIGHEST:g} m in steps of at least 0.01 m"
                 )
         setattr(namespace, self.dest, tuple(heights))

@@ -222,4 +222,5 @@ def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
 
 def _close(name: str, known: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
-    return f"; did you mean {' or '.join(map(repr, near))}?" if near else ": candidates.csv lists them all"
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {known[0]!r} to {known[-1]!r}"
+    return f"; {hint} (the candidates.csv of a run lists all; quote names with blanks)"

@@ -23,7 +23,8 @@ def test_areas_are_signed_by_the_turn(some):
 def test_an_outline_covers_what_its_triangles_cover(some):
     lying = some[np.abs(signed_area(some)) > 0]
     union = shapely.union_all(shapely.polygons(lying[:, :, :2]))
-    assert outline(some).symmetric_difference(union).area <= 1e-2
+    rounding = 1e-3 * shapely.length(shapely.polygons(lying[:, :, :2])).sum()
+    assert outline(some).symmetric_difference(union).area <= rounding
 
 
 def test_what_stands_on_edge_covers_nothing():
@@ -39,16 +40,14 @@ def test_gaps_up_to_twice_the_width_are_closed():
 
 @given(triangles, st.floats(-50, 50), st.floats(-50, 50))
 def test_the_surface_is_the_highest_plane_over_a_point(some, x, y):
-    covering = [
-        plane_height(each[None], np.array([[x, y]]))[0]
-        for each in some
-        if abs(signed_area(each[None])[0]) > 0
-        and shapely.Polygon(each[:, :2]).buffer(-1e-3).contains(shapely.Point(x, y))
-    ]
-    found = surface_height(np.array([[x, y]]), some)[0]
-    if covering:
-        assert found >= max(covering) - 1e-9
-    elif not any(shapely.Polygon(each[:, :2]).distance(shapely.Point(x, y)) < 1e-2 for each in some):
+    place = np.array([[x, y]])
+    lying = some[np.abs(signed_area(some)) > 0]
+    polygons = shapely.polygons(lying[:, :, :2])
+    over = lying[shapely.contains_xy(shapely.buffer(polygons, -1e-3), x, y)]
+    found = surface_height(place, some)[0]
+    if len(over):
+        assert found >= plane_height(over, np.repeat(place, len(over), axis=0)).max() - 1e-9
+    elif shapely.distance(polygons, shapely.Point(x, y)).min(initial=np.inf) > 1e-2:
         assert np.isnan(found)
 
 

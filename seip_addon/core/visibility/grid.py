@@ -37,6 +37,10 @@ SCHEMA = "seip.visibility"
 SCHEMA_VERSION = 1
 
 
+WIDEST_DELTA = 100.0
+"""Metres: a wider one is a slip of the keyboard."""
+
+
 @dataclass(frozen=True)
 class VisibilitySettings:
     """When a target counts as seen.
@@ -53,8 +57,8 @@ class VisibilitySettings:
     min_intensity: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.delta < np.inf:
-            raise SeipError(f"delta must be a positive number of metres, not {self.delta}")
+        if not 0 < self.delta <= WIDEST_DELTA:
+            raise SeipError(f"delta must be a positive number of metres up to {WIDEST_DELTA:g}, not {self.delta}")
         if not 0 <= self.min_intensity <= 1:
             raise SeipError(f"the least intensity must lie between 0 and 1, not {self.min_intensity}")
 
@@ -140,6 +144,7 @@ class VisibilityGrid:
             KeyError,
             IndexError,
             TypeError,
+            RecursionError,
             zipfile.BadZipFile,
             zlib.error,
         ) as error:

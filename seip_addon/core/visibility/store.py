@@ -89,7 +89,7 @@ def stored_visibility(
     """
     key = visibility_key(site, models, settings, engine_name(engine))
     stored = _load(path)
-    if stored is not None and stored.key == key:
+    if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
     pieces = PieceFolder(path, key)
