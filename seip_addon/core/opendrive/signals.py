@@ -23,7 +23,8 @@ class PlacedSignal:
     Parameters
     ----------
     road_id : str
-        The road that its place is given on, not always the one that it applies to.
+        The road that its place is given on, not always the one that it applies to;
+        where the place is given in map coordinates, the one that it applies to.
     id, name, kind : str
         As in the file; ``kind`` is its type.
     dynamic : bool

@@ -169,8 +169,7 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
         ),
         autolim=False,
     )
-    outline = shapely.union_all(flat, grid_size=1e-3)
-    _draw_area(plan, outline, facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    _draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
     return norm
 
 
