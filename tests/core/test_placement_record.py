@@ -11,7 +11,6 @@ from seip_addon.core.placement import Placement
 from seip_addon.core.results.placement_record import (
     Run,
     comparable,
-    degrees,
     load_placement_record,
     placement_record,
     save_placement_record,
@@ -94,12 +93,6 @@ def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
     save_placement_record(tmp_path / "placement.json", record)
     assert record["objective"]["bound"] is None
     assert violations(record, SCHEMA) == []
-
-
-def test_angles_are_written_from_zero_to_below_a_full_turn():
-    assert degrees(-math.pi / 2) == 270.0
-    assert degrees(2 * math.pi - 1e-12) == 0.0
-    assert degrees(-1e-12) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,9 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..placement import Placement
 from ..site import Site
-from ..storage import whole_file
+from ..storage import save_json
 from .deployment import Deployment, Sensor
+from .headings import degrees
 
 Record = dict[str, Any]
 
@@ -143,9 +144,7 @@ def comparable(record: Record) -> Record:
 
 def save_placement_record(path: str | os.PathLike[str], record: Record) -> None:
     """Write ``placement.json``."""
-    with whole_file(path) as temporary:
-        text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    save_json(path, record)
 
 
 def load_placement_record(path: str | os.PathLike[str]) -> Record:
@@ -185,11 +184,6 @@ def _sensor(sensor: Sensor, origin: Float) -> Record:
         "coverage_added": _share(sensor.added),
         "coverage_marginal": _share(sensor.marginal),
     }
-
-
-def degrees(angle: float) -> float:
-    """Return an angle in degrees, 0 <= angle < 360, to the millionth."""
-    return _rounded(math.degrees(angle), 6) % 360.0
 
 
 def _greedy(greedy: Placement, placement: Placement) -> Record:
