@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from ..coverage_study import NUMBERS, WEIGHTS, CoverageStudy
+from ..results import study_tables
 from .drawing import save_png
 from .palette import INK, PAPER, SOFT_INK
 
@@ -25,8 +26,8 @@ BESIDE = 0.09  # of the step between two heights, from one type to the next
 def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
     """Draw coverage against mounting height, a panel for each number of sensors, as PNG.
 
-    A bar above a mark ends at what the solver could not rule out. Cells
-    without a placement are left out.
+    A bar above a mark ends at the coverage that the solver could not rule out.
+    Cells without a placement are left out.
     """
     figure, panels = _figure(len(NUMBERS))
     ticks = [*(f"{height:g}" for height in study.heights), "free"]
@@ -46,6 +47,8 @@ def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title:
         panel.set_xlim(-0.5, len(ticks) - 0.5)
         panel.set_xlabel("mounting height (m)", color=INK)
         _dress(panel)
+    if any(case.span[1] > case.span[0] for case in study.cases if case.weight == 1.0):
+        panels[0].plot([], [], color=SOFT_INK, linewidth=1.1, marker="_", label="left open by the solver")
     _finish(figure, panels, f"{title}: coverage by sensor type, height and number")
     save_png(path, figure)
 
@@ -107,3 +110,11 @@ def _dress(panel: Axes) -> None:
     panel.tick_params(colors=SOFT_INK)
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
+
+
+def save_study_table(path: str | os.PathLike[str], study: CoverageStudy, _heights: Sequence[float]) -> None:
+    """Write the study's table, as the study command asks for it: to go with its next change."""
+    study_tables.save_study_table(path, study)
+
+
+save_claims = study_tables.save_claims
