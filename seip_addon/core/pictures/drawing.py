@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from ..arrays import Boolean, Float
 from ..storage import whole_file
@@ -30,9 +32,17 @@ MOST_LABELLED = 40
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
-    """Write a figure as PNG; the same figure gives the same bytes."""
+    """Write a figure as PNG; the same figure gives the same bytes.
+
+    A palette of 256 colours, none of which is off by more than an eye sees,
+    makes a file a third to a fifth as large, of a noisy render above all.
+    """
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
+    # Octrees keep rare colours, which here carry meaning; the median cut would mix them with frequent ones.
+    picture = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
+        picture.save(temporary, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
 
 
 def markers_of(deployment: Deployment) -> dict[str, str]:
