@@ -25,11 +25,11 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel, load_catalogue
-from seip_addon.core.observer import Observer, places
-from seip_addon.core.ray_casting import Engine, RayCaster, make_ray_caster
-from seip_addon.core.scanning import Place, seen_by_all_rays
 from seip_addon.core.site import Site, make_site
-from seip_addon.core.visibility import VisibilitySettings
+from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.visibility.observer import Observer, places
+from seip_addon.core.visibility.ray_casting import Engine, RayCaster, make_ray_caster
+from seip_addon.core.visibility.scanning import Place, seen_by_all_rays
 from seip_addon.scene.read import read_scene
 
 P = ParamSpec("P")

@@ -40,7 +40,7 @@ def main(argv: list[str]) -> None:
     save_blend(asked.output)
     for note in model.notes:
         sys.stdout.write(f"note: {note}\n")
-    x, y, z = model.origin
+    x, y, z = model.origin + 0.0  # no negative zero
     sys.stdout.write(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
         f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})\n"

@@ -48,8 +48,7 @@ class CandidateSettings:
     clearance: float = 0.3
     bracket: float = 0.4
 
-    def check(self) -> None:
-        """Raise SeipError where a value cannot be meant."""
+    def __post_init__(self) -> None:
         if not self.sensors:
             raise SeipError("no sensor type is chosen: name at least one of the catalogue")
         if not self.heights:
@@ -132,7 +131,6 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
         A setting cannot be meant, no candidate is left (with what dropped
         them), or a mandatory place holds none.
     """
-    settings.check()
     dropped: dict[str, int] = {}
     foot, axis_offset, name, on_pole = _positions(geometry, settings, dropped)
     heights = np.array(sorted(set(settings.heights)), dtype=np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -103,4 +104,5 @@ def _umask() -> int:
 
 def _unwritable(path: Path, error: OSError) -> SeipError:
     reason = error.strerror or str(error)
-    return SeipError(f"cannot write {path}: {reason}; choose a folder that you may write to")
+    cure = "make room there" if error.errno == errno.ENOSPC else "choose a folder that you may write to"
+    return SeipError(f"cannot write {path}: {reason}; {cure}")

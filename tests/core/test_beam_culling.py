@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.beam_culling import (
+from seip_addon.core.lidar import LidarModel, beam_directions, load_catalogue
+from seip_addon.core.visibility.beam_culling import (
     Beams,
     NearRays,
     Patches,
@@ -18,8 +19,7 @@ from seip_addon.core.beam_culling import (
     near_rays,
     target_patches,
 )
-from seip_addon.core.lidar import LidarModel, beam_directions, load_catalogue
-from seip_addon.core.near_surfaces import near_surfaces
+from seip_addon.core.visibility.near_surfaces import near_surfaces
 
 
 def random_model(random: np.random.Generator) -> LidarModel:

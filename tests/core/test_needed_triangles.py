@@ -7,8 +7,8 @@ from engines import each_engine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.needed_triangles import needed_triangles, triangles_sentence
-from seip_addon.core.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.needed_triangles import needed_triangles, triangles_sentence
+from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 
 @each_engine

@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.beam_culling import Beams, NearRays, Planes
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.occlusion import stopped_by
+from seip_addon.core.visibility.beam_culling import Beams, NearRays, Planes
+from seip_addon.core.visibility.occlusion import stopped_by
 
 BEAMS = Beams.of([load_catalogue()["type2"]], 0.4)
 COUNT = 300

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5], [-1, 1, 5]]], dtype=np.float64)
 UP = np.array([[0.0, 0.0, 1.0]])

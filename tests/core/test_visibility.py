@@ -19,19 +19,19 @@ from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel, load_catalogue
-from seip_addon.core.observer import Rows
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.ray_casting import Engine, make_ray_caster
-from seip_addon.core.ring_resolution import resolution_warnings
 from seip_addon.core.site import Site, Targets
-from seip_addon.core.visibility import (
+from seip_addon.core.visibility.grid import (
     VisibilityGrid,
     VisibilitySettings,
     compute_visibility,
     full_scan_visibility,
     visibility_key,
 )
-from seip_addon.core.visibility_store import PieceFolder, stored_visibility
+from seip_addon.core.visibility.observer import Rows
+from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.ring_resolution import resolution_warnings
+from seip_addon.core.visibility.store import PieceFolder, stored_visibility
 
 Float = NDArray[np.float64]
 

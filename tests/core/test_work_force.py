@@ -15,9 +15,9 @@ from synthetic_junction import junction_site
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
-from seip_addon.core.ray_casting import EmbreeRayCaster
-from seip_addon.core.visibility import VisibilitySettings, compute_visibility
-from seip_addon.core.visibility_store import stored_visibility
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.ray_casting import EmbreeRayCaster
+from seip_addon.core.visibility.store import stored_visibility
 
 HAS_DASK = importlib.util.find_spec("distributed") is not None
 needs_dask = pytest.mark.skipif(not HAS_DASK, reason="Dask is not installed: the group 'cluster' of pyproject.toml")
@@ -45,7 +45,7 @@ def test_a_missing_dask_has_its_sentence() -> None:
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])
 def test_a_scheduler_that_does_not_answer_has_its_sentence(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("seip_addon.core.work_force._SECONDS_FOR_AN_ANSWER", 0.5)
+    monkeypatch.setattr("seip_addon.core.visibility.grid.work_force._SECONDS_FOR_AN_ANSWER", 0.5)
     with pytest.raises(SeipError, match="no Dask scheduler answers at"):
         finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler=address))
 

@@ -11,11 +11,10 @@ from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.ray_casting import make_ray_caster
 from seip_addon.core.site import make_site
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.visibility import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.scene import collections as names
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
@@ -26,8 +25,7 @@ FAR = 5_000_000.0
 
 
 def seen(site):
-    caster = make_ray_caster(site.triangles)
-    return finish(compute_visibility(site, load_catalogue(), VisibilitySettings(), caster)).visible
+    return finish(compute_visibility(site, load_catalogue(), VisibilitySettings())).visible
 
 
 def site_of(scene):

@@ -178,7 +178,7 @@ def coverage_study(
         allowed = site.candidates.sensor == sensor
         if height is not None:
             allowed &= site.candidates.height == height
-        goal = Goal(count=count, weighted=weight != 1.0, central_weight=None if weight == 1.0 else weight)
+        goal = Goal(count=count, central_weight=None if weight == 1.0 else weight)
         try:
             problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
             placement = yield from within(progress, solve(problem, solver=solver, time_limit=time_limit))

@@ -18,10 +18,11 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..goal import Plan
 from ..placement import Placement
 from ..site import Site
 from ..storage import save_json
-from .deployment import Deployment, Sensor
+from .deployment import Sensor
 from .headings import degrees
 
 Record = dict[str, Any]
@@ -69,39 +70,23 @@ def versions(**more: str) -> dict[str, str]:
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 
-def placement_record(  # noqa: PLR0913 - one thing for each part of the file
-    site: Site,
-    deployment: Deployment,
-    placement: Placement,
-    run: Run,
-    *,
-    weighted: bool,
-    cheapest: bool = False,
-    greedy: Placement | None = None,
-) -> Record:
+def placement_record(site: Site, plan: Plan, run: Run) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
 
     Parameters
     ----------
     site : Site
-    deployment : Deployment
-        What `placement` chose, of the same site.
-    placement : Placement
-        The solution with its bound.
+    plan : Plan
+        Of that site.
     run : Run
         What it was made with.
-    weighted : bool
-        Whether the targets' weights counted.
-    cheapest : bool
-        Whether the least price for a coverage was sought, not the most coverage.
-    greedy : Placement, optional
-        The greedy solution of the same problem, to compare with.
 
     Returns
     -------
     dict
         Its layout is described in docs/formats.md and docs/placement.schema.json.
     """
+    deployment, placement, greedy = plan.deployment, plan.placement, plan.greedy
     return {
         "schema": SCHEMA,
         "site": {"name": site.name, "origin_m": _metres(site.origin)},
@@ -114,8 +99,8 @@ def placement_record(  # noqa: PLR0913 - one thing for each part of the file
             "seen_twice": _share(deployment.seen_twice),
         },
         "objective": {
-            "kind": "weighted" if weighted else "vanilla",
-            "sought": "least price" if cheapest else "most coverage",
+            "kind": "weighted" if plan.goal.weighted else "vanilla",
+            "sought": "least price" if plan.goal.cheapest else "most coverage",
             "value": _significant(placement.objective),
             "bound": _significant(placement.bound),
             "gap": _significant(placement.gap),

@@ -33,8 +33,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from .arrays import Boolean, Float, Integer
-from .lidar import LidarModel
+from ..arrays import Boolean, Float, Integer
+from ..lidar import LidarModel
 from .near_surfaces import NearSurfaces
 
 _MARGIN = 1e-9  # radians; a ray too many costs a cast, a ray too few a wrong grid

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import SeipError
-from .lidar import LidarModel
+from ..errors import SeipError
+from ..lidar import LidarModel
+from ..progress import Progress
+from ..site import Site
+from ..storage import whole_file
+from .grid import VisibilityGrid, VisibilitySettings, compute_visibility, visibility_key
 from .observer import Rows
-from .progress import Progress
 from .ray_casting import Engine, engine_name
-from .site import Site
-from .storage import whole_file
-from .visibility import VisibilityGrid, VisibilitySettings, compute_visibility, visibility_key
 
 
 class PieceFolder:
@@ -89,7 +89,7 @@ def stored_visibility(
     """
     key = visibility_key(site, models, settings, engine_name(engine))
     stored = _load(path)
-    if stored is not None and stored.key == key:
+    if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
     pieces = PieceFolder(path, key)

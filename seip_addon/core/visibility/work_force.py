@@ -8,12 +8,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from .arrays import Boolean, Integer
-from .errors import SeipError
-from .lidar import LidarModel
+from ..arrays import Boolean, Integer
+from ..errors import SeipError
+from ..lidar import LidarModel
+from ..site import Site
 from .observer import Observer, Rows
 from .ray_casting import Engine, make_ray_caster
-from .site import Site
 
 Submit = Callable[[Integer], Future[Rows]]
 

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from .arrays import Boolean, Float
+from ..arrays import Boolean, Float
 from .beam_culling import Beams, NearRays, Planes
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Float, Integer
+from ..arrays import Float, Integer
 
 _MOST_CELLS_PER_SIDE = 2000
 

@@ -21,20 +21,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Boolean, Float, Integer
-from .errors import SeipError
-from .lidar import LidarModel, find_models
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from ..lidar import LidarModel, find_models
+from ..progress import Progress
+from ..site import Site
+from ..storage import digest, whole_file
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
-from .progress import Progress
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import Place, seen_by_all_rays
-from .site import Site
-from .storage import digest, whole_file
 from .work_force import ObserverTask, cluster, threads_of
 
 SCHEMA = "seip.visibility"
 SCHEMA_VERSION = 1
+
+
+WIDEST_DELTA = 100.0
+"""Metres: a wider one is a slip of the keyboard."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,8 @@ class VisibilitySettings:
     min_intensity: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.delta < np.inf:
-            raise SeipError(f"delta must be a positive number of metres, not {self.delta}")
+        if not 0 < self.delta <= WIDEST_DELTA:
+            raise SeipError(f"delta must be a positive number of metres up to {WIDEST_DELTA:g}, not {self.delta}")
         if not 0 <= self.min_intensity <= 1:
             raise SeipError(f"the least intensity must lie between 0 and 1, not {self.min_intensity}")
 
@@ -140,6 +144,7 @@ class VisibilityGrid:
             KeyError,
             IndexError,
             TypeError,
+            RecursionError,
             zipfile.BadZipFile,
             zlib.error,
         ) as error:

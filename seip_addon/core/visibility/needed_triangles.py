@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import shapely
 
-from .arrays import Boolean, Float
+from ..arrays import Boolean, Float
 from .near_surfaces import caster_tolerance
 
 _ROUNDNESS = 1.01  # how much farther than δ the corners of the polygon lie that stands for a circle

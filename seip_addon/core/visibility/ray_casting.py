@@ -15,8 +15,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from .arrays import Boolean, Float, Integer
-from .errors import SeipError
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
 
 Engine = Literal["auto", "bvh", "embree"]
 

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Boolean, Float, Integer
+from ..arrays import Boolean, Float, Integer
+from ..lidar import BeamPattern, LidarModel, return_intensity
 from .beam_culling import Beams, NearRays, disc_patches, near_rays, target_patches
-from .lidar import BeamPattern, LidarModel, return_intensity
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
 from .ray_casting import RayCaster

@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import shapely
 
-from .arrays import Float, Integer
+from ..arrays import Float, Integer
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 

@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Float, Integer
-from .lidar import LidarModel
+from ..arrays import Float, Integer
+from ..lidar import LidarModel
+from ..progress import Progress
+from ..site import Site
 from .near_surfaces import near_surfaces
-from .progress import Progress
 from .ray_casting import RayCaster
 from .scanning import Place, seen_by_near_rays
-from .site import Site
 
 _PLACES_IN_A_PIECE = 16  # a second's work or less
 
