@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -67,6 +68,18 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
     for part in SCHEMA["required"]:
         assert violations({key: value for key, value in record.items() if key != part}, SCHEMA)
     assert violations({**record, "more": 1}, SCHEMA)
+
+
+def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
+    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
+    record = make_record(example, replace(run, settings=work))
+    assert violations(record, SCHEMA) == []
+    for name in work:
+        assert violations({**record, "settings": {**work, name: None}}, SCHEMA)
+
+
+def test_nothing_random_is_claimed(example, run):
+    assert make_record(example, run)["seeds"] == {}
 
 
 def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(example, run):

@@ -48,8 +48,6 @@ class Run:
         Of the program and what it stands on; see `versions`.
     inputs : mapping of str to str
         Digests or names of what went in.
-    seeds : mapping of str to int
-        Of every random number generator.
     warnings : tuple of str
         What the user should know before trusting the figures.
     """
@@ -59,7 +57,6 @@ class Run:
     durations: Mapping[str, float]
     versions: Mapping[str, str]
     inputs: Mapping[str, str] = field(default_factory=dict)
-    seeds: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
 
@@ -110,7 +107,7 @@ def placement_record(site: Site, plan: Plan, run: Run) -> Record:
         "greedy": None if greedy is None else _greedy(greedy, placement),
         "counts": _counts(site),
         "settings": dict(run.settings),
-        "seeds": dict(run.seeds),
+        "seeds": {},  # visibility and placement draw no random numbers
         "inputs": dict(run.inputs),
         "notes": list(placement.notes),
         "warnings": list(run.warnings),
