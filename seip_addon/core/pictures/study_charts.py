@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from ..coverage_study import NUMBERS, WEIGHTS, CoverageStudy
-from ..results import study_tables
 from .drawing import save_png
 from .palette import INK, PAPER, SOFT_INK
 
@@ -110,11 +109,3 @@ def _dress(panel: Axes) -> None:
     panel.tick_params(colors=SOFT_INK)
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
-
-
-def save_study_table(path: str | os.PathLike[str], study: CoverageStudy, _heights: Sequence[float]) -> None:
-    """Write the study's table, as the study command asks for it: to go with its next change."""
-    study_tables.save_study_table(path, study)
-
-
-save_claims = study_tables.save_claims
