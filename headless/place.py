@@ -40,7 +40,7 @@ def main(argv: list[str]) -> None:
     )
     plan = watch.run("placement", steps)
     run = Run(
-        settings=surveyed.settings | {"goal": asdict(plan.goal)},
+        settings=surveyed.settings | {"goal": asdict(plan.goal), "render": not options.no_render},
         created=datetime.now(UTC),
         durations=watch.seconds,
         versions=versions(blender=bpy.app.version_string),

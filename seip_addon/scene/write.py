@@ -21,8 +21,8 @@ from .meshes import mesh_of
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
 
-LIFT = max(height for height, _ in VEILS.values()) + 0.06
-"""Metres above the road: over the veils of areas, and against flicker in a viewport that shows the whole site."""
+LIFT = max(height for height, _ in VEILS.values()) + 0.02
+"""Metres of the coverage above the road: over the veils of areas, under the top of a kerb, which cuts it off."""
 BODY_RADIUS, BODY_HEIGHT = 0.12, 0.22  # metres; somewhat larger than life
 POST_RADIUS, BRACKET_RADIUS = 0.06, 0.03  # metres
 BODY_SIDES = 16

@@ -44,11 +44,11 @@ GARDEN = 5.0
 VERGE_SPACING = 12.0
 VEIL_SPACING = 10.0
 VEILS = {
-    Role.REGION: (0.05, "region veil"),
-    Role.WEIGHTED_REGIONS: (0.08, "weighted veil"),
-    Role.FORBIDDEN_AREAS: (0.11, "forbidden veil"),
-    Role.MANDATORY_AREAS: (0.14, "mandatory veil"),
-    Role.CANDIDATE_AREAS: (0.05, "candidate veil"),
+    Role.REGION: (0.03, "region veil"),
+    Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
+    Role.FORBIDDEN_AREAS: (0.05, "forbidden veil"),
+    Role.MANDATORY_AREAS: (0.06, "mandatory veil"),
+    Role.CANDIDATE_AREAS: (0.03, "candidate veil"),
 }
 """Height above the ground (metres) and material of areas that are not there to be seen."""
 
