@@ -14,6 +14,7 @@ from ..core.results.deployment import Deployment, Sensor
 from ..core.site import Site, Targets
 from ..core.streetscape.model import VEILS
 from ..core.streetscape.street_furniture import Solid, join, prism, tube
+from ..core.target_squares import target_squares
 from . import contract
 from .materials import linear, material
 from .meshes import mesh_of
@@ -145,7 +146,8 @@ def _coverage_mesh(targets: Targets, seen_by: Integer) -> bpy.types.Mesh:
     material for each class its Material colours and renders.
     """
     mesh = bpy.data.meshes.new("Coverage")
-    mesh.from_pydata(_squares(targets).tolist(), [], np.arange(4 * len(targets)).reshape(-1, 4).tolist())
+    corners = target_squares(targets).reshape(-1, 3) + np.array((0.0, 0.0, LIFT))
+    mesh.from_pydata(corners.tolist(), [], np.arange(4 * len(targets)).reshape(-1, 4).tolist())
     classes = np.minimum(seen_by, SEEN_TWICE).astype(np.int32)
     mesh.attributes.new("seip_seen", "INT", "FACE").data.foreach_set("value", seen_by.astype(np.int32))
     palette = np.array([linear(colour) for colour in SEEN_COLOURS], dtype=np.float32)
@@ -156,17 +158,3 @@ def _coverage_mesh(targets: Targets, seen_by: Integer) -> bpy.types.Mesh:
         mesh.materials.append(material(words))
     mesh.polygons.foreach_set("material_index", classes)
     return mesh
-
-
-def _squares(targets: Targets) -> Float:
-    """Return the corners of a square round each target, (4 t, 3), draped over the slopes of the road.
-
-    A corner that several squares share has the mean height of their targets.
-    """
-    half = targets.spacing / 2.0
-    offsets = half * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    corners = (targets.xyz[:, None, :2] + offsets).reshape(-1, 2)
-    _, shared = np.unique(np.round(corners / half).astype(np.int64), axis=0, return_inverse=True)
-    shared = shared.ravel()
-    height = np.bincount(shared, np.repeat(targets.xyz[:, 2], 4)) / np.bincount(shared)
-    return np.column_stack((corners, height[shared] + LIFT))
