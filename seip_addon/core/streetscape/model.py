@@ -42,7 +42,8 @@ VERGE_BELOW = 0.03
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
 VERGE_SPACING = 12.0
-VEIL_SPACING = 10.0
+VEIL_SPACING = 4.0
+"""As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
 VEILS = {
     Role.REGION: (0.03, "region veil"),
     Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
