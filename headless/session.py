@@ -30,6 +30,8 @@ try:
     import pulp  # noqa: F401
     import shapely  # noqa: F401
     from tqdm import tqdm
+
+    from seip_addon.scene.blend_file import open_blend
 except ModuleNotFoundError as error:
     sys.exit(
         f"error: {sys.executable} has no package {error.name!r}: use .venv/bin/python, set up by `make environment`, "
@@ -56,22 +58,6 @@ def arguments(argv: Sequence[str] | None = None) -> list[str]:
     if not in_blender():
         return given[1:]
     return given[given.index("--") + 1 :] if "--" in given else []
-
-
-def open_blend(path: Path) -> None:
-    """Open a .blend, without running scripts that it may carry.
-
-    Raises
-    ------
-    SeipError
-        There is no such file or it is not a .blend.
-    """
-    if not path.is_file():
-        raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
-    except RuntimeError as error:
-        raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
 
 
 def open_scene(path: Path | None) -> None:

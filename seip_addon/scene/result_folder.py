@@ -16,7 +16,7 @@ from ..core.results.carla import save_carla_spawns
 from ..core.results.placement_record import Record, save_placement_record
 from ..core.scene_geometry import SceneGeometry
 from ..core.site import Site
-from .build import save_blend
+from .blend_file import save_blend
 from .render import save_rendered_view
 from .write import write_result
 

@@ -15,6 +15,7 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
 from ..arrays import Float
+from ..plan_geometry import closed, outline
 from ..target_squares import target_squares
 from .drawing import draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
@@ -132,21 +133,15 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
     pavement = shapely.intersection(geometry.candidate_areas, shown)
-    _draw_area(plan, _healed(pavement), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
+    _draw_area(plan, closed(pavement, CRACK), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
-    _draw_area(plan, _healed(roads), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+    _draw_area(plan, closed(roads, CRACK), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
 
 
 def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
     """Return what a mesh covers in plan, near the part that is shown."""
-    flat = shapely.polygons(mesh.triangles[:, :, :2])
-    flat = flat[(shapely.area(flat) > FLAT) & shapely.intersects(flat, shown)]
-    return shapely.union_all(flat, grid_size=1e-3)
-
-
-def _healed(area: BaseGeometry) -> BaseGeometry:
-    """Close the cracks between surfaces that were modelled one by one."""
-    return area.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre")
+    near = shapely.intersects(shapely.polygons(mesh.triangles[:, :, :2]), shown)
+    return outline(mesh.triangles[near])
 
 
 def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
@@ -174,8 +169,7 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
         ),
         autolim=False,
     )
-    outline = shapely.union_all(flat, grid_size=1e-3)
-    _draw_area(plan, outline, facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    _draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
     return norm
 
 
@@ -188,7 +182,7 @@ def _road_level(site: Site, points: Float) -> Float:
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
-    _draw_area(plan, _healed(region), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    _draw_area(plan, closed(region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
         (geometry.forbidden_areas, FORBIDDEN, "////"),
         (geometry.mandatory_areas, MANDATORY, "...."),
