@@ -97,6 +97,14 @@ class Plan:
     greedy: Placement | None
     deployment: Deployment
 
+    @property
+    def certificate(self) -> str:
+        """How good the placement provably is, as a sentence."""
+        best = "cheapest" if self.goal.cheapest else "best"
+        if self.placement.status == "optimal":
+            return f"Proven: the {best} placement that there is among these candidates."
+        return f"Within {self.placement.gap:.2%} of the {best} placement possible among these candidates."
+
 
 def target_weights(site: Site, goal: Goal) -> NDArray[np.float64]:
     """Weight of each target under a goal, (t,) float64."""

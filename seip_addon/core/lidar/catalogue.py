@@ -129,8 +129,8 @@ def _require_keys(table: Mapping[str, Any], where: str) -> None:
 def _uniform(table: Mapping[str, Any], where: str) -> Float:
     low, high = _numbers(table, "field_of_view_deg", where, 2)
     channels = table["channels"]
-    if not isinstance(channels, int) or isinstance(channels, bool) or channels < 2:
-        raise SeipError(f"{where}: channels must be a whole number of at least 2, not {channels!r}")
+    if not isinstance(channels, int) or isinstance(channels, bool) or not 2 <= channels <= 10_000:
+        raise SeipError(f"{where}: channels must be a whole number from 2 to 10,000, not {channels!r}")
     if not low < high:
         raise SeipError(f"{where}: field_of_view_deg must be increasing, lower edge first, not {[low, high]}")
     elevations: Float = np.linspace(high, low, channels)
@@ -153,4 +153,5 @@ def _number(table: Mapping[str, Any], entry: str, where: str) -> float:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    # Whole numbers of any length are valid TOML, but no measure of anything beyond this.
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and not abs(value) > 1e300

@@ -90,6 +90,10 @@ class LidarModel:
         return sum(self.price_range) / 2
 
 
+MOST_RAYS = 50_000_000
+"""Rays of a revolution beyond which a figure must be a slip: fifty times the study's finest type."""
+
+
 def _require_valid(model: LidarModel) -> None:
     right_angle = math.pi / 2
     low, high = model.price_range
@@ -98,9 +102,12 @@ def _require_valid(model: LidarModel) -> None:
         "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
         "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
         "azimuth offsets must be finite": bool(np.isfinite(model.azimuth_offsets).all()),
-        "its range must be increasing, from 0 m or more, and finite": 0 <= model.min_range < model.max_range < math.inf,
-        "points per second must be positive and finite": 0 < model.points_per_second < math.inf,
-        "the rotation rate must be positive and finite": 0 < model.rotation_rate < math.inf,
+        "its range must be increasing, from 0 m or more to at most 10 km": 0 <= model.min_range < model.max_range <= 1e4,
+        "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
+        "the rotation rate must lie between 0.01 and 1000 Hz": 0.01 <= model.rotation_rate <= 1000,
+        f"a revolution must have at most {MOST_RAYS:,} rays": (
+            model.points_per_second <= MOST_RAYS * model.rotation_rate and model.channels <= MOST_RAYS
+        ),
         "its price range must be positive, finite and not decreasing": 0 < low <= high < math.inf,
         "the range noise must be 0 m or more and finite": 0 <= model.range_noise_std < math.inf,
         "attenuation must be 0 or more and finite": 0 <= model.attenuation < math.inf,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 from .plan_style import FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.colors import Normalize
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from ..site import Site
 
 LEGEND_WIDTH = 3.7  # inches
-ROW, LINE = 0.42, 0.24  # inches that a sensor and a line of text take
+ROW, LINE, SMALL_LINE = 0.42, 0.24, 0.15  # inches that a sensor, a line and a line of small text take
+LETTERS = 62  # of small text that fit into a line
 
 
 class PlanLegend:
@@ -43,7 +45,14 @@ class PlanLegend:
         axes.set(xlim=(0.0, LEGEND_WIDTH), ylim=(height, 0.0))
         axes.axis("off")
 
-    def draw(self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize) -> None:
+    def draw(
+        self,
+        geometry: SceneGeometry,
+        site: Site,
+        deployment: Deployment,
+        heights: Normalize,
+        notes: Sequence[str],
+    ) -> None:
         """Write all parts, with as many sensors as there is room for.
 
         Parameters
@@ -53,13 +62,19 @@ class PlanLegend:
         deployment : Deployment
         heights : Normalize
             Scale of the obstacles' colours, metres above the road.
+        notes : sequence of str
+            Sentences below everything else.
         """
         weights = sorted({area.weight for area in geometry.weighted_regions})
+        lines = [line for note in notes for line in wrap(note, LETTERS)]
         below = 3.72 + LINE * (3 + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas))
+        below += 0.5 + SMALL_LINE * len(lines) if lines else 0.0
         self._sensors(deployment, self.height - below)
         self._targets(site, deployment)
         self._map(geometry, site, weights)
         self._heights(heights)
+        if lines:
+            self._notes(lines)
 
     def _sensors(self, deployment: Deployment, room: float) -> None:
         """List the sensors, without their positions where room is short, and as many as fit."""
@@ -100,7 +115,7 @@ class PlanLegend:
             names = [area.name for area in geometry.weighted_regions if area.weight == weight]
             words = _short(names[0], 26) if len(names) == 1 else f"{len(names)} areas"
             self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
-            self._line(f"{words} (weight {weight:g})")
+            self._line(f"{words} (weight {weight:g} where weights count)")
         for areas, colour, hatch, words in (
             (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
             (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
@@ -130,6 +145,13 @@ class PlanLegend:
         for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
             unit = " m" if share == 1.0 else ""
             self._text(2.2 * share, f"{highest * share:g}{unit}", ha=align, size=8)
+
+    def _notes(self, lines: Iterable[str]) -> None:
+        self.y += 0.34
+        self._heading("Notes")
+        for line in lines:
+            self._text(0.0, line, size=7.5, color=SOFT_INK)
+            self.y += SMALL_LINE
 
     def _heading(self, words: str) -> None:
         self._text(0.0, words, weight="bold", size=11, y=self.y + 0.04)

@@ -24,7 +24,7 @@ from .plan_style import FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK,
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from matplotlib.axes import Axes
     from shapely.geometry.base import BaseGeometry
@@ -46,7 +46,13 @@ FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
-def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment) -> None:
+def save_plan_view(
+    path: str | os.PathLike[str],
+    geometry: SceneGeometry,
+    site: Site,
+    deployment: Deployment,
+    notes: Sequence[str] = (),
+) -> None:
     """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
 
     The same arguments give the same bytes.
@@ -61,12 +67,14 @@ def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: 
         Targets and candidates made from it.
     deployment : Deployment
         The chosen sensors and what they see.
+    notes : sequence of str
+        What a reader of the plan should know, in sentences.
     """
-    figure = draw_plan(geometry, site, deployment)
+    figure = draw_plan(geometry, site, deployment, notes)
     save_png(path, figure)
 
 
-def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Figure:
+def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = ()) -> Figure:
     """Return the plan as a figure."""
     map_width, map_height = _map_size(site.region)
     window = _window(site.region, map_height / map_width)
@@ -88,7 +96,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     _draw_north(plan, inch)
     draw_title(figure, site, deployment, MARGIN)
     panel = _axes(figure, map_width + 2 * MARGIN, MARGIN, LEGEND_WIDTH, map_height)
-    PlanLegend(panel, map_height).draw(geometry, site, deployment, norm)
+    PlanLegend(panel, map_height).draw(geometry, site, deployment, norm, notes)
     return figure
 
 
