@@ -8,6 +8,7 @@ import bpy
 
 from ..core.errors import SeipError
 from ..core.storage import whole_file
+from .interrupts import held_interrupts
 
 CLIP_START, CLIP_END = 0.5, 5000.0
 """Metres before the eye between which a 3D view shows things: a site, without flicker of what lies close together."""
@@ -53,7 +54,21 @@ def save_blend(path: Path) -> None:
     _set_up_views()
     with whole_file(path) as temporary:
         temporary.unlink()  # Blender would keep a backup of a file that is there
-        bpy.ops.wm.save_as_mainfile(filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False)
+        with held_interrupts():
+            bpy.ops.wm.save_as_mainfile(
+                filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False
+            )
+        if not _is_whole(temporary):
+            raise SeipError(f"cannot write {path} to its end; make room there or choose another folder")
+
+
+def _is_whole(path: Path) -> bool:
+    """Return whether a .blend can be read: a full disk cuts one short without a word from Blender."""
+    try:
+        with bpy.data.libraries.load(str(path.resolve())) as (there, _):
+            return len(there.scenes) > 0
+    except OSError:
+        return False
 
 
 def _set_up_views() -> None:

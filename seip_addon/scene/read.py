@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -75,6 +76,7 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
         none, has a coordinate that is no number, or has no area at all.
     """
     members = contract.members(scene)
+    _require_libraries(scene, members)
     parts = list(_shown(scene, members))
     region = outline(joined(_meshes(parts, contract.REGION)))
     if region.is_empty:
@@ -108,6 +110,21 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
         poles=_poles(parts),
     )
     return SceneReading(geometry, _hidden(scene, members))
+
+
+def _require_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> None:
+    """Refuse a scene that lacks a library: Blender shows nothing, or placeholders, in its place."""
+    objects = set().union(*members.values())
+    instanced = {item.instance_collection for item in objects if item.instance_collection is not None}
+    objects.update(*(collection.all_objects for collection in instanced))
+    data = {item.data for item in objects if item.data is not None}
+    for thing in (*scene.collection.children_recursive, *instanced, *objects, *data):
+        library = thing.library
+        if library is not None and not Path(bpy.path.abspath(library.filepath)).is_file():
+            raise SeipError(
+                f"{thing.name!r} is linked from {library.filepath}, which is not there: "
+                "bring the file back, relocate the library, or delete what is linked from it"
+            )
 
 
 def _shown(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[_Shown]:

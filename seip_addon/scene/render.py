@@ -21,6 +21,7 @@ from ..core.results.deployment import Deployment
 from ..core.site import Site
 from . import contract
 from .daylight import add_daylight
+from .interrupts import held_interrupts
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES = 12
@@ -56,7 +57,7 @@ def save_rendered_view(
         viewpoint = _add_camera(stage, site)
         add_daylight(stage, stage.collection)
         _set_up(stage, raw)
-        with _silence():
+        with _silence(), held_interrupts():
             bpy.ops.render.render(scene=stage.name, write_still=True)
         sight = _sight(stage, viewpoint, site, deployment)
         save_labelled_view(path, raw, site, deployment, sight)

@@ -289,3 +289,19 @@ def test_each_fault_has_its_sentence(scene, spoil, sentence):
     spoil(scene)
     with pytest.raises(SeipError, match=sentence):
         read_scene(scene)
+
+
+def test_a_missing_library_is_named(scene, tmp_path):
+    library = tmp_path / "library.blend"
+    sheet(scene, "linked wall", (contract.OCCLUDERS,), 1, 1, (0, 30, 0))
+    bpy.data.libraries.write(str(library), {contract.find(scene, contract.OCCLUDERS)}, fake_user=True)
+    bpy.data.objects.remove(bpy.data.objects["linked wall"])
+    bpy.data.collections.remove(contract.find(scene, contract.OCCLUDERS))
+    with bpy.data.libraries.load(str(library), link=True) as (_source, target):
+        target.collections = [contract.OCCLUDERS]
+    scene.collection.children.link(target.collections[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    library.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
+    with pytest.raises(SeipError, match=r"is linked from .*library\.blend, which is not there"):
+        read_scene(bpy.context.scene)

@@ -102,7 +102,7 @@ def _require_valid(model: LidarModel) -> None:
         "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
         "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
         "azimuth offsets must be finite": bool(np.isfinite(model.azimuth_offsets).all()),
-        "its range must be increasing, from 0 m or more to at most 10 km": 0 <= model.min_range < model.max_range <= 1e4,
+        "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
         "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
         "the rotation rate must lie between 0.01 and 1000 Hz": 0.01 <= model.rotation_rate <= 1000,
         f"a revolution must have at most {MOST_RAYS:,} rays": (
