@@ -53,14 +53,14 @@ class CandidateSettings:
         if not self.heights:
             raise SeipError("no mounting height is given: name at least one, in metres")
         for height in self.heights:
-            if not (np.isfinite(height) and height > 0):
-                raise SeipError(f"a mounting height must be a positive number of metres, not {height}")
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise SeipError(f"the candidate spacing must be a positive number of metres, not {self.spacing}")
+            if not 0 < height <= 100:
+                raise SeipError(f"a mounting height must be a positive number of metres up to 100, not {height}")
+        if not 0.1 <= self.spacing <= 1000:
+            raise SeipError(f"the candidate spacing must be 0.1 to 1000 m, not {self.spacing}")
         for name in ("setback", "clearance", "bracket"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise SeipError(f"the {name} must be zero or a positive number of metres, not {value}")
+            if not 0 <= value <= 100:
+                raise SeipError(f"the {name} must be 0 to 100 m, not {value}")
 
 
 @dataclass(frozen=True, eq=False)

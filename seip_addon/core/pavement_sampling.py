@@ -7,9 +7,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from .arrays import Float
+from .errors import SeipError
 
 _FINE_STEPS = 8
 """Fine grid steps per candidate spacing: a strip wider than an eighth of it gets candidates."""
+
+MOST_POINTS = 20_000
+"""More positions than these are a slip of the keyboard: each is cast from at every height with every type."""
 
 
 def spread(area: BaseGeometry, spacing: float) -> Float:
@@ -28,9 +32,19 @@ def spread(area: BaseGeometry, spacing: float) -> Float:
     Returns
     -------
     (n, 2) float64, metres
+
+    Raises
+    ------
+    SeipError
+        The spacing is far too small for the area.
     """
     if area.is_empty:
         return np.empty((0, 2))
+    if area.area / spacing**2 > MOST_POINTS:
+        raise SeipError(
+            f"a candidate spacing of {spacing:g} m would lay about {area.area / spacing**2:,.0f} positions on "
+            f"{area.area:,.0f} m²; choose a wider one (at most {MOST_POINTS:,} positions)"
+        )
     step = spacing / _FINE_STEPS
     low_x, low_y, high_x, high_y = area.bounds
     axes = (np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))

@@ -18,6 +18,9 @@ from .scene_geometry import NamedArea
 MAX_TARGETS = 2_000_000
 """A grid beyond this is a slip of the keyboard, not a plan."""
 
+FINEST, WIDEST = 0.01, 1000.0
+"""Metres between which a spacing makes sense."""
+
 
 @dataclass(frozen=True, eq=False)
 class Targets:
@@ -76,8 +79,8 @@ def lay_targets(
         The spacing is not positive or far too small, the region is empty, or
         no grid point lies on the road inside it.
     """
-    if not (np.isfinite(spacing) and spacing > 0):
-        raise SeipError(f"the grid spacing must be a positive number of metres, not {spacing}")
+    if not FINEST <= spacing <= WIDEST:
+        raise SeipError(f"the grid spacing must be {FINEST:g} to {WIDEST:g} m, not {spacing}")
     if region.is_empty:
         raise SeipError("the region of interest is empty: put a mesh over the road into SEIP Region")
     plan = _grid(region, spacing)
@@ -103,7 +106,8 @@ def lay_targets(
 
 def _grid(region: BaseGeometry, spacing: float) -> Float:
     low_x, low_y, high_x, high_y = region.bounds
-    counts = [int(np.floor(side / spacing)) + 1 for side in (high_x - low_x, high_y - low_y)]
+    sides = (high_x - low_x, high_y - low_y)
+    counts = [max(1, int(np.floor(side / spacing + 1e-6))) for side in sides]  # whole cells, targets in their middles
     if counts[0] * counts[1] > 50 * MAX_TARGETS or region.area / spacing**2 > MAX_TARGETS:
         raise SeipError(
             f"a grid of {spacing:g} m would lay about {region.area / spacing**2:.3g} targets in the region; "
