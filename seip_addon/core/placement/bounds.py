@@ -25,7 +25,7 @@ import numpy as np
 from ..arrays import Float, Integer
 from ..progress import Progress
 from .clock import Clock
-from .instance import SLACK, Instance
+from .instance import Instance
 
 ITERATIONS = 1000
 PATIENCE = 20
@@ -109,7 +109,7 @@ def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool
     if exact:
         score = np.concatenate([block @ targets for block in np.array_split(instance.visible, 16)])
     else:
-        score = (instance.matrix @ targets.astype(np.float32)).astype(np.float64)
+        score = instance.gains(targets)
     selection = select(instance, score + groups @ instance.mandatory)
     value = math.fsum(instance.weight - targets) - math.fsum(groups) + selection.value
     return Bound(value, targets, groups, selection)
@@ -148,10 +148,9 @@ def lagrangian_bound(
     step, stale = 1.0, 0
     current = best
     for iteration in range(ITERATIONS):
-        if best.value < goal - SLACK or step < SMALLEST_STEP or clock.left <= 0:
+        if best.value < goal - instance.slack or step < SMALLEST_STEP or clock.left <= 0:
             break
-        if iteration % 20 == 0:
-            yield Progress(iteration, ITERATIONS, "bounding what any placement can cover")
+        yield Progress(iteration, ITERATIONS, "bounding what any placement can cover")
         picked = current.selection.picked
         seen = instance.matrix[picked].sum(axis=0)
         slope = np.where(targets < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
@@ -207,7 +206,7 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     in_clique[:] = net[picked].min() if len(picked) == instance.count else 0.0
     in_clique[instance.clique[picked]] = net[picked]
     forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
-    return np.flatnonzero(forced >= goal - SLACK)
+    return np.flatnonzero(forced >= goal - instance.slack)
 
 
 def _select(instance: Instance, score: Float, multiplier: float) -> Selection:
