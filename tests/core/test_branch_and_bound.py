@@ -5,12 +5,14 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from placement_oracle import small_problems
 from street_visibility import street_problem
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.placement import branch_and_bound
 from seip_addon.core.placement.branch_and_bound import best_placements, first_in_order, merit
 from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
@@ -39,7 +41,16 @@ def search(instance, goal, most=10_000, seconds=math.inf):
     return finish(best_placements(instance, goal, most, instance.total, forever(), seconds))
 
 
-@settings(max_examples=300, deadline=None)
+@pytest.fixture(scope="module", params=[1, 10**9], ids=["relaxed", "not relaxed"], autouse=True)
+def _relax(request):
+    """Small problems have few children; relax their nodes none the less, and not at all."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(branch_and_bound, "WIDE", request.param)
+        patch.setattr(branch_and_bound, "RELAXED", 2)
+        yield
+
+
+@settings(max_examples=200, deadline=None)
 @given(small_problems(), st.floats(0.0, 1.0))
 def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     instance = reduced(problem)

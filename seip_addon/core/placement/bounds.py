@@ -116,7 +116,7 @@ def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool
 
 
 def lagrangian_bound(
-    instance: Instance, goal: float, clock: Clock, start: Bound | None = None
+    instance: Instance, goal: float, clock: Clock, start: Float | None = None, iterations: int = ITERATIONS
 ) -> Generator[Progress, None, Bound]:
     """Search for multipliers with a small bound by deflected subgradients.
 
@@ -127,8 +127,10 @@ def lagrangian_bound(
         Covered weight to reach; the search ends when the bound falls below.
     clock : Clock
         Ends the search when the time is up.
-    start : Bound, optional
-        Multipliers to begin from.
+    start : (t,) float64, optional
+        Multipliers of the targets to begin from.
+    iterations : int
+        At most so many steps.
 
     Yields
     ------
@@ -139,18 +141,18 @@ def lagrangian_bound(
     Bound
         The best one found, evaluated in double precision.
     """
-    targets = start.targets if start else instance.weight / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5
-    groups = start.groups if start else np.zeros(len(instance.mandatory))
+    targets = instance.weight / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5 if start is None else start
+    groups = np.zeros(len(instance.mandatory))
     # group multipliers live on the scale of scores, those of targets on that of weights
     stretch = instance.visible.sum() / len(instance) if len(groups) else 1.0
     best = bound_from(instance, targets, groups, exact=False)
     direction, group_direction = np.zeros(len(targets)), np.zeros(len(groups))
     step, stale = 1.0, 0
     current = best
-    for iteration in range(ITERATIONS):
+    for iteration in range(iterations):
         if best.value < goal - instance.slack or step < SMALLEST_STEP or clock.left <= 0:
             break
-        yield Progress(iteration, ITERATIONS, "bounding what any placement can cover")
+        yield Progress(iteration, iterations, "bounding what any placement can cover")
         picked = current.selection.picked
         seen = instance.matrix[picked].sum(axis=0)
         slope = np.where(targets < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))

@@ -18,14 +18,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
+from .bounds import can_reach, lagrangian_bound
 from .clock import Clock
 from .instance import Instance, Numbers
+from .problem import TIE
+
+RELAXED = 3
+"""With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""
+
+WIDE = 60
+"""... where at least so many children are left."""
+
+FIRST_STEPS, LATER_STEPS = 300, 100
+"""Steps that the multipliers of the first node may take, and of each later one from its parent's."""
 
 LARGEST = 30_000_000
 """Entries of V up to which the search keeps V as numbers: 120 MB, or twice that where weights are uneven."""
@@ -68,6 +79,8 @@ class _Node:
     followers : (n,) int64
     gains : (n,) float
         What each follower would add.
+    multipliers : (t,) float64, optional
+        Lagrangian multipliers of the targets to begin from.
     """
 
     chosen: tuple[int, ...]
@@ -75,6 +88,7 @@ class _Node:
     goal: float
     followers: Integer
     gains: Numbers
+    multipliers: Float | None
 
 
 def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
@@ -82,7 +96,7 @@ def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
     return instance.count <= MOST_SENSORS and len(candidates) * len(instance.weight) <= LARGEST
 
 
-def best_placements(  # noqa: PLR0913 -- what to look for, and for how long
+def best_placements(
     instance: Instance, goal: float, most: int, bound: float, clock: Clock, seconds: float
 ) -> Generator[Progress, None, Found]:
     """List the placements of largest coverage among those that cover at least ``goal``.
@@ -167,11 +181,14 @@ class _Search:
         self.weight = instance.weight.astype(self.matrix.dtype)
         self.goal = instance.attainable(goal) - instance.slack
         self.satisfied = False
+        self._clock = Clock(math.inf)
 
     def run(self, clock: Clock, seconds: float) -> Generator[Progress, None, bool]:
         """Search depth first; return whether all was seen, or enough, before the time was up."""
         end = clock.elapsed + min(seconds, clock.left)
-        stack = [self._node((), 0.0, np.arange(len(self.instance)), self.matrix @ self.weight)]
+        self._clock = clock
+        everyone = np.arange(len(self.instance))
+        stack = [_sorted_node((), 0.0, -math.inf, everyone, self.matrix @ self.weight, None)]
         nodes = 0
         while stack and not self.satisfied:
             if clock.elapsed > end:
@@ -179,7 +196,7 @@ class _Search:
             if nodes % 16 == 0:
                 yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
             nodes += 1
-            stack += reversed(self._expand(stack.pop()))
+            stack += reversed((yield from self._expand(stack.pop())))
         return True
 
     def _take(self, chosen: tuple[int, ...], value: float) -> float:
@@ -190,55 +207,107 @@ class _Search:
         """Whether nothing below is wanted for another reason than its coverage."""
         raise NotImplementedError
 
-    def _expand(self, node: _Node) -> list[_Node]:
+    def _expand(self, node: _Node) -> Generator[Progress, None, list[_Node]]:
         """Return the children of a node that can still reach the goal; take those that do."""
         goal = max(node.goal, self.goal)
         left = self.instance.count - len(node.chosen)
-        sums = np.concatenate(([0.0], np.cumsum(node.gains, dtype=np.float64), np.full(left, np.sum(node.gains))))
-        reach = node.value + sums[left : left + len(node.gains)] - sums[: len(node.gains)]
-        children = int(np.count_nonzero(reach >= goal))
+        node, children = _within_reach(node, left, goal)
         if children == 0 or self._is_hopeless(node.chosen, node.followers):
             return []
         if left == 1:
-            for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
-                if node.value + gain >= max(node.goal, self.goal):
-                    self._take((*node.chosen, candidate), node.value + gain)
+            self._take_leaves(node, children)
             return []
-        # A follower matters only where it reaches the goal together with the largest gains.
-        useful = int(np.count_nonzero(node.value + sums[left - 1] + node.gains >= goal))
-        followers, gains = node.followers[:useful], node.gains[:useful]
-        later, gains_after = self._after_each(node, followers, gains, children)
+        rest = self._rest(node, left)
+        if left >= RELAXED and children >= WIDE:
+            node, children = yield from self._relaxed(node, rest, left, goal)
+            if children == 0:
+                return []
+            rest = self._rest(node, left)
+        later, gains_after = _after_each(rest, node.gains, children)
         best = _largest(np.where(later, gains_after, 0.0), left - 1).sum(axis=1, dtype=np.float64)
-        values = node.value + gains[:children].astype(np.float64)
+        values = node.value + node.gains[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
-            chosen, value = (*node.chosen, int(followers[row])), float(values[row])
-            goal = max(node.goal, self.goal)
-            if value >= goal:
-                goal = self._take(chosen, value)
-            if value + best[row] >= goal:
-                kept.append(self._node(chosen, value, followers[later[row]], gains_after[row, later[row]], goal))
+            chosen, value = (*node.chosen, int(node.followers[row])), float(values[row])
+            wanted = max(node.goal, self.goal)
+            if value >= wanted:
+                wanted = self._take(chosen, value)
+            if value + best[row] >= wanted:
+                after = later[row]
+                kept.append(
+                    _sorted_node(
+                        chosen, value, wanted, node.followers[after], gains_after[row, after], node.multipliers
+                    )
+                )
         return kept
 
-    def _after_each(self, node: _Node, followers: Integer, gains: Numbers, children: int) -> tuple[Boolean, Numbers]:
-        """Return who may follow each child, and the gains of all followers on top of it, (children, n) each."""
-        rest = self.weight * ~self.instance.visible[list(node.chosen)].any(axis=0)
-        unseen = np.flatnonzero(rest)
-        matrix = self.matrix[np.ix_(followers, unseen)]
-        overlap = (matrix[:children] * rest[unseen]) @ matrix.T
-        later: Boolean = np.arange(len(followers)) > np.arange(children)[:, None]
-        later &= ~self.instance.conflict[np.ix_(followers[:children], followers)]
-        if np.isfinite(self.instance.budget):
-            spent = self.instance.price[list(node.chosen)].sum()
-            price = self.instance.price[followers]
-            later &= self.instance.affordable(spent + price[:children, None] + price)
-        return later, np.maximum(gains - overlap, 0.0)
+    def _take_leaves(self, node: _Node, children: int) -> None:
+        for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
+            if node.value + gain >= max(node.goal, self.goal):
+                self._take((*node.chosen, candidate), node.value + gain)
 
-    def _node(
-        self, chosen: tuple[int, ...], value: float, followers: Integer, gains: Numbers, goal: float = -math.inf
-    ) -> _Node:
-        order = np.argsort(-gains, kind="stable")
-        return _Node(chosen, value, goal, followers[order], gains[order])
+    def _rest(self, node: _Node, left: int) -> Instance:
+        """Return what is left to decide at a node: its followers, the targets that are not seen yet."""
+        instance, followers = self.instance, node.followers
+        unseen = np.flatnonzero(~instance.visible[list(node.chosen)].any(axis=0))
+        spent = math.fsum(instance.price[list(node.chosen)])
+        return replace(
+            instance,
+            visible=instance.visible[np.ix_(followers, unseen)],
+            weight=instance.weight[unseen],
+            price=instance.price[followers],
+            conflict=instance.conflict[np.ix_(followers, followers)],
+            clique=instance.clique[followers],
+            mandatory=np.zeros((0, len(followers)), bool),
+            original=unseen,
+            count=left,
+            budget=max(instance.budget * (1 + TIE) - spent, 0.0),
+        )
+
+    def _relaxed(
+        self, node: _Node, rest: Instance, left: int, goal: float
+    ) -> Generator[Progress, None, tuple[_Node, int]]:
+        """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
+        start = None if node.multipliers is None else node.multipliers[rest.original]
+        steps = FIRST_STEPS if start is None else LATER_STEPS
+        bound = yield from lagrangian_bound(rest, goal - node.value, self._clock, start, steps)
+        keep = can_reach(rest, bound, goal - node.value)
+        multipliers = np.zeros(len(self.weight))
+        multipliers[rest.original] = bound.targets
+        node = replace(node, followers=node.followers[keep], gains=node.gains[keep], multipliers=multipliers)
+        return _within_reach(node, left, goal)
+
+
+def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:
+    """Drop the followers whose gains are too small, and return how many can come next."""
+    sums = np.concatenate(([0.0], np.cumsum(node.gains, dtype=np.float64), np.full(left, np.sum(node.gains))))
+    reach = node.value + sums[left : left + len(node.gains)] - sums[: len(node.gains)]
+    # A follower matters only where it reaches the goal together with the largest gains.
+    useful = int(np.count_nonzero(node.value + sums[left - 1] + node.gains >= goal))
+    node = replace(node, followers=node.followers[:useful], gains=node.gains[:useful])
+    return node, int(np.count_nonzero(reach >= goal))
+
+
+def _after_each(rest: Instance, gains: Numbers, children: int) -> tuple[Boolean, Numbers]:
+    """Return who may follow each child, and the gains of all followers on top of it, (children, n) each."""
+    matrix = rest.matrix
+    overlap = (matrix[:children] * rest.weight.astype(matrix.dtype)) @ matrix.T
+    later: Boolean = np.arange(len(gains)) > np.arange(children)[:, None]
+    later &= ~rest.conflict[:children]
+    later &= rest.price[:children, None] + rest.price <= rest.budget
+    return later, np.maximum(gains - overlap, 0.0)
+
+
+def _sorted_node(
+    chosen: tuple[int, ...],
+    value: float,
+    goal: float,
+    followers: Integer,
+    gains: Numbers,
+    multipliers: Float | None,
+) -> _Node:
+    order = np.argsort(-gains, kind="stable")
+    return _Node(chosen, value, goal, followers[order], gains[order], multipliers)
 
 
 class _BestPlacements(_Search):

@@ -45,6 +45,9 @@ class Instance:
     price : (c,) float64
     conflict : (c, c) bool
         Pairs that exclude each other: same position, or too close. The diagonal is false.
+    clique : (c,) int64
+        A partition of the candidates into sets of which one at most can be
+        chosen. Without a minimum distance these are the positions.
     mandatory : (g, c) bool
     original : (c,) int64
         Index of each candidate in the problem.
@@ -60,6 +63,7 @@ class Instance:
     slack: float
     price: Float
     conflict: Boolean
+    clique: Integer
     mandatory: Boolean
     original: Integer
     count: int
@@ -78,24 +82,6 @@ class Instance:
     def total(self) -> float:
         """Weight that all candidates together cover."""
         return float(self.weight.sum())
-
-    @cached_property
-    def clique(self) -> Integer:
-        """A partition of the candidates into sets of which one at most can be chosen, (c,) int64.
-
-        Without a minimum distance these are the positions.
-        """
-        clique = np.full(len(self), -1)
-        for first in range(len(self)):
-            if clique[first] < 0:
-                members = [first]
-                common = self.conflict[first] & (clique < 0)
-                while common.any():
-                    members.append(int(np.argmax(common)))
-                    common &= self.conflict[members[-1]]
-                clique[members] = first
-        numbered: Integer = np.unique(clique, return_inverse=True)[1]
-        return numbered
 
     def attainable(self, goal: float) -> float:
         """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
@@ -147,6 +133,7 @@ class Instance:
             weight=weight,
             price=self.price[keep],
             conflict=self.conflict[np.ix_(keep, keep)],
+            clique=self.clique[keep],
             mandatory=self.mandatory[:, keep],
             original=self.original[keep],
         )
@@ -171,13 +158,15 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
     slack = TIE * float(weight.sum())
     places = len(np.unique(problem.positions[order]))
+    conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
         visible=visible,
         weight=weight,
         step=1.0 if whole else 2 * slack,
         slack=slack,
         price=problem.prices[order],
-        conflict=_conflicts(problem.positions[order], problem.xyz[order], problem.min_distance),
+        conflict=conflict,
+        clique=_cliques(conflict),
         mandatory=problem.mandatory_groups[:, order],
         original=order,
         count=places if problem.count is None else problem.count,
@@ -227,7 +216,7 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
     packed = np.ascontiguousarray(np.packbits(visible, axis=0).T)
     keys = packed.view(np.dtype((np.void, packed.shape[1])))[:, 0]
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
-    return visible[:, first], np.bincount(group, weight)
+    return visible[:, first], np.bincount(group, weight).astype(np.float64)
 
 
 def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
@@ -237,6 +226,21 @@ def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
             conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance
     np.fill_diagonal(conflict, val=False)
     return conflict
+
+
+def _cliques(conflict: Boolean) -> Integer:
+    """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
+    clique = np.full(len(conflict), -1)
+    for first in range(len(conflict)):
+        if clique[first] < 0:
+            members = [first]
+            common = conflict[first] & (clique < 0)
+            while common.any():
+                members.append(int(np.argmax(common)))
+                common &= conflict[members[-1]]
+            clique[members] = first
+    numbered: Integer = np.unique(clique, return_inverse=True)[1]
+    return numbered
 
 
 def _superfluous(instance: Instance, positions: Integer) -> Boolean:
