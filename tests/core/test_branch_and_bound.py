@@ -4,12 +4,13 @@ import math
 from dataclasses import replace
 from itertools import combinations
 
+from headless.street_visibility import street_problem
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from placement_oracle import small_problems
-from street_visibility import street_problem
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import branch_and_bound

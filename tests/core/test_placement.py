@@ -10,10 +10,11 @@ import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from headless.street_visibility import street_problem
+
 import numpy as np
 import pulp.apis.coin_api
 import pytest
-from street_visibility import street_problem
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import (

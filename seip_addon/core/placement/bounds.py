@@ -33,6 +33,9 @@ SHRINK = 0.7
 DEFLECTION = 0.85
 SMALLEST_STEP = 1e-3
 
+NEAR = (0.8, 0.95, 1.0, 1.05, 1.25)
+"""Factors by which the budget's multiplier may change in a step."""
+
 PRICES = 200
 """Multipliers of the price that are tried for a bound on it."""
 
@@ -81,14 +84,17 @@ class Bound:
     selection: Selection
 
 
-def select(instance: Instance, score: Float) -> Selection:
+def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
     """Choose the candidates of largest scores, one per clique, within the number and the budget.
 
-    The budget is relaxed; its multiplier minimises the bound, by bisection.
+    The budget is relaxed; its multiplier minimises the bound, by bisection,
+    or is the best of a few near the one given.
     """
     free = _select(instance, score, 0.0)
     if instance.affordable(float(instance.price[free.picked].sum())):
         return free
+    if near > 0:
+        return min((_select(instance, score, near * factor) for factor in NEAR), key=lambda choice: choice.value)
     priced = instance.price > 0
     low, high = 0.0, float((score[priced] / instance.price[priced]).max())
     best = _select(instance, score, high)
@@ -104,13 +110,16 @@ def select(instance: Instance, score: Float) -> Selection:
     return best
 
 
-def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool) -> Bound:
-    """Return the bound that some multipliers give, in double precision where ``exact``."""
+def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool, near: float = 0.0) -> Bound:
+    """Return the bound that some multipliers give, in double precision where ``exact``.
+
+    The budget's multiplier is sought near the one given, if any.
+    """
     if exact:
         score = np.concatenate([block @ targets for block in np.array_split(instance.visible, 16)])
     else:
         score = instance.gains(targets)
-    selection = select(instance, score + groups @ instance.mandatory)
+    selection = select(instance, score + groups @ instance.mandatory, near)
     value = math.fsum(instance.weight - targets) - math.fsum(groups) + selection.value
     return Bound(value, targets, groups, selection)
 
@@ -164,7 +173,7 @@ def lagrangian_bound(
         length = step * max(current.value - goal, 1e-6 * instance.total) / size
         targets = np.clip(targets - length * direction, 0.0, instance.weight)
         groups = np.maximum(groups - length * stretch * group_direction, 0.0)
-        current = bound_from(instance, targets, groups, exact=False)
+        current = bound_from(instance, targets, groups, exact=False, near=current.selection.multiplier)
         if current.value < best.value - 1e-7 * instance.total:
             best, stale = current, 0
         else:

@@ -193,8 +193,7 @@ class _Search:
         while stack and not self.satisfied:
             if clock.elapsed > end:
                 return False
-            if nodes % 16 == 0:
-                yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
+            yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
             nodes += 1
             stack += reversed((yield from self._expand(stack.pop())))
         return True
@@ -210,7 +209,9 @@ class _Search:
     def _expand(self, node: _Node) -> Generator[Progress, None, list[_Node]]:
         """Return the children of a node that can still reach the goal; take those that do."""
         goal = max(node.goal, self.goal)
-        left = self.instance.count - len(node.chosen)
+        left = self._left(node)
+        if left == 0:
+            return []
         node, children = _within_reach(node, left, goal)
         if children == 0 or self._is_hopeless(node.chosen, node.followers):
             return []
@@ -240,6 +241,15 @@ class _Search:
                     )
                 )
         return kept
+
+    def _left(self, node: _Node) -> int:
+        """Return how many sensors can follow at most."""
+        left = self.instance.count - len(node.chosen)
+        if not math.isfinite(self.instance.budget):
+            return left
+        prices = np.sort(self.instance.price[node.followers])[:left]
+        spent = math.fsum(self.instance.price[list(node.chosen)])
+        return int(np.count_nonzero(self.instance.affordable(spent + np.cumsum(prices))))
 
     def _take_leaves(self, node: _Node, children: int) -> None:
         for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):

@@ -26,6 +26,9 @@ KERNELS = ((6, 0.15), (12, 0.3))
 BRANCHING = 0.6
 """Share of the time for branch and bound, where that is worthwhile, before programs are tried."""
 
+BRANCHING_ALONE = 0.9
+"""The same where the whole program is too large for a solver."""
+
 LARGEST = 1_000_000
 """Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
 
@@ -182,7 +185,8 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     as_good = np.union1d(can_reach(instance, bound, instance.covered(chosen)), chosen)
     if is_worthwhile(instance, as_good):
         part, value, most = instance.part(as_good), instance.covered(chosen), min(bound.value, instance.total)
-        found = yield from best_placements(part, value, MANY, most, clock, BRANCHING * clock.left)
+        share = BRANCHING if np.count_nonzero(part.visible) <= LARGEST else BRANCHING_ALONE
+        found = yield from best_placements(part, value, MANY, most, clock, share * clock.left)
         equal = [as_good[choice] for choice in found.placements]
         chosen = max([chosen, *equal[:1]], key=instance.covered)
         if found.finished:

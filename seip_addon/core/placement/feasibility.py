@@ -45,10 +45,11 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
 def _why_infeasible(problem: PlacementProblem, part: Instance, solver: str) -> Generator[Progress, None, str]:
     groups = f"the mandatory places ({', '.join(problem.group_names)}) cannot all carry a sensor"
     unlimited = len(part)
+    asked = unlimited if problem.count is None else problem.count  # the part's own is what the budget buys
     fewest = yield from _least(problem, replace(part, count=unlimited), solver)
     if fewest is not None:
         return f"{groups} with {problem.count} sensors; ask for at least {len(fewest)} or lift a demand"
-    cheapest = yield from _least(problem, replace(part, budget=math.inf), solver, by_price=True)
+    cheapest = yield from _least(problem, replace(part, count=asked, budget=math.inf), solver, by_price=True)
     if cheapest is not None:
         price = math.fsum(part.price[cheapest])
         return f"{groups} within the budget of {problem.budget:g}; raise it to at least {price:g} or lift a demand"

@@ -169,10 +169,19 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         clique=_cliques(conflict),
         mandatory=problem.mandatory_groups[:, order],
         original=order,
-        count=places if problem.count is None else problem.count,
+        count=min(places if problem.count is None else problem.count, _affordable_number(problem, order)),
         budget=math.inf if problem.budget is None else float(problem.budget),
     )
     return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
+
+
+def _affordable_number(problem: PlacementProblem, order: Integer) -> int:
+    """Return how many sensors the budget buys at most, one at each position."""
+    if problem.budget is None:
+        return len(order)
+    cheapest = np.full(int(problem.positions.max()) + 1, math.inf)
+    np.minimum.at(cheapest, problem.positions[order], problem.prices[order])
+    return max(1, int(np.count_nonzero(np.cumsum(np.sort(cheapest)) <= problem.budget * (1 + TIE))))
 
 
 def common_unit(weights: Float) -> tuple[float, bool]:
