@@ -163,7 +163,7 @@ def lagrangian_bound(
             break
         yield Progress(iteration, iterations, "bounding what any placement can cover")
         picked = current.selection.picked
-        seen = instance.matrix[picked].sum(axis=0)
+        seen = instance.visible[picked].sum(axis=0)
         slope = np.where(targets < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
         direction = slope + DEFLECTION * direction
         group_direction = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0) + DEFLECTION * group_direction
