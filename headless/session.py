@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import signal
 import sys
+import tempfile
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
 from headless.system_libraries import complaint, missing_libraries
 
-from tqdm import tqdm
-
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +24,19 @@ if TYPE_CHECKING:
 
 try:
     import bpy
+    import defusedxml  # noqa: F401  # first of what the commands stand on, to be missed here rather than anywhere
+    import highspy  # noqa: F401
+    import matplotlib as mpl  # noqa: F401
+    import pulp  # noqa: F401
+    import shapely  # noqa: F401
+    from tqdm import tqdm
+
+    from seip_addon.scene.blend_file import open_blend
+except ModuleNotFoundError as error:
+    sys.exit(
+        f"error: {sys.executable} has no package {error.name!r}: use .venv/bin/python, set up by `make environment`, "
+        "or in Blender install the extension that `make extension` builds"
+    )
 except ImportError:
     missing = missing_libraries()
     if not missing:
@@ -47,22 +58,6 @@ def arguments(argv: Sequence[str] | None = None) -> list[str]:
     if not in_blender():
         return given[1:]
     return given[given.index("--") + 1 :] if "--" in given else []
-
-
-def open_blend(path: Path) -> None:
-    """Open a .blend, without running scripts that it may carry.
-
-    Raises
-    ------
-    SeipError
-        There is no such file or it is not a .blend.
-    """
-    if not path.is_file():
-        raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
-    except RuntimeError as error:
-        raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
 
 
 def open_scene(path: Path | None) -> None:
@@ -87,9 +82,22 @@ def check_folder(folder: Path) -> None:
     SeipError
         The folder cannot be made or written.
     """
-    with whole_file(folder / ".writable") as probe:
-        probe.touch()
-    (folder / ".writable").unlink()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Say of an interruption from here on that the folder is incomplete: each file in it is whole, but some lack."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(f"stopped while writing: the results in {folder} are incomplete") from stop
 
 
 def say(text: str) -> None:
@@ -99,7 +107,7 @@ def say(text: str) -> None:
 
 
 def run(main: Callable[[list[str]], None]) -> NoReturn:
-    """Run a command and end the process: 0, or 1 after a user's mistake, or 130 after Ctrl-C.
+    """Run a command and end the process: 0, 1 after a user's mistake, 130 after Ctrl-C, 143 when terminated.
 
     Parameters
     ----------
@@ -108,12 +116,14 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
         `SeipError` and `KeyboardInterrupt` are defects and show their traceback.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender leaves SIGINT to the system
+    for number in (signal.SIGTERM, signal.SIGHUP):  # end in good order: half-written files are removed on the way out
+        signal.signal(number, lambda which, _frame: sys.exit(128 + which))
     try:
         main(arguments())
     except SeipError as error:
         _end(1, f"error: {error}")
-    except KeyboardInterrupt:
-        _end(STOPPED, "stopped, nothing written")
+    except KeyboardInterrupt as stop:
+        _end(STOPPED, str(stop) or "stopped, no result written")
     _end(0)
 
 

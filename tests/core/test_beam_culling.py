@@ -1,4 +1,4 @@
-"""No ray that passes near a target is culled, and few that do not are kept."""
+"""No ray that can return from near a target is culled, and few that cannot are kept."""
 
 from __future__ import annotations
 
@@ -10,8 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.beam_culling import near_rays
-from seip_addon.core.lidar import LidarModel, beam_directions
+from seip_addon.core.lidar import LidarModel, beam_directions, load_catalogue
+from seip_addon.core.visibility.beam_culling import (
+    Beams,
+    NearRays,
+    Patches,
+    disc_patches,
+    near_rays,
+    target_patches,
+)
+from seip_addon.core.visibility.near_surfaces import near_surfaces
 
 
 def random_model(random: np.random.Generator) -> LidarModel:
@@ -31,37 +39,96 @@ def random_model(random: np.random.Generator) -> LidarModel:
     )
 
 
-def passing_distance(directions: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Least distance between each half-line and each target, (rays, targets)."""
-    along = np.maximum(directions @ offsets.T, 0.0)
-    return np.linalg.norm(directions[:, None] * along[:, :, None] - offsets[None], axis=2)
+def hits(origin: np.ndarray, directions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Where each ray meets each triangle, (rays, triangles, 3); NaN where it does not."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normal = np.cross(b - a, c - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = ((a - origin) * normal).sum(axis=1) / (directions @ normal.T)
+        point = origin + along[..., None] * directions[:, None]
+        inside = along > 0
+        for one, other in ((a, b), (b, c), (c, a)):
+            inside &= (np.cross(other - one, point - one) * normal).sum(axis=2) >= 0
+    return np.where(inside[..., None], point, np.nan)
+
+
+def rays_by_target(near: NearRays, model: LidarModel, targets: int) -> np.ndarray:
+    marked = np.zeros((targets, model.channels, model.azimuth_count), dtype=bool)
+    for target, channel, first, width in zip(near.target, near.channel, near.first, near.width, strict=True):
+        marked[target, channel, np.arange(first, first + width) % model.azimuth_count] = True
+    return marked.reshape(targets, -1)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 1.0, 4.0]))
-def test_the_rays_marked_are_those_that_pass_near(seed: int, delta: float) -> None:
+def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: float) -> None:
     random = np.random.default_rng(seed)
     model, yaw = random_model(random), random.uniform(-7, 7)
-    offsets = random.normal(0, 12, (20, 3))
-    offsets[0] = (0.0, 0.0, -6.0)  # straight below
-    offsets[1] *= 0.3 * delta / np.linalg.norm(offsets[1])  # δ about it holds the sensor
-    near = near_rays(model, yaw, offsets, delta)
-    distance = passing_distance(beam_directions(model, yaw).reshape(-1, 3), offsets)
-    for target in range(len(offsets)):
-        wanted = np.zeros(len(offsets), dtype=bool)
-        wanted[target] = True
-        marked = near.rays(wanted)
-        assert marked[distance[:, target] < delta].all()
-        if np.linalg.norm(offsets[target]) > delta:
-            assert not marked[distance[:, target] > delta * (1 + 1e-3)].any()
-    union = np.any([near.rays(np.arange(len(offsets)) == target) for target in range(len(offsets))], axis=0)
-    assert (near.rays(np.ones(len(offsets), dtype=bool)) == union).all()
-    assert union[near.likeliest_rays(within=np.inf)].all()
+    origin = random.normal(0, 2, 3)
+    level = random.random() < 0.5  # road-like, or a soup
+    triangles = random.uniform(-20, 20, (40, 1, 3)) + random.normal(0, 4, (40, 3, 3)) * (1, 1, 0.05 if level else 1)
+    inside = random.dirichlet([1, 1, 1], 30)
+    targets = (triangles[random.integers(0, 40, 30)] * inside[:, :, None]).sum(axis=1)
+    targets += random.normal(0, 0.3 * delta, (30, 3))
+    targets[0] = origin + random.normal(0, 0.3 * delta, 3)  # δ about it may hold the sensor
+    surfaces = near_surfaces(triangles, targets, delta)
+    beams = Beams.of([model], yaw)
+    coarse = near_rays(beams, target_patches(origin, surfaces))
+    patches, planes = disc_patches(origin, surfaces, np.ones(30, dtype=bool))
+    fine = near_rays(beams, patches, planes)
+
+    points = hits(origin, beam_directions(model, yaw).reshape(-1, 3), triangles)
+    distance = np.linalg.norm(points[None] - targets[:, None, None], axis=3)
+    returns = (distance < delta).any(axis=2)
+    for near in (coarse, fine):
+        assert rays_by_target(near, model, 30)[returns].all()
+    within_range = np.linalg.norm(targets - origin, axis=1) < 60 - delta
+    likeliest = near_rays(beams, target_patches(origin, surfaces)).likeliest(beams.sensor)
+    assert set(np.flatnonzero(returns.any(axis=1) & within_range)) <= set(likeliest.target.tolist())
+    assert len(np.unique(likeliest.target)) == len(likeliest.target)
 
 
-def test_targets_out_of_range_need_no_ray() -> None:
+def road(half: float) -> np.ndarray:
+    corners = np.array([[-half, -half, 0.0], [half, -half, 0], [half, half, 0], [-half, half, 0]])
+    return corners[[[0, 1, 2], [0, 2, 3]]]
+
+
+def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
+    random = np.random.default_rng(4)
+    targets = np.column_stack([random.uniform(-60, 60, (400, 2)), np.zeros(400)])
+    model = load_catalogue()["type3"]
+    origin = np.array([0.0, 0.0, 5.0])
+    surfaces = near_surfaces(road(80.0), targets, 1.0)
+    near = near_rays(Beams.of([model], 0.3), target_patches(origin, surfaces))
+    down = np.tan(model.elevations)[near.channel]
+    radius = -5.0 / down
+    ends = near.target[down < 0]
+    gap = np.abs(radius[down < 0] - np.hypot(*(targets[ends, :2] - origin[:2]).T))
+    assert (down < 0).all()
+    assert (gap < 1.03).all()
+
+
+def test_steep_surfaces_are_met_by_few_rays_more_than_needed() -> None:
+    """A wall beside the sensor's view: of all rays within its heights only those that end on its line are kept."""
+    wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]], [[10.0, -9, -1], [10, 9, 3], [10, -9, 3]]])
+    target = np.array([[10.0, 4.0, 0.0]])
+    model = replace(load_catalogue()["type3"], min_range=0.0)
+    origin = np.array([0.0, 0.0, 1.0])
+    surfaces = near_surfaces(wall, target, 1.0)
+    patches, planes = disc_patches(origin, surfaces, np.array([True]))
+    kept = rays_by_target(near_rays(Beams.of([model], 0.0), patches, planes), model, 1)[0]
+    points = hits(origin, beam_directions(model, 0.0).reshape(-1, 3), wall)
+    returns = (np.linalg.norm(points - target, axis=2) < 1.0).any(axis=1)
+    assert kept[returns].all()
+    assert kept.sum() < 1.6 * returns.sum()
+
+
+def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
     model = replace(random_model(np.random.default_rng(0)), min_range=0.5)
-    offsets = np.array([[61.5, 0.0, 0.0], [0.1, 0.0, 0.0]])
-    assert not near_rays(model, 0.0, offsets, 0.3).rays(np.array([True, True])).any()
+    patches = Patches(
+        *(np.array(values) for values in ([0, 1, 2], [0.0, 0, 0], [61.5, 0.1, 9], [0.3, 0.3, 0.3])),
+        *(np.array(values) for values in ([-0.1, -0.1, np.inf], [0.1, 0.1, -np.inf])),
+    )
+    assert len(near_rays(Beams.of([model], 0.0), patches)) == 0
 
 
 def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
@@ -78,7 +145,30 @@ def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
         price_range=(1.0, 2.0),
     )
     radius = 4 / math.tan(math.radians(20))
-    offsets = np.array([[0.0, radius, -4.0], [30.0, 0.0, -4.0]])
-    near = near_rays(model, 0.0, offsets, 1.0)
-    assert near.likeliest_rays(within=1.0).tolist() == [360 + 90]
-    assert near.miss.min() == pytest.approx(0, abs=1e-9)
+    targets = np.array([[0.0, radius, 0.0], [30.0, 0.0, 0.0]])
+    beams = Beams.of([model], 0.0)
+    surfaces = near_surfaces(road(50.0), targets, 1.0)
+    near = near_rays(beams, target_patches(np.array([0.0, 0, 4]), surfaces)).likeliest(beams.sensor)
+    assert near.target.tolist() == [0]
+    assert (near.channel.tolist(), near.middle.tolist()) == ([1], [90])
+    assert near.miss.min() == pytest.approx(0, abs=0.1)
+
+
+def test_sensors_share_the_rays_of_equal_channels() -> None:
+    models = load_catalogue()
+    beams = Beams.of([models["type2"], models["type3"]], 0.2)
+    equal = np.isin(models["type3"].elevations, models["type2"].elevations)
+    assert equal.any()
+    assert beams.rays == 7500 * (32 + 128 - equal.sum())
+    assert set(beams.first_ray[32:][equal]) <= set(beams.first_ray[:32])
+
+
+@given(st.integers(1, 40), st.integers(-50, 50))
+def test_bundles_fall_into_single_rays(width: int, first: int) -> None:
+    left = NearRays(*(np.array([value]) for value in (0, 0, 0, first, width)), np.zeros(1))
+    steps = []
+    while len(left):
+        steps += left.middle.tolist()
+        left, part_of = left.beside_middle()
+        assert len(part_of) == len(left)
+    assert sorted(steps) == list(range(first, first + width))

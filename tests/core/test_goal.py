@@ -5,7 +5,7 @@ import pytest
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, placement_problem, reach, target_weights
+from seip_addon.core.goal import Goal, check_goal, make_plan, placement_problem, target_weights
 from seip_addon.core.progress import finish
 
 
@@ -27,8 +27,8 @@ def test_without_a_goal_four_sensors_are_sought(example):
 def test_weights_count_in_the_weighted_problem_alone(example):
     central = example.site.targets.central
     assert set(target_weights(example.site, Goal())) == {1.0}
-    assert set(target_weights(example.site, Goal(weighted=True))[central]) == {2.0}
-    weights = target_weights(example.site, Goal(weighted=True, central_weight=7.5))
+    assert set(target_weights(example.site, Goal(central_weight="scene"))[central]) == {2.0}
+    weights = target_weights(example.site, Goal(central_weight=7.5))
     assert set(weights[central]) == {7.5}
     assert set(weights[~central]) == {1.0}
 
@@ -42,7 +42,7 @@ def test_prices_come_from_the_catalogue(example):
 def test_demands_by_name_are_met(example):
     names = example.site.candidates.position_name.tolist()
     goal = Goal(count=3, mandatory=(names[0],), forbidden=tuple(names[5:]))
-    placement = finish(reach(placement_problem(example.site, example.visible, example.models, goal), goal))
+    placement = finish(make_plan(example.site, example.visible, example.models, goal)).placement
     chosen = {names[example.site.candidates.position_of[pose]] for pose in placement.chosen}
     assert names[0] in chosen
     assert chosen <= set(names[:5])
@@ -50,12 +50,19 @@ def test_demands_by_name_are_met(example):
 
 def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
     goal = Goal(coverage=0.6)
-    placement = finish(reach(placement_problem(example.site, example.visible, example.models, goal), goal))
-    seen = example.visible[placement.chosen].any(axis=0)
-    assert seen.mean() >= 0.6
-    cheaper = Goal(budget=placement.price - 1)
-    other = finish(reach(placement_problem(example.site, example.visible, example.models, cheaper), cheaper))
-    assert example.visible[other.chosen].any(axis=0).mean() < 0.6
+    plan = finish(make_plan(example.site, example.visible, example.models, goal))
+    assert plan.deployment.coverage >= 0.6
+    assert plan.greedy is None
+    cheaper = Goal(budget=plan.placement.price - 1)
+    other = finish(make_plan(example.site, example.visible, example.models, cheaper))
+    assert other.deployment.coverage < 0.6
+
+
+def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
+    plan = finish(make_plan(example.site, example.visible, example.models, Goal()))
+    assert plan.goal.count == 4
+    assert plan.greedy.objective <= plan.placement.objective
+    assert plan.deployment.seen_by.tolist() == example.visible[plan.placement.chosen].sum(axis=0).tolist()
 
 
 @pytest.mark.parametrize(
@@ -63,7 +70,10 @@ def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
     [
         ({"coverage": 0.0}, "share above 0 and at most 1"),
         ({"coverage": 1.5}, "share above 0 and at most 1"),
-        ({"weighted": True, "central_weight": -1.0}, "central weight must be a positive"),
+        ({"central_weight": -1.0}, "central weight must be a positive"),
+        ({"central_weight": float("nan")}, "central weight must be a positive"),
+        ({"budget": float("inf")}, "budget must be a finite number"),
+        ({"min_distance": -1.0}, "min distance must be a finite number"),
         ({"forbidden": ("a",), "mandatory": ("a",)}, "'a' is both forbidden and mandatory"),
         ({"mandatory": ("signal pole 9",)}, "did you mean 'signal pole"),
         ({"forbidden": ("zzz",)}, "there is no position 'zzz'"),
@@ -74,7 +84,7 @@ def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
 )
 def test_each_fault_has_its_sentence(example, goal, sentence):
     with pytest.raises(SeipError, match=sentence):
-        problem(example, **goal)
+        check_goal(example.site, example.models, Goal(**goal))
 
 
 def test_the_weighted_problem_needs_a_weighted_region(example):
@@ -82,4 +92,4 @@ def test_the_weighted_problem_needs_a_weighted_region(example):
     targets = type(site.targets)(site.targets.xyz, site.targets.weight, np.zeros(len(site.targets), bool), 1.0)
     bare = type(site)(site.name, site.origin, site.region, targets, site.candidates, site.triangles)
     with pytest.raises(SeipError, match="needs a weighted region"):
-        target_weights(bare, Goal(weighted=True))
+        target_weights(bare, Goal(central_weight=2.0))

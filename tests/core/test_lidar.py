@@ -215,3 +215,14 @@ def test_measured_returns_follow_the_seed_and_leave_misses() -> None:
     assert np.isfinite(first[[2, 4]]).all()
     other = measured_returns(model, np.array([9.0, 9.0, 50.0, 9.0, 20.0]), np.ones(5), np.random.default_rng(7))
     assert (other[[2, 4]] == first[[2, 4]]).all()
+
+
+def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    assert load_catalogue([tmp_path / "mine.toml"])["corner32"].price == 9_000
+
+
+def test_the_documentation_names_every_sensor() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    assert all(f"| `{key}` |" in text for key in load_catalogue())

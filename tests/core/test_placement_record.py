@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -7,11 +8,11 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.goal import Goal, Plan
 from seip_addon.core.placement import Placement
 from seip_addon.core.results.placement_record import (
     Run,
     comparable,
-    degrees,
     load_placement_record,
     placement_record,
     save_placement_record,
@@ -49,7 +50,7 @@ def make_record(example, run, **changes):
     values = {"objective": 512.0, "bound": 530.5, "gap": 18.5 / 512.0, **changes}
     best = solution([sensor.pose for sensor in example.deployment.sensors], **values)
     greedy = solution([1, 2, 3], objective=500.0, bound=531.0, gap=0.05)
-    return placement_record(example.site, example.deployment, best, run, weighted=False, greedy=greedy)
+    return placement_record(example.site, Plan(Goal(count=3), best, greedy, example.deployment), run)
 
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
@@ -67,6 +68,18 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
     for part in SCHEMA["required"]:
         assert violations({key: value for key, value in record.items() if key != part}, SCHEMA)
     assert violations({**record, "more": 1}, SCHEMA)
+
+
+def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
+    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
+    record = make_record(example, replace(run, settings=work))
+    assert violations(record, SCHEMA) == []
+    for name in work:
+        assert violations({**record, "settings": {**work, name: None}}, SCHEMA)
+
+
+def test_nothing_random_is_claimed(example, run):
+    assert make_record(example, run)["seeds"] == {}
 
 
 def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(example, run):
@@ -94,12 +107,6 @@ def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
     save_placement_record(tmp_path / "placement.json", record)
     assert record["objective"]["bound"] is None
     assert violations(record, SCHEMA) == []
-
-
-def test_angles_are_written_from_zero_to_below_a_full_turn():
-    assert degrees(-math.pi / 2) == 270.0
-    assert degrees(2 * math.pi - 1e-12) == 0.0
-    assert degrees(-1e-12) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from engines import each_engine, needs_embree
@@ -10,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 SQUARE = np.array([[[-1, -1, 5], [1, -1, 5], [1, 1, 5]], [[-1, -1, 5], [1, 1, 5], [-1, 1, 5]]], dtype=np.float64)
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -41,11 +43,10 @@ def test_both_sides_stop_a_ray(engine: Engine) -> None:
 
 
 @each_engine
-def test_triangles_without_area_are_counted_and_stop_nothing(engine: Engine) -> None:
+def test_triangles_without_area_stop_nothing(engine: Engine) -> None:
     point = np.broadcast_to([0.1, 0.2, 1.0], (1, 3, 3))
     line = np.array([[[-1.0, 0, 2], [1, 0, 2], [3, 0, 2]]])
     caster = make_ray_caster(np.concatenate([point, line, SQUARE]), engine)
-    assert caster.dropped == 2
     distance, triangle = caster.cast(np.array([0.1, 0.2, 0.0]), UP, 100.0)
     assert distance[0] == pytest.approx(5)
     assert triangle[0] == 3
@@ -109,6 +110,36 @@ def test_a_rays_result_does_not_depend_on_its_company(engine: Engine) -> None:
     part = caster.cast(np.zeros(3), rays[pick], 100.0)
     assert (part[0] == whole[0][pick]).all()
     assert (part[1] == whole[1][pick]).all()
+
+
+@each_engine
+def test_a_hit_is_the_same_whatever_else_is_kept_and_however_far_the_ray_goes(engine: Engine) -> None:
+    random = np.random.default_rng(6)
+    triangles = random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3))
+    rays = unit(random, 1000)
+    distance, triangle = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, 100.0)
+    keep = random.random(500) < 0.5
+    fewer = make_ray_caster(triangles, engine, keep).cast(np.zeros(3), rays, 100.0)
+    same = (triangle >= 0) & keep[triangle]
+    assert (fewer[0][same] == distance[same]).all()
+    assert (fewer[1][same] == triangle[same]).all()
+    assert keep[fewer[1][fewer[1] >= 0]].all()
+    reach = float(np.median(distance[triangle >= 0]))
+    short = make_ray_caster(triangles, engine).cast(np.zeros(3), rays, reach)
+    assert (short[0] == np.where(distance <= reach, distance, np.inf)).all()
+
+
+@each_engine
+def test_threads_cast_alike(engine: Engine) -> None:
+    random = np.random.default_rng(7)
+    caster = make_ray_caster(random.uniform(-20, 20, (500, 1, 3)) + random.normal(0, 2, (500, 3, 3)), engine)
+    batches = [unit(random, 500) for _ in range(20)]
+    alone = [caster.cast(np.zeros(3), rays, 100.0) for rays in batches]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda rays: caster.cast(np.zeros(3), rays, 100.0), batches))
+    for one, other in zip(alone, together, strict=True):
+        assert (one[0] == other[0]).all()
+        assert (one[1] == other[1]).all()
 
 
 def test_an_unknown_engine_names_the_known() -> None:

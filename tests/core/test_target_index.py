@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.target_index import TargetIndex
+from seip_addon.core.visibility.target_index import TargetIndex
 
 
 @given(

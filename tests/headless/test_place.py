@@ -113,6 +113,8 @@ def test_each_mistake_has_its_sentence_and_leaves_no_result(options, sentence, t
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path, *options)
     assert not (tmp_path / "placement.json").exists()
+    before_any_ray = sentence != "cannot be reached"
+    assert (tmp_path / "visibility.npz").exists() is not before_any_ray
     assert all(not path.name.startswith(".") for path in tmp_path.iterdir())
 
 
@@ -157,5 +159,23 @@ def test_control_c_leaves_nothing_half_written(tmp_path):
     process.send_signal(signal.SIGINT)
     _, complaint = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "stopped, nothing written" in complaint
-    assert list(tmp_path.iterdir()) == []
+    assert "stopped, no result written" in complaint
+    assert {path.name for path in tmp_path.iterdir()} <= {"visibility.pieces"}  # to go on from
+
+
+def test_a_terminated_run_leaves_nothing_hidden(tmp_path):
+    process = start("-o", str(tmp_path), "--sensor", "type3", "--grid", "1")
+    while "targets" not in process.stdout.readline():
+        assert process.poll() is None
+    time.sleep(1.0)
+    process.terminate()
+    process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert [path for path in tmp_path.rglob("*") if path.name.startswith(".")] == []
+
+
+def test_no_file_of_an_earlier_result_stays_beside_a_new_one(folder, tmp_path):
+    (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
+    (tmp_path / "view.png").touch()
+    run(tmp_path, "--count", "1")
+    assert not (tmp_path / "view.png").exists()

@@ -91,12 +91,13 @@ def test_the_add_on_never_names_itself(path):
 
 @pytest.mark.parametrize("path", [*modules("seip_addon"), *modules("headless")], ids=lambda p: str(p.relative_to(ROOT)))
 def test_what_is_imported_is_pinned(path):
-    """Torch may be imported by the detector alone; SciPy is for oracles."""
+    """Torch may be imported by the detector alone, Dask by what hands work to a cluster; SciPy is for oracles."""
     own = {"seip_addon", "headless"}
-    ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "pulp", "shapely", "tqdm"}
+    ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "PIL", "pulp", "shapely", "tqdm"}
     detector = {"torch"} if "detection" in path.parts else set()
+    cluster = {"dask", "distributed"} if path.name == "work_force.py" else set()
     foreign = {top(name) for name in imported(path)} - set(sys.stdlib_module_names) - own
-    assert foreign <= ours | BLENDERS_OWN | detector
+    assert foreign <= ours | BLENDERS_OWN | detector | cluster
 
 
 def test_an_import_that_points_up_is_found(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
 GROUPS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
-PINS = [Requirement(pin) for name in ("extension", "blender", "test", "lint") for pin in GROUPS[name]]
+PINS = [Requirement(pin) for name in ("extension", "blender", "test", "cluster", "lint") for pin in GROUPS[name]]
 PINS_HERE = {canonicalize_name(pin.name): pin for pin in PINS if pin.marker is None or pin.marker.evaluate()}
 
 

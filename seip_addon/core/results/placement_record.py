@@ -18,10 +18,12 @@ import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..goal import Plan
 from ..placement import Placement
 from ..site import Site
-from ..storage import whole_file
-from .deployment import Deployment, Sensor
+from ..storage import save_json
+from .deployment import Sensor
+from .headings import degrees
 
 Record = dict[str, Any]
 
@@ -46,8 +48,6 @@ class Run:
         Of the program and what it stands on; see `versions`.
     inputs : mapping of str to str
         Digests or names of what went in.
-    seeds : mapping of str to int
-        Of every random number generator.
     warnings : tuple of str
         What the user should know before trusting the figures.
     """
@@ -57,7 +57,6 @@ class Run:
     durations: Mapping[str, float]
     versions: Mapping[str, str]
     inputs: Mapping[str, str] = field(default_factory=dict)
-    seeds: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
 
@@ -68,39 +67,23 @@ def versions(**more: str) -> dict[str, str]:
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 
-def placement_record(  # noqa: PLR0913 - one thing for each part of the file
-    site: Site,
-    deployment: Deployment,
-    placement: Placement,
-    run: Run,
-    *,
-    weighted: bool,
-    cheapest: bool = False,
-    greedy: Placement | None = None,
-) -> Record:
+def placement_record(site: Site, plan: Plan, run: Run) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
 
     Parameters
     ----------
     site : Site
-    deployment : Deployment
-        What `placement` chose, of the same site.
-    placement : Placement
-        The solution with its bound.
+    plan : Plan
+        Of that site.
     run : Run
         What it was made with.
-    weighted : bool
-        Whether the targets' weights counted.
-    cheapest : bool
-        Whether the least price for a coverage was sought, not the most coverage.
-    greedy : Placement, optional
-        The greedy solution of the same problem, to compare with.
 
     Returns
     -------
     dict
         Its layout is described in docs/formats.md and docs/placement.schema.json.
     """
+    deployment, placement, greedy = plan.deployment, plan.placement, plan.greedy
     return {
         "schema": SCHEMA,
         "site": {"name": site.name, "origin_m": _metres(site.origin)},
@@ -113,8 +96,8 @@ def placement_record(  # noqa: PLR0913 - one thing for each part of the file
             "seen_twice": _share(deployment.seen_twice),
         },
         "objective": {
-            "kind": "weighted" if weighted else "vanilla",
-            "sought": "least price" if cheapest else "most coverage",
+            "kind": "weighted" if plan.goal.weighted else "vanilla",
+            "sought": "least price" if plan.goal.cheapest else "most coverage",
             "value": _significant(placement.objective),
             "bound": _significant(placement.bound),
             "gap": _significant(placement.gap),
@@ -124,7 +107,7 @@ def placement_record(  # noqa: PLR0913 - one thing for each part of the file
         "greedy": None if greedy is None else _greedy(greedy, placement),
         "counts": _counts(site),
         "settings": dict(run.settings),
-        "seeds": dict(run.seeds),
+        "seeds": {},  # visibility and placement draw no random numbers
         "inputs": dict(run.inputs),
         "notes": list(placement.notes),
         "warnings": list(run.warnings),
@@ -143,9 +126,7 @@ def comparable(record: Record) -> Record:
 
 def save_placement_record(path: str | os.PathLike[str], record: Record) -> None:
     """Write ``placement.json``."""
-    with whole_file(path) as temporary:
-        text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    save_json(path, record)
 
 
 def load_placement_record(path: str | os.PathLike[str]) -> Record:
@@ -185,11 +166,6 @@ def _sensor(sensor: Sensor, origin: Float) -> Record:
         "coverage_added": _share(sensor.added),
         "coverage_marginal": _share(sensor.marginal),
     }
-
-
-def degrees(angle: float) -> float:
-    """Return an angle in degrees, 0 <= angle < 360, to the millionth."""
-    return _rounded(math.degrees(angle), 6) % 360.0
 
 
 def _greedy(greedy: Placement, placement: Placement) -> Record:

@@ -20,9 +20,9 @@ from shapely.validation import explain_validity
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..scene_geometry import DEFAULT_WEIGHT
 
 DEFAULT_RADIUS = 80.0
-DEFAULT_WEIGHT = 2.0
 
 
 @dataclass(frozen=True, eq=False)

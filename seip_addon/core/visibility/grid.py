@@ -3,9 +3,8 @@
 V_ij = 1 if and only if some return of candidate i's full scan lies nearer than
 δ to target j and, where a least intensity is asked for, is at least as strong.
 
-The grid is exactly the full scan's, but only rays that can change it are cast:
-those that pass within δ of a target (`beam_culling`), and of these first the one
-per target that should end nearest to it; then, for targets still unseen, the rest.
+The grid is exactly the full scan's, but only rays that can change it are cast
+(`scanning`), against triangles that can change it (`needed_triangles`).
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,23 +21,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .beam_culling import near_rays
-from .errors import SeipError
-from .lidar import BeamPattern, LidarModel, find_models, return_intensity
-from .progress import Progress
-from .ray_casting import RayCaster
-from .site import Site
-from .storage import digest, whole_file
-from .target_index import TargetIndex
-
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Boolean = NDArray[np.bool_]
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from ..lidar import LidarModel, find_models
+from ..progress import Progress
+from ..site import Site
+from ..storage import digest, whole_file
+from .needed_triangles import needed_triangles
+from .observer import KeptPieces, pieces_of, see_pieces
+from .ray_casting import Engine, RayCaster, engine_name
+from .scanning import Place, seen_by_all_rays
+from .work_force import ObserverTask, cluster, threads_of
 
 SCHEMA = "seip.visibility"
 SCHEMA_VERSION = 1
 
-_RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
+
+WIDEST_DELTA = 100.0
+"""Metres: a wider one is a slip of the keyboard."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class VisibilitySettings:
     min_intensity: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.delta < np.inf:
-            raise SeipError(f"delta must be a positive number of metres, not {self.delta}")
+        if not 0 < self.delta <= WIDEST_DELTA:
+            raise SeipError(f"delta must be a positive number of metres up to {WIDEST_DELTA:g}, not {self.delta}")
         if not 0 <= self.min_intensity <= 1:
             raise SeipError(f"the least intensity must lie between 0 and 1, not {self.min_intensity}")
 
@@ -144,6 +144,7 @@ class VisibilityGrid:
             KeyError,
             IndexError,
             TypeError,
+            RecursionError,
             zipfile.BadZipFile,
             zlib.error,
         ) as error:
@@ -153,12 +154,10 @@ class VisibilityGrid:
         return grid
 
 
-def visibility_key(
-    site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, caster: RayCaster
-) -> str:
+def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: str) -> str:
     """Return the digest of all that a grid follows from, names left out.
 
-    A stored grid with this key needs no computing again.
+    A stored grid with this key needs no computing again. ``engine`` is ``bvh`` or ``embree``.
     """
     used = _models_of(site, models)
     patterns = [
@@ -171,14 +170,19 @@ def visibility_key(
     ]
     which = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
     return digest(
-        *(SCHEMA, SCHEMA_VERSION, caster.name, float(settings.delta), float(settings.min_intensity)),
+        *(SCHEMA, SCHEMA_VERSION, engine, float(settings.delta), float(settings.min_intensity)),
         *(site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, which),
         *patterns,
     )
 
 
 def compute_visibility(
-    site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, caster: RayCaster
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: Engine = "auto",
+    kept: KeptPieces | None = None,
+    scheduler: str | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Find which pose sees which target, casting only rays that can matter.
 
@@ -188,134 +192,79 @@ def compute_visibility(
     models : mapping of str to LidarModel
         At least those that the candidates name.
     settings : VisibilitySettings
-    caster : RayCaster
-        Of the site's triangles.
+    engine : {"auto", "bvh", "embree"}
+        What casts the rays.
+    kept : KeptPieces, optional
+        Pieces of an earlier run with the same key, to which those of this run are added.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work, instead of this process.
 
     Yields
     ------
     Progress
-        After each pose.
+        After each piece of the work.
 
     Returns
     -------
     VisibilityGrid
-        The same, bit for bit, as `full_scan_visibility`.
+        The same, bit for bit, as `full_scan_visibility`, wherever the work is done.
 
     Raises
     ------
     SeipError
-        A sensor is unknown, or there is no pose or target, or a coordinate is not finite.
+        A sensor is unknown, or there is no pose or target, or a coordinate is not
+        finite, or the engine or the scheduler is not there.
     """
-    return _visibility(site, models, settings, caster, _seen_by_near_rays)
+    used = _models_of(site, models)
+    _require_finite(site)
+    longest = max(model.max_range for model in used.values())
+    needed = needed_triangles(site.triangles, site.candidates.xyz, site.targets.xyz, settings.delta, longest)
+    task = ObserverTask(site, used, settings.delta, settings.min_intensity, engine_name(engine), needed.keep)
+    pieces = pieces_of(site)
+    with threads_of(task) if scheduler is None else cluster(scheduler, task) as submit:
+        rows = yield from see_pieces(pieces, submit, kept)
+    packed = np.zeros((len(site.candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
+    packed[np.concatenate(pieces)] = np.concatenate([row.packed for row in rows])
+    parameters = {"triangles": needed.counts, "rays_cast": sum(row.rays for row in rows)}
+    return _grid(site, used, settings, task.engine, packed, parameters)
 
 
 def full_scan_visibility(
     site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, caster: RayCaster
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Find which pose sees which target by casting every ray: the reference for `compute_visibility`."""
-    return _visibility(site, models, settings, caster, _seen_by_all_rays)
-
-
-@dataclass(frozen=True, eq=False)
-class _Scan:
-    """One sensor at one pose.
-
-    Parameters
-    ----------
-    caster : RayCaster
-    model : LidarModel
-    origin : (3,) float64, metres
-    yaw : float, radians
-    settings : VisibilitySettings
-    """
-
-    caster: RayCaster
-    model: LidarModel
-    origin: Float
-    yaw: float
-    settings: VisibilitySettings
-
-    def returns(self, rays: Integer) -> Float:
-        """Cast rays and return the points, (n, 3) float64, of those returns that count."""
-        directions = BeamPattern(self.model, self.yaw).directions(rays)
-        distance, triangle = self.caster.cast(self.origin, directions, self.model.max_range)
-        counts = np.isfinite(distance) & (distance >= self.model.min_range)
-        if self.settings.min_intensity > 0:
-            counts[counts] = self._intensity(distance[counts], directions[counts], triangle[counts]) >= (
-                self.settings.min_intensity
-            )
-        points: Float = self.origin + distance[counts, None] * directions[counts]
-        return points
-
-    def _intensity(self, distance: Float, directions: Float, triangle: Integer) -> Float:
-        corners = self.caster.triangles[triangle]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        cos_incidence = (normal * directions).sum(axis=1) / np.linalg.norm(normal, axis=1)
-        return return_intensity(self.model, distance, cos_incidence)
-
-
-def _seen_by_near_rays(scan: _Scan, targets: Float) -> tuple[Boolean, int]:
-    """Which targets are seen, (t,) bool, and how many rays that took."""
-    delta = scan.settings.delta
-    near = near_rays(scan.model, scan.yaw, targets - scan.origin, delta)
-    seen = np.zeros(len(targets), dtype=bool)
-    likeliest = near.likeliest_rays(within=delta)
-    _see(scan, likeliest, targets, seen)
-    rest = near.rays(~seen)
-    rest[likeliest] = False
-    rays = np.flatnonzero(rest)
-    _see(scan, rays, targets, seen)
-    return seen, len(likeliest) + len(rays)
-
-
-def _seen_by_all_rays(scan: _Scan, targets: Float) -> tuple[Boolean, int]:
-    index = TargetIndex(targets, scan.settings.delta)
-    seen = np.zeros(len(targets), dtype=bool)
-    total = scan.model.channels * scan.model.azimuth_count
-    for begin in range(0, total, _RAYS_AT_ONCE):
-        rays = np.arange(begin, min(begin + _RAYS_AT_ONCE, total))
-        seen[index.within_delta(scan.returns(rays))] = True
-    return seen, total
-
-
-def _see(scan: _Scan, rays: Integer, targets: Float, seen: Boolean) -> None:
-    """Cast rays and add the targets that they see to ``seen``."""
-    unseen = np.flatnonzero(~seen)
-    if len(rays) and len(unseen):
-        points = scan.returns(rays)
-        seen[unseen[TargetIndex(targets[unseen], scan.settings.delta).within_delta(points)]] = True
-
-
-def _visibility(
-    site: Site,
-    models: Mapping[str, LidarModel],
-    settings: VisibilitySettings,
-    caster: RayCaster,
-    seen_by: Callable[[_Scan, Float], tuple[Boolean, int]],
-) -> Generator[Progress, None, VisibilityGrid]:
     used = _models_of(site, models)
     _require_finite(site)
-    targets, poses = site.targets.xyz, site.candidates
+    poses, targets = site.candidates, site.targets.xyz
     packed = np.zeros((len(poses), (len(targets) + 7) // 8), dtype=np.uint8)
-    cast = 0
     for pose, key in enumerate(poses.sensor.tolist()):
-        yield Progress(pose, len(poses), "visibility")
-        scan = _Scan(caster, used[key], poses.xyz[pose], float(poses.yaw[pose]), settings)
-        seen, rays = seen_by(scan, targets)
-        packed[pose] = np.packbits(seen)
-        cast += rays
-    yield Progress(len(poses), len(poses), "visibility")
-    parameters = {
-        **asdict(settings),
-        "engine": caster.name,
-        "sensors": list(used),
-        "triangles": len(site.triangles),
-        "triangles_without_area": caster.dropped,
-        "rays_of_full_scan": sum(used[key].channels * used[key].azimuth_count for key in poses.sensor.tolist()),
-        "rays_cast": cast,
-    }
-    key = visibility_key(site, models, settings, caster)
-    return VisibilityGrid(packed, (len(poses), len(targets)), key, parameters)
+        yield Progress(pose, len(poses), "full scan")
+        place = Place(
+            caster, poses.xyz[pose], float(poses.yaw[pose]), [used[key]], settings.delta, settings.min_intensity
+        )
+        packed[pose] = np.packbits(seen_by_all_rays(place, targets)[0])
+    yield Progress(len(poses), len(poses), "full scan")
+    return _grid(site, used, settings, caster.name, packed, {"rays_cast": _rays_of_full_scan(site, used)})
+
+
+def _grid(
+    site: Site,
+    used: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: str,
+    packed: NDArray[np.uint8],
+    parameters: Mapping[str, Any],
+) -> VisibilityGrid:
+    """Join bits and what is known of them."""
+    known = {"engine": engine, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
+    key = visibility_key(site, used, settings, engine)
+    return VisibilityGrid(
+        packed, (len(site.candidates), len(site.targets)), key, {**asdict(settings), **known, **parameters}
+    )
+
+
+def _rays_of_full_scan(site: Site, used: Mapping[str, LidarModel]) -> int:
+    return sum(used[key].channels * used[key].azimuth_count for key in site.candidates.sensor.tolist())
 
 
 def _models_of(site: Site, models: Mapping[str, LidarModel]) -> dict[str, LidarModel]:

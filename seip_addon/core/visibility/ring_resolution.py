@@ -11,13 +11,11 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .lidar import LidarModel, find_models
-from .site import Site
-from .visibility import VisibilitySettings
-
-Float = NDArray[np.float64]
+from ..arrays import Float
+from ..lidar import LidarModel, find_models
+from ..site import Site
+from .grid import VisibilitySettings
 
 
 def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:

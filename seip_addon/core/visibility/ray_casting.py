@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import gc
 import importlib.util
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .errors import SeipError
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
 
-Float = NDArray[np.float64]
-Integer = NDArray[np.int64]
 Engine = Literal["auto", "bvh", "embree"]
+
+# Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray
+# is then the same as on a longer ray.
+_BEYOND = 1 + 1e-6
+_MOST_THREADS = min(4, os.cpu_count() or 1)  # the work between casts holds Python's lock for a part of the time
 
 
 class RayCaster(Protocol):
@@ -31,8 +35,8 @@ class RayCaster(Protocol):
         Of the engine, ``bvh`` or ``embree``.
     triangles : (n, 3, 3) float64, metres
         As they were given, so that hits index them.
-    dropped : int
-        How many of them have no area and stop no ray.
+    threads : int
+        How many threads may cast at once to advantage.
     """
 
     @property
@@ -44,8 +48,8 @@ class RayCaster(Protocol):
         """The triangles that hits index."""
 
     @property
-    def dropped(self) -> int:
-        """How many of the triangles have no area."""
+    def threads(self) -> int:
+        """How many threads may cast at once to advantage."""
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays from one point.
@@ -68,25 +72,34 @@ class RayCaster(Protocol):
         """
 
 
-def make_ray_caster(triangles: Float, engine: Engine = "auto") -> RayCaster:
-    """Build a ray caster; ``auto`` takes Embree where it is installed, else Blender's BVH tree.
+def engine_name(engine: Engine) -> Engine:
+    """Return ``bvh`` or ``embree``; for ``auto`` Embree where it is installed, else Blender's BVH tree."""
+    if engine == "auto":
+        return "embree" if importlib.util.find_spec("embreex") else "bvh"
+    return engine
+
+
+def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | None = None) -> RayCaster:
+    """Build a ray caster; see `engine_name` for ``auto``.
 
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
     engine : {"auto", "bvh", "embree"}
+    keep : (n,) bool, optional
+        Which of them stop rays; all if not given. What a ray that meets these alone
+        hits, and how far away, is the same bits whatever else is kept.
 
     Raises
     ------
     SeipError
         A coordinate is not finite, or the engine is not there.
     """
-    if engine == "auto":
-        engine = "embree" if importlib.util.find_spec("embreex") else "bvh"
-    if engine == "embree":
-        return EmbreeRayCaster(triangles)
-    if engine == "bvh":
-        return BvhRayCaster(triangles)
+    name = engine_name(engine)
+    if name == "embree":
+        return EmbreeRayCaster(triangles, keep)
+    if name == "bvh":
+        return BvhRayCaster(triangles, keep)
     raise SeipError(f"no ray-casting engine '{engine}'; choose auto, bvh or embree")
 
 
@@ -96,11 +109,14 @@ class BvhRayCaster:
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
+    keep : (n,) bool, optional
+        Which of them stop rays.
     """
 
     name = "bvh"
+    threads = 1  # casting a ray holds Python's lock
 
-    def __init__(self, triangles: Float) -> None:
+    def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
         try:
             from mathutils.bvhtree import BVHTree  # noqa: PLC0415 - exists within Blender's Python alone
         except ImportError as error:
@@ -108,8 +124,7 @@ class BvhRayCaster:
                 "the ray-casting engine bvh needs Blender's Python: run within Blender, or import bpy first"
             ) from error
         self.triangles = triangles
-        self._index, self._centre, corners = _rebased(triangles)
-        self.dropped = len(triangles) - len(corners)
+        self._index, self._centre, corners = _rebased(triangles, keep)
         with _no_garbage_collection():  # else it walks the growing lists again and again
             points = corners.reshape(-1, 3).tolist()
             faces = np.arange(len(points)).reshape(-1, 3).tolist()
@@ -120,7 +135,8 @@ class BvhRayCaster:
         start = (origin - self._centre).tolist()
         ray_cast = self._tree.ray_cast
         with _no_garbage_collection():
-            hits = [ray_cast(start, direction, max_range)[2:] for direction in directions.tolist()]
+            reach = max_range * _BEYOND
+        hits = [ray_cast(start, direction, reach)[2:] for direction in directions.tolist()]
         face = np.array([-1 if hit[0] is None else hit[0] for hit in hits], dtype=np.int64)
         distance = np.array([np.inf if hit[1] is None else hit[1] for hit in hits], dtype=np.float64)
         return _result(distance, face, self._index, max_range)
@@ -132,36 +148,40 @@ class EmbreeRayCaster:
     Parameters
     ----------
     triangles : (n, 3, 3) float64, metres
+    keep : (n,) bool, optional
+        Which of them stop rays.
     """
 
     name = "embree"
+    threads = _MOST_THREADS
 
-    def __init__(self, triangles: Float) -> None:
+    def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
         try:
             from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415 - an extra that need not be installed
             from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415 - as above
         except ImportError as error:
             raise SeipError("the ray-casting engine embree is not installed; choose bvh or install embreex") from error
         self.triangles = triangles
-        self._index, self._centre, corners = _rebased(triangles)
-        self.dropped = len(triangles) - len(corners)
+        self._index, self._centre, corners = _rebased(triangles, keep)
         self._scene = EmbreeScene(robust=True)  # no leaks along shared edges
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
+        self.cast(self._centre, np.array([[0.0, 0.0, 1.0]]), 1.0)  # builds the tree, before threads may ask for it
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays from one point; see `RayCaster.cast`."""
         if self._mesh is None or len(directions) == 0:
             return np.full(len(directions), np.inf), np.full(len(directions), -1, dtype=np.int64)
         start = np.broadcast_to((origin - self._centre).astype(np.float32), directions.shape)
-        reach = np.full(len(directions), max_range, dtype=np.float32)
+        reach = np.full(len(directions), max_range * _BEYOND, dtype=np.float32)
         hits = self._scene.run(np.ascontiguousarray(start), directions.astype(np.float32), dists=reach, output=True)
         return _result(hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64), self._index, max_range)
 
 
-def _rebased(triangles: Float) -> tuple[Integer, Float, Float]:
-    """Pick the triangles that have an area and move them to their common centre.
+def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Float]:
+    """Pick the triangles that are kept and have an area, and move them to the common centre of all.
 
-    Both engines compute in float32, which is off by metres at map coordinates.
+    Both engines compute in float32, which is off by metres at map coordinates. The
+    centre does not depend on what is kept, so that the rounding does not either.
 
     Returns
     -------
@@ -182,7 +202,7 @@ def _rebased(triangles: Float) -> tuple[Integer, Float, Float]:
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     corners = triangles - centre
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    index = np.flatnonzero(area > 0)
+    index = np.flatnonzero(area > 0 if keep is None else (area > 0) & keep)
     return index, centre, corners[index]
 
 

@@ -1,0 +1,200 @@
+"""What the commands have in common: options of a scene's survey, its site, and its visibility grid."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Generator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from headless import session
+
+import bpy
+import numpy as np
+
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
+from seip_addon.core.placement.integer_program import check_solver
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.scene_geometry import SceneGeometry
+from seip_addon.core.site import Site, make_site
+from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
+from seip_addon.core.visibility.needed_triangles import triangles_sentence
+from seip_addon.core.visibility.ring_resolution import resolution_warnings
+from seip_addon.core.visibility.store import stored_visibility
+from seip_addon.scene.read import read_scene
+
+Result = TypeVar("Result")
+
+HIGHEST = 100.0
+"""Metres: the end of a range of heights beyond this is a slip of the keyboard."""
+
+
+@dataclass
+class Stopwatch:
+    """How long each step took, in seconds; kept apart from results."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def time(self, step: str, work: Callable[[], Result]) -> Result:
+        """Return what ``work`` returns and note how long it took."""
+        start = time.perf_counter()
+        result = work()
+        self.seconds[step] = time.perf_counter() - start
+        return result
+
+    def run(self, step: str, steps: Generator[Progress, None, Result]) -> Result:
+        """Run work in steps to its end behind a progress bar."""
+        with session.progress_bar() as report:
+            return self.time(step, lambda: finish(steps, report))
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """A scene with its site and who sees what.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    site : Site
+    models : dict of str to LidarModel
+        The sensor types asked for, by catalogue key.
+    grid : VisibilityGrid
+    settings : dict
+        All options of the survey, defaults included.
+    warnings : tuple of str
+        What a user should know before trusting the figures.
+    stopwatch : Stopwatch
+    """
+
+    geometry: SceneGeometry
+    site: Site
+    models: dict[str, LidarModel]
+    grid: VisibilityGrid
+    settings: dict[str, Any]
+    warnings: tuple[str, ...]
+    stopwatch: Stopwatch
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the scene, the folder of results and the options of a survey to a command."""
+    layout, sight = CandidateSettings(), VisibilitySettings()
+    parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
+    sensors = parser.add_argument_group("sensors")
+    sensors.add_argument("--sensor", nargs="+", default=layout.sensors, metavar="KEY", help="types to choose from")
+    sensors.add_argument("--catalogue", nargs="+", type=Path, default=[], metavar="TOML", help="catalogues of your own")
+    sensors.add_argument(
+        "--heights", nargs="+", default=layout.heights, action=_Heights, metavar="M", help="metres, or FROM:TO:STEP"
+    )
+    metres = parser.add_argument_group("grid and candidates, in metres")
+    metres.add_argument("--grid", type=float, default=1.0, help="spacing of the targets")
+    metres.add_argument("--delta", type=float, default=sight.delta, help="a return closer than this sees a target")
+    metres.add_argument("--spacing", type=float, default=layout.spacing, help="between posts on the pavement")
+    metres.add_argument("--setback", type=float, default=layout.setback, help="of posts from the kerb")
+    metres.add_argument("--clearance", type=float, default=layout.clearance, help="of posts from walls")
+    metres.add_argument("--bracket", type=float, default=layout.bracket, help="of sensors from the axis of a pole")
+    work = parser.add_argument_group("work")
+    work.add_argument(
+        "--min-intensity", type=float, default=sight.min_intensity, help="least intensity of a return that sees"
+    )
+    work.add_argument("--engine", choices=("auto", "bvh", "embree"), default="auto", help="ray caster")
+    work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers cast, like tcp://host:8786")
+    work.add_argument("--solver", default="highs", help="highs, cbc or gurobi")
+    work.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for each answer, in seconds")
+
+
+def survey(options: argparse.Namespace, check: Callable[[Site, dict[str, LidarModel]], None]) -> Survey:
+    """Read the scene, lay out its site, and find or compute its visibility grid.
+
+    Parameters
+    ----------
+    options : Namespace
+        Of a parser with `add_options`.
+    check : callable
+        Called with the site and the models before any ray is cast: refuses what the site cannot do.
+
+    Returns
+    -------
+    Survey
+    """
+    check_solver(options.solver)
+    models = find_models(load_catalogue(options.catalogue), options.sensor)
+    layout = CandidateSettings(
+        sensors=tuple(options.sensor),
+        heights=tuple(options.heights),
+        spacing=options.spacing,
+        setback=options.setback,
+        clearance=options.clearance,
+        bracket=options.bracket,
+    )
+    sight = VisibilitySettings(options.delta, options.min_intensity)
+    session.check_folder(options.output)
+    session.open_scene(options.scene)
+
+    watch = Stopwatch()
+    reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
+    site = watch.time("lay out the site", lambda: make_site(reading.geometry, layout, options.grid))
+    session.say(_in_words(site))
+    warnings = reading.warnings + resolution_warnings(site, models, sight)
+    for sentence in warnings:
+        session.say(f"warning: {sentence}")
+    check(site, models)
+    store = options.output / "visibility.npz"
+    grid = watch.run("visibility", stored_visibility(store, site, models, sight, options.engine, options.scheduler))
+    session.say(triangles_sentence(grid.parameters["triangles"]))
+    settings = {
+        "grid_spacing_m": options.grid,
+        "candidates": asdict(layout),
+        "visibility": asdict(sight),
+        "catalogue": [path.name for path in options.catalogue],
+        "engine": options.engine,
+        "solver": options.solver,
+        "time_limit_s": options.time_limit,
+    }
+    return Survey(reading.geometry, site, models, grid, settings, warnings, watch)
+
+
+def _in_words(site: Site) -> str:
+    candidates = site.candidates
+    dropped = ", ".join(f"{count} {reason}" for reason, count in candidates.dropped.items())
+    poles = np.count_nonzero(candidates.on_pole)
+    return (
+        f"{site.name}: {len(site.targets):,} targets, {len(candidates.position)} positions ({poles} on poles), "
+        f"{len(candidates):,} poses, {len(site.triangles):,} triangles" + (f"; dropped: {dropped}" if dropped else "")
+    )
+
+
+class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
+    """Help that names the default of each option that has one."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, []) else super()._get_help_string(action)
+
+
+class _Heights(argparse.Action):
+    """Heights as a list, or a range FROM:TO:STEP with both ends."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, *_: object
+    ) -> None:
+        """Store the heights as a tuple of metres."""
+        heights: list[float] = []
+        for text in values if isinstance(values, list) else []:
+            try:
+                numbers = [float(part) for part in str(text).split(":")]
+            except ValueError:
+                numbers = []
+            if len(numbers) == 1:
+                heights += numbers
+            elif len(numbers) == 3 and 0 < numbers[0] <= numbers[1] <= HIGHEST and numbers[2] >= 0.01:
+                first, last, step = numbers
+                heights += np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
+            else:
+                parser.error(
+                    f"argument --heights: {text!r} is neither a height in metres nor a range FROM:TO:STEP "
+                    f"up to {HIGHEST:g} m in steps of at least 0.01 m"
+                )
+        setattr(namespace, self.dest, tuple(heights))

@@ -1,0 +1,160 @@
+"""The poses of a site and what they see, in pieces that can be worked on anywhere and in any order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float, Integer
+from ..lidar import LidarModel
+from ..progress import Progress
+from ..site import Site
+from .near_surfaces import near_surfaces
+from .ray_casting import RayCaster
+from .scanning import Place, seen_by_near_rays
+
+_PLACES_IN_A_PIECE = 16  # a second's work or less
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What some poses see.
+
+    Parameters
+    ----------
+    packed : (k, ceil(t / 8)) uint8
+        Bits of V, as `numpy.packbits` packs them.
+    rays : int
+        How many rays were cast for it.
+    """
+
+    packed: NDArray[np.uint8]
+    rays: int
+
+
+class Observer:
+    """Looks from the poses of a site. What is the same for all poses is computed once.
+
+    Parameters
+    ----------
+    site : Site
+    models : mapping of str to LidarModel
+        At least those that the candidates name.
+    delta : float, metres
+    min_intensity : float
+    caster : RayCaster
+        Of the site's triangles.
+    """
+
+    def __init__(
+        self, site: Site, models: Mapping[str, LidarModel], delta: float, min_intensity: float, caster: RayCaster
+    ) -> None:
+        self._poses, self._models, self._caster = site.candidates, models, caster
+        self._delta, self._min_intensity = delta, min_intensity
+        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, delta)
+
+    @property
+    def targets(self) -> int:
+        """Number of targets."""
+        return len(self._surfaces.xyz)
+
+    def see(self, poses: Integer) -> Rows:
+        """Find what poses see; those at one place, of different sensors, share rays.
+
+        Parameters
+        ----------
+        poses : (k,) int64
+        """
+        packed = np.zeros((len(poses), (self.targets + 7) // 8), dtype=np.uint8)
+        rays = 0
+        for members in places(self._poses.xyz[poses], self._poses.yaw[poses]):
+            here = poses[members]
+            models = [self._models[key] for key in self._poses.sensor[here].tolist()]
+            origin, yaw = self._poses.xyz[here[0]], float(self._poses.yaw[here[0]])
+            place = Place(self._caster, origin, yaw, models, self._delta, self._min_intensity)
+            seen, cast = seen_by_near_rays(place, self._surfaces)
+            packed[members] = np.packbits(seen, axis=1)
+            rays += cast
+        return Rows(packed, rays)
+
+
+def places(xyz: Float, yaw: Float) -> list[Integer]:
+    """Group poses that have position and yaw in common.
+
+    Parameters
+    ----------
+    xyz : (c, 3) float64, metres
+    yaw : (c,) float64, radians
+
+    Returns
+    -------
+    list of (k,) int64
+        In the order of their first poses.
+    """
+    _, first, place = np.unique(np.column_stack([xyz, yaw]), axis=0, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))[place.ravel()]
+    order = np.argsort(rank, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(rank))[:-1])
+
+
+def pieces_of(site: Site) -> list[Integer]:
+    """Divide the poses of a site into pieces of work, places kept whole."""
+    whole = places(site.candidates.xyz, site.candidates.yaw)
+    groups = range(0, len(whole), _PLACES_IN_A_PIECE)
+    return [np.concatenate(whole[begin : begin + _PLACES_IN_A_PIECE]) for begin in groups]
+
+
+class KeptPieces(Protocol):
+    """Where finished pieces outlive an interruption."""
+
+    def load(self, number: int) -> Rows | None:
+        """Return a piece that was kept, or None."""
+
+    def save(self, number: int, rows: Rows) -> None:
+        """Keep a piece."""
+
+
+def see_pieces(
+    pieces: Sequence[Integer], submit: Callable[[Integer], Future[Rows]], kept: KeptPieces | None = None
+) -> Generator[Progress, None, list[Rows]]:
+    """Have pieces worked on, whoever does it, and collect the results.
+
+    Parameters
+    ----------
+    pieces : sequence of (k,) int64
+    submit : callable
+        Starts the work on one piece.
+    kept : KeptPieces, optional
+        Pieces in it are not worked on again; those that are finished are added.
+
+    Returns
+    -------
+    list of Rows
+        One for each piece.
+    """
+    loaded = {number: kept.load(number) for number in range(len(pieces))} if kept else {}
+    rows = {number: found for number, found in loaded.items() if found and len(found.packed) == len(pieces[number])}
+    total = sum(map(len, pieces))
+    done = sum(len(pieces[number]) for number in rows)
+    yield Progress(done, total, "visibility")
+    numbers = {submit(piece): number for number, piece in enumerate(pieces) if number not in rows}
+    pending = set(numbers)
+    try:
+        while pending:
+            finished, pending = wait(pending, return_when=FIRST_COMPLETED)
+            for future in finished:
+                number = numbers[future]
+                rows[number] = future.result()
+                if kept:
+                    kept.save(number, rows[number])
+                done += len(pieces[number])
+            yield Progress(done, total, "visibility")
+    finally:
+        for future in pending:
+            future.cancel()
+    return [rows[number] for number in range(len(pieces))]

@@ -1,0 +1,107 @@
+"""A visibility grid on disk that is computed once and used again while its inputs stay the same."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Generator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import SeipError
+from ..lidar import LidarModel
+from ..progress import Progress
+from ..site import Site
+from ..storage import whole_file
+from .grid import VisibilityGrid, VisibilitySettings, compute_visibility, visibility_key
+from .observer import Rows
+from .ray_casting import Engine, engine_name
+
+
+class PieceFolder:
+    """Finished pieces of a grid in the making, in a folder beside its file.
+
+    Parameters
+    ----------
+    path : path
+        The grid's file.
+    key : str
+        The grid's key. Pieces of another are removed.
+    """
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._folder = path.with_name(f"{path.stem}.pieces")
+        self._prefix = key[:16]
+        for other in self._folder.glob("*.npz"):
+            if not other.name.startswith(self._prefix):
+                other.unlink()
+
+    def load(self, number: int) -> Rows | None:
+        """Return a piece, or None where there is none that can be used."""
+        try:
+            with self._file(number).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+                return Rows(arrays["packed"], int(arrays["rays"]))
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+            return None
+
+    def save(self, number: int, rows: Rows) -> None:
+        """Write a piece."""
+        with whole_file(self._file(number)) as temporary, temporary.open("wb") as file:
+            np.savez(file, packed=rows.packed, rays=np.array(rows.rays))
+
+    def remove(self) -> None:
+        """Remove the folder, once the grid is whole."""
+        if self._folder.exists():
+            shutil.rmtree(self._folder)
+
+    def _file(self, number: int) -> Path:
+        return self._folder / f"{self._prefix}-{number:06d}.npz"
+
+
+def stored_visibility(
+    path: Path,
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: Engine = "auto",
+    scheduler: str | None = None,
+) -> Generator[Progress, None, VisibilityGrid]:
+    """Return the grid of a file where it follows from the same inputs; else compute it and write the file.
+
+    What was finished before an interruption is kept beside the file and not computed again.
+
+    Parameters
+    ----------
+    path : path
+        The grid's file, read and written.
+    site : Site
+    models : mapping of str to LidarModel
+    settings : VisibilitySettings
+    engine : {"auto", "bvh", "embree"}
+        What casts the rays.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work.
+
+    Returns
+    -------
+    VisibilityGrid
+    """
+    key = visibility_key(site, models, settings, engine_name(engine))
+    stored = _load(path)
+    if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
+        yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
+        return stored
+    pieces = PieceFolder(path, key)
+    grid = yield from compute_visibility(site, models, settings, engine, pieces, scheduler)
+    grid.save(path)
+    pieces.remove()
+    return grid
+
+
+def _load(path: Path) -> VisibilityGrid | None:
+    """Return the grid of a file, or None where there is none that can be used again."""
+    try:
+        return VisibilityGrid.load(path)
+    except SeipError:
+        return None

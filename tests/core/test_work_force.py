@@ -1,0 +1,82 @@
+"""Work on a cluster: the same grid whatever the number of workers, and though workers die."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from engines import ANY, needs_embree
+from synthetic_junction import junction_site
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.progress import finish
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.ray_casting import EmbreeRayCaster
+from seip_addon.core.visibility.store import stored_visibility
+
+HAS_DASK = importlib.util.find_spec("distributed") is not None
+needs_dask = pytest.mark.skipif(not HAS_DASK, reason="Dask is not installed: the group 'cluster' of pyproject.toml")
+SITE = junction_site(positions=60, heights=[4.0, 6.0], spacing=2.0)
+MODELS = load_catalogue()
+SETTINGS = VisibilitySettings()
+
+
+@pytest.fixture
+def cluster() -> Iterator[object]:
+    from distributed import LocalCluster  # noqa: PLC0415 - an extra that need not be installed
+
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1", silence_logs=50
+    ) as started:
+        yield started
+
+
+@pytest.mark.skipif(HAS_DASK, reason="Dask is installed")
+def test_a_missing_dask_has_its_sentence() -> None:
+    with pytest.raises(SeipError, match="the group 'cluster'"):
+        finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler="tcp://127.0.0.1:1"))
+
+
+@needs_dask
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://"])
+def test_a_scheduler_that_does_not_answer_has_its_sentence(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("seip_addon.core.visibility.grid.work_force._SECONDS_FOR_AN_ANSWER", 0.5)
+    with pytest.raises(SeipError, match="no Dask scheduler answers at"):
+        finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler=address))
+
+
+@needs_dask
+@needs_embree
+@pytest.mark.slow
+def test_a_cluster_writes_the_same_bytes_though_a_worker_dies(cluster, tmp_path: Path) -> None:
+    def grid(name: str, scheduler: str | None):
+        return stored_visibility(tmp_path / name, SITE, MODELS, SETTINGS, "embree", scheduler)
+
+    finish(grid("here.npz", None))
+    finish(grid("there.npz", cluster.scheduler_address))
+    assert (tmp_path / "there.npz").read_bytes() == (tmp_path / "here.npz").read_bytes()
+
+    steps = grid("hurt.npz", cluster.scheduler_address)
+    killed = False
+    for progress in iter(lambda: next(steps, None), None):
+        if progress.done and not killed:
+            os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+            killed = True
+    assert killed
+    assert (tmp_path / "hurt.npz").read_bytes() == (tmp_path / "here.npz").read_bytes()
+    assert not (tmp_path / "hurt.pieces").exists()
+
+
+@needs_embree
+def test_the_number_of_threads_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    grids = []
+    for threads in (1, 3):
+        monkeypatch.setattr(EmbreeRayCaster, "threads", threads)
+        grids.append(finish(compute_visibility(SITE, MODELS, SETTINGS, "embree")))
+    assert (grids[0].packed == grids[1].packed).all()
+    assert grids[0].parameters == grids[1].parameters
