@@ -132,19 +132,27 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
     A terminal sees a moving bar, a log file a line every ten seconds. Work
-    that starts anew (a smaller count, another total) gets a bar of its own.
+    that starts anew (a smaller count, another total) gets a bar of its own;
+    work of unknown length shows what it does and for how long.
     """
     bar: tqdm | None = None
+    pause = 0.1 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
 
     def report(progress: Progress) -> None:
         nonlocal bar
-        if bar is None or progress.total != bar.total or progress.done < bar.n:
+        known = progress.total > 0
+        if bar is None or (progress.total or None) != bar.total or (known and progress.done < bar.n):
             if bar is not None:
                 bar.close()
-            pause = 0.1 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
-            bar = tqdm(total=progress.total, file=sys.stderr, mininterval=pause, maxinterval=pause)
+            bar = tqdm(
+                total=progress.total or None,
+                bar_format=None if known else "{desc} [{elapsed}]",
+                file=sys.stderr,
+                mininterval=pause,
+                maxinterval=pause,
+            )
         bar.set_description(progress.what, refresh=False)
-        bar.update(progress.done - bar.n)
+        bar.update(progress.done - bar.n if known else 1)
 
     try:
         yield report

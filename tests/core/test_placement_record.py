@@ -26,7 +26,7 @@ SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "placement.schema.json
 
 def solution(chosen, **values) -> Placement:
     more = {"status": "feasible", "solver": "HiGHS", "seconds": 0.5, "covered": values["objective"], "price": 0.0}
-    return Placement(chosen=np.array(chosen), seen_by=np.zeros(0, np.int64), notes=("3 suffice",), **{**more, **values})
+    return Placement(chosen=np.array(chosen), notes=("3 suffice",), **{**more, **values})
 
 
 @pytest.fixture(scope="module")

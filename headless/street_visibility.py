@@ -1,8 +1,11 @@
-"""Synthetic street visibility: junctions, wedges behind buildings, ranges. For tests and measurements."""
+"""Synthetic street visibility, without a scene: junctions, wedges behind buildings, ranges."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from seip_addon.core.placement import PlacementProblem
 
@@ -45,14 +48,14 @@ def street_problem(
     )
 
 
-def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> np.ndarray:
+def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> NDArray[Any]:
     along = rng.uniform(0, extent, number)
     across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + rng.uniform(-half, half, number)
     flip = rng.random(number) < 0.5
     return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
 
 
-def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> np.ndarray:
+def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> NDArray[Any]:
     along = rng.uniform(0, extent, number)
     side = rng.choice([-1.0, 1.0], number) * offset
     across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + side
@@ -60,7 +63,7 @@ def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float
     return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
 
 
-def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> np.ndarray:
+def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> NDArray[Any]:
     boxes = []
     for i in range(blocks + 1):
         for j in range(blocks + 1):
@@ -70,7 +73,7 @@ def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float
     return np.array(boxes)
 
 
-def _hidden(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray, discs: np.ndarray) -> np.ndarray:
+def _hidden(posts: NDArray[Any], points: NDArray[Any], boxes: NDArray[Any], discs: NDArray[Any]) -> NDArray[Any]:
     """Return whether a building or a tree stands between post and point; beyond `SIGHT` everything is hidden."""
     hidden = np.ones((len(posts), len(points)), bool)
     for index, post in enumerate(posts):
@@ -81,7 +84,7 @@ def _hidden(posts: np.ndarray, points: np.ndarray, boxes: np.ndarray, discs: np.
     return hidden
 
 
-def _behind_boxes(step: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+def _behind_boxes(step: NDArray[Any], boxes: NDArray[Any]) -> NDArray[Any]:
     hidden = np.zeros(len(step), bool)
     for box in boxes[(np.minimum(np.abs(boxes[:, :2]), np.abs(boxes[:, 2:])) < SIGHT).all(axis=1)]:
         first, second = box[:2] / step, box[2:] / step
@@ -91,7 +94,7 @@ def _behind_boxes(step: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     return hidden
 
 
-def _behind_discs(step: np.ndarray, discs: np.ndarray) -> np.ndarray:
+def _behind_discs(step: NDArray[Any], discs: NDArray[Any]) -> NDArray[Any]:
     hidden = np.zeros(len(step), bool)
     length = (step**2).sum(axis=1)
     distance = np.hypot(discs[:, 0], discs[:, 1])
