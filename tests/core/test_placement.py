@@ -362,3 +362,19 @@ def test_greedy_states_its_guarantee() -> None:
     assert "one half" in solve_greedy(row_problem(halves, count=2, positions=np.array([0, 0, 1, 1]))).notes[0]
     assert "(1 - 1/e)/2" in solve_greedy(row_problem(halves, budget=12000.0)).notes[0]
     assert "no guarantee" in solve_greedy(row_problem(halves, count=2, min_distance=5.0)).notes[0]
+
+
+@pytest.mark.parametrize("offset", [0.0, 1000.0, 5e6])
+def test_posts_exactly_as_far_apart_as_asked_for_may_both_carry_a_sensor(offset):
+    xyz = np.array([(offset + x, offset, 4.0) for x in (0.0, 0.3, 0.6)])
+    problem = PlacementProblem(
+        visible=np.eye(3, dtype=bool),
+        weights=np.ones(3),
+        prices=np.ones(3),
+        positions=np.arange(3),
+        xyz=xyz,
+        labels=np.full(3, "type1"),
+        count=3,
+        min_distance=0.3,
+    )
+    assert len(finish(solve(problem)).chosen) == 3

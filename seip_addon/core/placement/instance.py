@@ -20,6 +20,9 @@ SINGLE = 2**24
 FINEST = 2**50
 """Total of weights that have no common unit: sums stay exact in double precision, rounding far below `TIE`."""
 
+MICROMETRE = 1e-6
+"""Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
+
 DENOMINATORS = range(1, 13)
 """A common unit of all weights is sought among these parts of the smallest one."""
 
@@ -232,7 +235,7 @@ def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
     conflict: Boolean = positions[:, None] == positions[None, :]
     if min_distance > 0:
         for index, xy in enumerate(xyz[:, :2]):
-            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance
+            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance - MICROMETRE
     np.fill_diagonal(conflict, val=False)
     return conflict
 
