@@ -23,7 +23,8 @@ from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription, read_site_description
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.scene.build import build_scene, save_blend
+from seip_addon.scene.blend_file import check_name, new_file, save_blend
+from seip_addon.scene.build import build_scene
 
 
 def main(argv: list[str]) -> None:
@@ -32,11 +33,10 @@ def main(argv: list[str]) -> None:
     description = _description(asked)
     if description.map is None:
         raise SeipError(f'{asked.source} names no map: add map = "file.xodr" to it, or give the map and --site')
-    if asked.output.suffix != ".blend":
-        raise SeipError(f"{asked.output} is no name for a Blender file; let it end in .blend")
-    model = site_model(read_map(description.map), description)
+    check_name(asked.output)
     with session.progress_bar() as report:
-        finish(build_scene(model, description.map.name), report)
+        model = finish(site_model(read_map(description.map), description), report)
+        finish(build_scene(new_file(), model, description.map.name), report)
     save_blend(asked.output)
     for note in model.notes:
         sys.stdout.write(f"note: {note}\n")

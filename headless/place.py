@@ -40,7 +40,7 @@ def main(argv: list[str]) -> None:
     )
     plan = watch.run("placement", steps)
     run = Run(
-        settings=surveyed.settings | {"goal": asdict(plan.goal)},
+        settings=surveyed.settings | {"goal": asdict(plan.goal), "render": not options.no_render},
         created=datetime.now(UTC),
         durations=watch.seconds,
         versions=versions(blender=bpy.app.version_string),
@@ -82,9 +82,9 @@ def _in_words(plan: Plan) -> str:
         f"sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
         for sensor in deployment.sensors
     ]
-    proven = "proven optimal" if placement.status == "optimal" else f"within {placement.gap:.2%} of the best possible"
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"
-    lines.append(f"coverage {deployment.coverage:.2%}{central}, price ${deployment.price:,.0f}, {proven}")
+    lines.append(f"coverage {deployment.coverage:.2%}{central}, price ${deployment.price:,.0f}")
+    lines.append(plan.certificate)
     if plan.greedy is not None and placement.objective > 0:
         lines.append(
             f"the greedy algorithm reaches {plan.greedy.objective / placement.objective:.2%} of that objective"

@@ -30,6 +30,8 @@ try:
     import pulp  # noqa: F401
     import shapely  # noqa: F401
     from tqdm import tqdm
+
+    from seip_addon.scene.blend_file import open_blend
 except ModuleNotFoundError as error:
     sys.exit(
         f"error: {sys.executable} has no package {error.name!r}: use .venv/bin/python, set up by `make environment`, "
@@ -56,22 +58,6 @@ def arguments(argv: Sequence[str] | None = None) -> list[str]:
     if not in_blender():
         return given[1:]
     return given[given.index("--") + 1 :] if "--" in given else []
-
-
-def open_blend(path: Path) -> None:
-    """Open a .blend, without running scripts that it may carry.
-
-    Raises
-    ------
-    SeipError
-        There is no such file or it is not a .blend.
-    """
-    if not path.is_file():
-        raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
-    except RuntimeError as error:
-        raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
 
 
 def open_scene(path: Path | None) -> None:
@@ -146,19 +132,27 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
     A terminal sees a moving bar, a log file a line every ten seconds. Work
-    that starts anew (a smaller count, another total) gets a bar of its own.
+    that starts anew (a smaller count, another total) gets a bar of its own;
+    work of unknown length shows what it does and for how long.
     """
     bar: tqdm | None = None
+    pause = 0.1 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
 
     def report(progress: Progress) -> None:
         nonlocal bar
-        if bar is None or progress.total != bar.total or progress.done < bar.n:
+        known = progress.total > 0
+        if bar is None or (progress.total or None) != bar.total or (known and progress.done < bar.n):
             if bar is not None:
                 bar.close()
-            pause = 0.1 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
-            bar = tqdm(total=progress.total, file=sys.stderr, mininterval=pause, maxinterval=pause)
+            bar = tqdm(
+                total=progress.total or None,
+                bar_format=None if known else "{desc} [{elapsed}]",
+                file=sys.stderr,
+                mininterval=pause,
+                maxinterval=pause,
+            )
         bar.set_description(progress.what, refresh=False)
-        bar.update(progress.done - bar.n)
+        bar.update(progress.done - bar.n if known else 1)
 
     try:
         yield report

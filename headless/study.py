@@ -15,13 +15,11 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 
-from seip_addon.core.coverage_study import NUMBERS, coverage_study, judge
+from seip_addon.core.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_study, judge
 from seip_addon.core.goal import Goal, check_goal
 from seip_addon.core.pictures.plan_view import save_plan_view
-from seip_addon.core.pictures.study_charts import save_claims, save_height_chart, save_study_table, save_weight_chart
-
-WEIGHT_SHOWN = 4.0
-"""Central weight of the plans that stand beside the vanilla ones."""
+from seip_addon.core.pictures.study_charts import save_height_chart, save_weight_chart
+from seip_addon.core.results.study_tables import save_claims, save_study_table
 
 
 def main(argv: list[str]) -> None:
@@ -34,16 +32,17 @@ def main(argv: list[str]) -> None:
     claims = judge(study)
 
     with session.writing(folder):
-        save_study_table(folder / "coverage.csv", study, site.candidates.height.tolist())
+        save_study_table(folder / "coverage.csv", study)
         save_height_chart(folder / "heights.png", study, site.name)
         weighted = site.targets.central.any()
         if weighted:
             save_weight_chart(folder / "weights.png", study, site.name)
         for sensor in study.sensors:
             for weight in (1.0, WEIGHT_SHOWN) if weighted else (1.0,):
-                case = study.case(sensor, NUMBERS[-1], weight=weight)
-                name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
-                save_plan_view(folder / name, surveyed.geometry, site, case.deployment)
+                case = study.find(sensor, NUMBERS[-1], weight=weight)
+                if case is not None:
+                    name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
+                    save_plan_view(folder / name, surveyed.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
         session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from scenes.alignment import Alignment, Piece, Pose, transition_curve
-from scenes.junctions import Arm, connect, equip
+from scenes.junctions import Arm, End, connect, equip
 from scenes.opendrive_writer import Lane, Map, Neighbour, Repeat, Road, RoadObject, Section
 from scenes.streets import (
     KERB,
@@ -36,6 +36,24 @@ PARKING_PAVEMENT = 4.5  # beside a parking lane 2.2 m of it are given up
 PARKING = 2.2
 
 
+class Stretch(NamedTuple):
+    """A part of the arterial between two stations, with the junctions at its ends and a side for parking."""
+
+    id: str
+    stations: tuple[float, float]
+    heights: tuple[float, float]
+    ends: tuple[str | None, str | None]
+    parking: int = 0
+
+
+STRETCHES = (
+    Stretch("1", (0.0, MILL - 11.0), (-0.6, 0.0), (None, "100")),
+    Stretch("2", (MILL + 11.0, SCHOOL - 10.0), (0.0, 1.6), ("100", "200"), parking=-1),
+    Stretch("3", (SCHOOL + 10.0, STATION - 15.0), (1.6, 0.9), ("200", "300"), parking=1),
+    Stretch("4", (STATION + 15.0, ARTERIAL.length), (0.9, 1.5), ("300", None)),
+)
+
+
 class SideStreet(NamedTuple):
     """A street off the arterial: where, at which angle to it in degrees, and how far from its middle it begins."""
 
@@ -60,58 +78,62 @@ SIDE_STREETS = (
 )
 
 
+class Crossing(NamedTuple):
+    """A junction with its arms, counter-clockwise, and those that have green together."""
+
+    id: str
+    name: str
+    arms: tuple[tuple[str, End], ...]
+    phases: tuple[tuple[int, ...], ...]
+
+
+CROSSINGS = (
+    Crossing(
+        "100",
+        "Mill Lane junction",
+        (("2", "start"), ("11", "start"), ("1", "end"), ("12", "start")),
+        ((0, 2), (1, 3)),
+    ),
+    Crossing("200", "School Street junction", (("3", "start"), ("2", "end"), ("13", "start")), ((0, 1), (2,))),
+    Crossing(
+        "300",
+        "Station Road junction",
+        (("4", "start"), ("14", "start"), ("3", "end"), ("15", "start")),
+        ((0, 2), (1, 3)),
+    ),
+)
+
+
 def corridor_map() -> Map:
     """Return the map; the first junction's centre is the origin."""
-    west = _furnish(_arterial("1", (0.0, MILL - 11.0), (-0.6, 0.0), (None, "100")))
-    middle = _furnish(_arterial("2", (MILL + 11.0, SCHOOL - 10.0), (0.0, 1.6), ("100", "200"), parking=-1))
-    inner = _furnish(_arterial("3", (SCHOOL + 10.0, STATION - 15.0), (1.6, 0.9), ("200", "300"), parking=1))
-    east = _furnish(_arterial("4", (STATION + 15.0, ARTERIAL.length), (0.9, 1.5), ("300", None)))
-    mill_north, mill_south, school, north, south = (_side_street(street) for street in SIDE_STREETS)
-    junctions = (
-        connect(
-            "100",
-            "Mill Lane junction",
-            (Arm(middle, "start"), Arm(mill_north, "start"), Arm(west, "end"), Arm(mill_south, "start")),
-            phases=((0, 2), (1, 3)),
-        ),
-        connect(
-            "200",
-            "School Street junction",
-            (Arm(inner, "start"), Arm(middle, "end"), Arm(school, "start")),
-            phases=((0, 1), (2,)),
-        ),
-        connect(
-            "300",
-            "Station Road junction",
-            (Arm(east, "start"), Arm(north, "start"), Arm(inner, "end"), Arm(south, "start")),
-            phases=((0, 2), (1, 3)),
-        ),
-    )
-    roads = [west, middle, inner, east, mill_north, mill_south, school, north, south]
-    connecting = [road for roads_of_one, _ in junctions for road in roads_of_one]
-    return Map("Arterial corridor", (*roads, *connecting), tuple(junction for _, junction in junctions))
+    stretches = [_furnish(_arterial(stretch)) for stretch in STRETCHES]
+    roads = [*stretches, *(_side_street(street) for street in SIDE_STREETS)]
+    of_id = {road.id: road for road in roads}
+    connecting: list[Road] = []
+    junctions = []
+    for crossing in CROSSINGS:
+        arms = tuple(Arm(of_id[road], contact) for road, contact in crossing.arms)
+        roads_of_one, junction = connect(crossing.id, crossing.name, arms, phases=crossing.phases)
+        connecting += roads_of_one
+        junctions.append(junction)
+    return Map("Arterial corridor", (*roads, *connecting), tuple(junctions))
 
 
-def _arterial(
-    identity: str,
-    stations: tuple[float, float],
-    heights: tuple[float, float],
-    ends: tuple[str | None, str | None],
-    parking: int = 0,
-) -> Road:
-    """Return a stretch of the arterial between two stations, with the junctions at its ends and a parking side."""
-    line = ARTERIAL.cut(*stations)
+def _arterial(stretch: Stretch) -> Road:
+    """Return a stretch of the arterial, ready to meet the junctions at its ends."""
+    line = ARTERIAL.cut(*stretch.stations)
+    before, behind = stretch.ends
     road = Road(
-        identity,
+        stretch.id,
         "High Street",
         line.geometries(),
-        _parking_sections(line.length, parking) if parking else (_arterial_section(0.0, 0),),
-        between(*heights, line.length),
-        predecessor=Neighbour("junction", ends[0]) if ends[0] else None,
-        successor=Neighbour("junction", ends[1]) if ends[1] else None,
+        _parking_sections(line.length, stretch.parking) if stretch.parking else (_arterial_section(0.0, 0),),
+        between(*stretch.heights, line.length),
+        predecessor=Neighbour("junction", before) if before else None,
+        successor=Neighbour("junction", behind) if behind else None,
     )
-    road = equip(road, "start") if ends[0] else road
-    return equip(road, "end") if ends[1] else road
+    road = equip(road, "start") if before else road
+    return equip(road, "end") if behind else road
 
 
 def _arterial_section(start: float, parking: int) -> Section:

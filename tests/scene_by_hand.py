@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 import shapely
 
-from seip_addon.scene import collections as contract
+from seip_addon.scene import contract
+from seip_addon.scene.materials import nodes_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -45,9 +46,7 @@ def _object(name: str, triangles: np.ndarray, colour: tuple[float, float, float]
     mesh.from_pydata(triangles.reshape(-1, 3).tolist(), [], np.arange(3 * len(triangles)).reshape(-1, 3).tolist())
     material = bpy.data.materials.get(f"{colour}") or bpy.data.materials.new(f"{colour}")
     material.diffuse_color = (*colour, 1.0)
-    if material.node_tree is None:
-        material.use_nodes = True
-    for node in material.node_tree.nodes:
+    for node in nodes_of(material):
         if node.type == "BSDF_PRINCIPLED":
             node.inputs["Base Color"].default_value = (*colour, 1.0)
     mesh.materials.append(material)

@@ -10,7 +10,7 @@ from typing import Any
 from headless.measures.alone import alone
 from headless.measures.expense import Expense, peak_memory
 from headless.measures.rivals import ours
-from headless.measures.streets import street_problem
+from headless.street_visibility import street_problem
 
 import numpy as np
 

@@ -14,8 +14,8 @@ from headless.measures.growth import Growth, Scaled, placement_growth, repeated,
 from headless.measures.placement import Run, compare
 from headless.measures.report import Findings
 from headless.measures.rivals import RIVALS, can_run
-from headless.measures.streets import street_problem
 from headless.measures.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
+from headless.street_visibility import street_problem
 
 import numpy as np
 

@@ -11,14 +11,13 @@ from shapely.geometry.base import BaseGeometry
 
 from .arrays import Boolean, Float, Integer, Text
 from .errors import SeipError
-from .scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
-from .targets import surface_height
+from .obstruction import inside_any, post_blocked
+from .pavement_sampling import spread
+from .plan_geometry import outline, surface_height
+from .scene_geometry import NamedArea, Pole, SceneGeometry, joined
 
-_POST_FOOT = 0.3
-"""Metres above the ground from which a post must keep clear: kerbs and plinths are no walls."""
-
-_FINE_STEPS = 8
-"""Fine grid steps per candidate spacing: a strip wider than an eighth of it gets candidates."""
+_ABOVE_POLE = 0.5
+"""Metres that a sensor may hang above the top of its pole, on a short mast."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +53,14 @@ class CandidateSettings:
         if not self.heights:
             raise SeipError("no mounting height is given: name at least one, in metres")
         for height in self.heights:
-            if not (np.isfinite(height) and height > 0):
-                raise SeipError(f"a mounting height must be a positive number of metres, not {height}")
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise SeipError(f"the candidate spacing must be a positive number of metres, not {self.spacing}")
+            if not 0 < height <= 100:
+                raise SeipError(f"a mounting height must be a positive number of metres up to 100, not {height}")
+        if not 0.1 <= self.spacing <= 1000:
+            raise SeipError(f"the candidate spacing must be 0.1 to 1000 m, not {self.spacing}")
         for name in ("setback", "clearance", "bracket"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise SeipError(f"the {name} must be zero or a positive number of metres, not {value}")
+            if not 0 <= value <= 100:
+                raise SeipError(f"the {name} must be 0 to 100 m, not {value}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,20 +131,23 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
         them), or a mandatory place holds none.
     """
     dropped: dict[str, int] = {}
-    foot, axis_offset, name, on_pole = _positions(geometry, settings, dropped)
+    foot, axis_offset, top, name, on_pole = _positions(geometry, settings, dropped)
     heights = np.array(sorted(set(settings.heights)), dtype=np.float64)
     position_of = np.repeat(np.arange(len(foot)), len(heights))
     height = np.tile(heights, len(foot))
     xyz = foot[position_of] + axis_offset[position_of]
     xyz[:, 2] += height
 
-    inside = _inside_any(xyz, geometry.occluders)
+    too_high = height > top[position_of] + _ABOVE_POLE
+    inside = ~too_high
+    inside[inside] = inside_any(xyz[inside], geometry.occluders)
     blocked = np.zeros(len(xyz), dtype=bool)
     post = ~on_pole[position_of] & ~inside
-    blocked[post] = _post_blocked(foot[position_of[post]], height[post], settings.clearance, geometry.occluders)
+    blocked[post] = post_blocked(foot[position_of[post]], height[post], settings.clearance, geometry.occluders)
+    dropped["higher than their pole"] = int(too_high.sum())
     dropped["inside an object"] = int(inside.sum())
     dropped["too close to a wall or object"] = int(blocked.sum())
-    kept = ~inside & ~blocked
+    kept = ~too_high & ~inside & ~blocked
     if not kept.any():
         raise SeipError(_none_left(dropped))
 
@@ -170,21 +172,23 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
 
 def _positions(
     geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]
-) -> tuple[Float, Float, Text, Boolean]:
-    """Foot, offset of the optical axis from it, name and kind of each position, in order of x, y, z."""
+) -> tuple[Float, Float, Float, Text, Boolean]:
+    """Foot, offset of the optical axis from it, top, name and kind of each position, in order of x, y, z."""
     poles = _free_poles(geometry, dropped)
     pole_feet = np.array([pole.base for pole in poles], dtype=np.float64).reshape(-1, 3)
     pavement = _pavement_feet(geometry, settings, pole_feet, dropped)
     foot = np.round(np.concatenate((pavement, pole_feet)), 6)
     offset = np.zeros_like(foot)
+    top = np.full(len(foot), np.inf)
     for row, pole in enumerate(poles, start=len(pavement)):
+        top[row] = np.inf if pole.height is None else pole.height
         offset[row, :2] = settings.bracket * _towards(pole.base[:2], geometry.region)
     on_pole = np.arange(len(foot)) >= len(pavement)
     order = np.lexsort((foot[:, 2], foot[:, 1], foot[:, 0]))
     numbers = iter(range(1, len(pavement) + 1))
     pole_names = [pole.name for pole in poles]
     names = [pole_names[i - len(pavement)] if on_pole[i] else f"sidewalk {next(numbers)}" for i in order]
-    return foot[order], np.round(offset[order], 6), np.array(names, dtype=np.str_), on_pole[order]
+    return foot[order], np.round(offset[order], 6), top[order], np.array(names, dtype=np.str_), on_pole[order]
 
 
 def _free_poles(geometry: SceneGeometry, dropped: dict[str, int]) -> list[Pole]:
@@ -207,7 +211,7 @@ def _pavement_feet(
     area = geometry.candidate_areas
     if area.is_empty:
         return np.empty((0, 3))
-    road = plan_outline(geometry.roads)
+    road = outline(joined(geometry.roads))
     free = area.difference(road.buffer(settings.setback)) if not road.is_empty else area
     if len(poles):
         # A pole that stands there already serves its surroundings.
@@ -217,46 +221,10 @@ def _pavement_feet(
     allowed = ~shapely.intersects_xy(forbidden, plan[:, 0], plan[:, 1])
     dropped["in a forbidden area"] = int((~allowed).sum())
     plan = plan[allowed]
-    surface = np.concatenate([mesh.triangles for mesh in (*geometry.ground, *geometry.roads)])
-    height = surface_height(plan, surface)
+    height = surface_height(plan, joined((*geometry.ground, *geometry.roads)))
     supported = np.isfinite(height)
     dropped["over no ground"] = int((~supported).sum())
     return np.column_stack((plan[supported], height[supported]))
-
-
-def spread(area: BaseGeometry, spacing: float) -> Float:
-    """Spread points over an area, none closer than ``spacing`` and no room left for another.
-
-    A maximal Poisson-disc sample drawn from a fine grid in order of x, then y:
-    deterministic, uniform on wide areas, and evenly spaced along narrow strips,
-    which a plain grid of that spacing would hit or miss by chance.
-
-    Parameters
-    ----------
-    area : shapely geometry
-        In plan, metres.
-    spacing : float, metres
-
-    Returns
-    -------
-    (n, 2) float64, metres
-    """
-    if area.is_empty:
-        return np.empty((0, 2))
-    step = spacing / _FINE_STEPS
-    low_x, low_y, high_x, high_y = area.bounds
-    axes = (np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))
-    x, y = (values.ravel() for values in np.meshgrid(*axes, indexing="ij"))
-    shapely.prepare(area)
-    inside = shapely.intersects_xy(area, x, y)
-    fine = np.column_stack((x[inside], y[inside]))
-    taken = []
-    free = np.ones(len(fine), dtype=bool)
-    while free.any():
-        point = fine[np.argmax(free)]
-        taken.append(point)
-        free &= np.hypot(*(fine - point).T) >= spacing * (1 - 1e-9)
-    return np.array(taken).reshape(-1, 2)
 
 
 def _towards(point: Float, region: BaseGeometry) -> Float:
@@ -270,64 +238,6 @@ def _towards(point: Float, region: BaseGeometry) -> Float:
     return way / length if length > 0 else np.array((1.0, 0.0))
 
 
-def _inside_any(points: Float, meshes: Sequence[Mesh]) -> Boolean:
-    """Whether each point lies inside some object, by its winding number."""
-    inside = np.zeros(len(points), dtype=bool)
-    for mesh in meshes:
-        if not len(mesh.triangles):
-            continue
-        low, high = mesh.triangles.min(axis=(0, 1)), mesh.triangles.max(axis=(0, 1))
-        near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1) & ~inside)
-        inside[near] = np.abs(winding_number(points[near], mesh.triangles)) > 0.5
-    return inside
-
-
-def winding_number(points: Float, triangles: Float) -> Float:
-    """Generalised winding number of a triangle soup: 1 (or −1) inside, 0 outside, between where it is open.
-
-    Parameters
-    ----------
-    points : (n, 3) float64, metres
-    triangles : (m, 3, 3) float64, metres
-
-    Returns
-    -------
-    (n,) float64
-
-    Notes
-    -----
-    Solid angle of a triangle after van Oosterom and Strackee (1983); as a test
-    for open and messy meshes Jacobson et al. (2013).
-    """
-    total = np.zeros(len(points))
-    for row, point in enumerate(points):
-        a, b, c = np.moveaxis(triangles - point, 1, 0)
-        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-        dots = (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
-        total[row] = np.arctan2(volume, la * lb * lc + dots).sum() / (2 * np.pi)
-    return total
-
-
-def _post_blocked(foot: Float, height: Float, clearance: float, meshes: Sequence[Mesh]) -> Boolean:
-    """Whether a post with its sensor comes closer than ``clearance`` to an object.
-
-    A triangle counts when it is that close in plan and its span of heights
-    meets the post's: on the safe side for leaning faces.
-    """
-    blocked = np.zeros(len(foot), dtype=bool)
-    triangles = np.concatenate([mesh.triangles for mesh in meshes]) if meshes else np.empty((0, 3, 3))
-    if not len(foot) or not len(triangles):
-        return blocked
-    low, high = triangles[:, :, 2].min(axis=1), triangles[:, :, 2].max(axis=1)
-    corners = shapely.points(triangles[:, :, :2])
-    tree = shapely.STRtree(shapely.convex_hull(shapely.multipoints(corners)))
-    post, triangle = tree.query(shapely.points(foot[:, :2]), predicate="dwithin", distance=clearance)
-    meets = (low[triangle] < foot[post, 2] + height[post] + clearance) & (high[triangle] > foot[post, 2] + _POST_FOOT)
-    blocked[post[meets]] = True
-    return blocked
-
-
 def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[tuple[str, Boolean]]:
     groups = []
     for pole in geometry.poles:
@@ -339,19 +249,9 @@ def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[
         if not row.any():
             raise SeipError(
                 f"{title!r} must carry a sensor but holds no candidate position: "
-                "enlarge it, or free it of forbidden areas and obstacles"
+                "enlarge it, free it of forbidden areas and obstacles, or ask for lower heights"
             )
     return groups
-
-
-def plan_outline(meshes: Sequence[Mesh]) -> BaseGeometry:
-    """Union of the meshes' triangles in plan, to a millimetre."""
-    triangles = [mesh.triangles[:, :, :2] for mesh in meshes]
-    corners = np.concatenate(triangles) if triangles else np.empty((0, 3, 2))
-    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0])
-    rings = corners[area > 1e-9][:, [0, 1, 2, 0]]
-    return shapely.union_all(shapely.polygons(rings), grid_size=1e-3)
 
 
 def _union(areas: Sequence[NamedArea]) -> BaseGeometry:

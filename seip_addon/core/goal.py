@@ -97,6 +97,14 @@ class Plan:
     greedy: Placement | None
     deployment: Deployment
 
+    @property
+    def certificate(self) -> str:
+        """How good the placement provably is, as a sentence."""
+        best = "cheapest" if self.goal.cheapest else "best"
+        if self.placement.status == "optimal":
+            return f"Proven: the {best} placement that there is among these candidates."
+        return f"Within {self.placement.gap:.2%} of the {best} placement possible among these candidates."
+
 
 def target_weights(site: Site, goal: Goal) -> NDArray[np.float64]:
     """Weight of each target under a goal, (t,) float64."""
@@ -148,7 +156,7 @@ def placement_problem(
         mandatory=groups[:, candidates.position_of],
         mandatory_names=np.concatenate((candidates.mandatory_name, np.array(goal.mandatory, dtype=np.str_))),
         forbidden=forbidden[candidates.position_of],
-        count=_with_count(goal).count,
+        count=_with_count(goal, site).count,
         budget=goal.budget,
         min_distance=goal.min_distance,
     )
@@ -203,13 +211,13 @@ def make_plan(  # a place, what is asked of it, and how hard to try
     else:
         placement = yield from solve(problem, solver=solver, time_limit=time_limit)
         greedy = solve_greedy(problem)
-    return Plan(_with_count(goal), placement, greedy, deploy(site, models, visible, placement.chosen))
+    return Plan(_with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
 
 
-def _with_count(goal: Goal) -> Goal:
+def _with_count(goal: Goal, site: Site) -> Goal:
     """Fill in the number of sensors where nothing is asked for that limits it."""
     free = goal.count is None and goal.budget is None and goal.coverage is None
-    return replace(goal, count=DEFAULT_COUNT) if free else goal
+    return replace(goal, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else goal
 
 
 def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:

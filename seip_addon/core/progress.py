@@ -7,11 +7,16 @@ exhausts them with `finish`.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Generator
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TypeVar
 
 Result = TypeVar("Result")
+
+PAUSE = 0.1
+"""Seconds between the reports of work in a thread."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,7 @@ class Progress:
     Parameters
     ----------
     done, total : int
-        Finished and all units of work, ``0 <= done <= total``.
+        Finished and all units of work, ``0 <= done <= total``; a total of 0 means that it is not known.
     what : str
         What is being worked on, for the person who waits.
     """
@@ -52,3 +57,38 @@ def within(whole: Progress, steps: Generator[Progress, None, Result]) -> Generat
             result: Result = stop.value
             return result
         yield whole
+
+
+def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator[Progress, None, Result]:
+    """Run work that cannot yield, such as a call of a library, in a thread of its own.
+
+    Parameters
+    ----------
+    work : callable
+        Called with an event; once that is set nobody waits for the result, and the sooner it returns the better.
+    what : str
+        What is being worked on.
+
+    Yields
+    ------
+    Progress
+        Ten times a second.
+    """
+    stop = threading.Event()
+    result: Future[Result] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(work(stop))
+        except BaseException as error:  # noqa: BLE001 -- raised again where the result is asked for
+            result.set_exception(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(PAUSE)
+            yield Progress(0, 0, what)
+        return result.result()
+    finally:
+        stop.set()

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from .arrays import Float
+
+DEFAULT_WEIGHT = 2.0
+"""Of a weighted region that does not say its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,11 @@ class Mesh:
     triangles: Float
 
 
+def joined(meshes: Sequence[Mesh]) -> Float:
+    """Return the triangles (n, 3, 3) of all meshes."""
+    return np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
+
+
 @dataclass(frozen=True, eq=False)
 class Pole:
     """A post that can carry a sensor.
@@ -36,12 +46,15 @@ class Pole:
         The object's name.
     base : (3,) float64, metres
         Foot of the post, local site axes.
+    height : float or None, metres
+        Top of the post above its foot; None where that is not known, and any height will do.
     forbidden, mandatory : bool
         No sensor may hang here; at least one sensor must.
     """
 
     name: str
     base: Float
+    height: float | None = None
     forbidden: bool = False
     mandatory: bool = False
 

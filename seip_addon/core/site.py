@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from .arrays import Float
 from .candidates import Candidates, CandidateSettings, lay_candidates
 from .errors import SeipError
-from .scene_geometry import SceneGeometry
+from .scene_geometry import SceneGeometry, joined
 from .targets import Targets, lay_targets
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]
@@ -64,15 +64,15 @@ def make_site(geometry: SceneGeometry, settings: CandidateSettings, grid_spacing
     """
     if not geometry.roads:
         raise SeipError("there is no road: put the meshes of the carriageway into SEIP Roads")
-    road = np.concatenate([mesh.triangles for mesh in geometry.roads])
-    meshes = (*geometry.roads, *geometry.ground, *geometry.occluders)
+    road = joined(geometry.roads)
+    everything = joined((*geometry.roads, *geometry.ground, *geometry.occluders))
     return Site(
         name=geometry.name,
         origin=geometry.origin,
         region=geometry.region,
         targets=lay_targets(geometry.region, road, grid_spacing, geometry.weighted_regions),
         candidates=lay_candidates(geometry, settings),
-        triangles=_in_order(np.concatenate([mesh.triangles for mesh in meshes])),
+        triangles=_in_order(everything),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import tempfile
 from collections.abc import Iterator
@@ -51,6 +52,21 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise _unwritable(target, error) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def save_json(path: str | os.PathLike[str], value: object) -> None:
+    """Write a value as JSON for people and programs: indented, UTF-8, and without NaN or infinity.
+
+    Raises
+    ------
+    ValueError
+        The value holds a number that is not finite: JSON has no sign for it.
+    SeipError
+        The folder or the file cannot be written.
+    """
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    with whole_file(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:

@@ -12,16 +12,14 @@ from shapely.geometry.base import BaseGeometry
 
 from .arrays import Float
 from .errors import SeipError
+from .plan_geometry import surface_height
 from .scene_geometry import NamedArea
 
 MAX_TARGETS = 2_000_000
 """A grid beyond this is a slip of the keyboard, not a plan."""
 
-_FLAT = 1e-9
-"""Square metres in plan below which a triangle stands on edge and carries nothing."""
-
-_SEAM = 1e-6
-"""Slack in barycentric coordinates, so that no point falls between two triangles."""
+FINEST, WIDEST = 0.01, 1000.0
+"""Metres between which a spacing makes sense."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +79,8 @@ def lay_targets(
         The spacing is not positive or far too small, the region is empty, or
         no grid point lies on the road inside it.
     """
-    if not (np.isfinite(spacing) and spacing > 0):
-        raise SeipError(f"the grid spacing must be a positive number of metres, not {spacing}")
+    if not FINEST <= spacing <= WIDEST:
+        raise SeipError(f"the grid spacing must be {FINEST:g} to {WIDEST:g} m, not {spacing}")
     if region.is_empty:
         raise SeipError("the region of interest is empty: put a mesh over the road into SEIP Region")
     plan = _grid(region, spacing)
@@ -108,7 +106,8 @@ def lay_targets(
 
 def _grid(region: BaseGeometry, spacing: float) -> Float:
     low_x, low_y, high_x, high_y = region.bounds
-    counts = [int(np.floor(side / spacing)) + 1 for side in (high_x - low_x, high_y - low_y)]
+    sides = (high_x - low_x, high_y - low_y)
+    counts = [max(1, int(np.floor(side / spacing + 1e-6))) for side in sides]  # whole cells, targets in their middles
     if counts[0] * counts[1] > 50 * MAX_TARGETS or region.area / spacing**2 > MAX_TARGETS:
         raise SeipError(
             f"a grid of {spacing:g} m would lay about {region.area / spacing**2:.3g} targets in the region; "
@@ -122,34 +121,3 @@ def _grid(region: BaseGeometry, spacing: float) -> Float:
     shapely.prepare(region)
     inside = shapely.intersects_xy(region, x, y)
     return np.column_stack((x[inside], y[inside]))
-
-
-def surface_height(plan: Float, triangles: Float) -> Float:
-    """Height of the highest surface over each plan point.
-
-    Parameters
-    ----------
-    plan : (n, 2) float64, metres
-    triangles : (m, 3, 3) float64, metres
-
-    Returns
-    -------
-    (n,) float64, metres
-        NaN where no triangle lies over or under the point.
-    """
-    height = np.full(len(plan), -np.inf)
-    corner, along, across = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
-    level = np.flatnonzero(np.abs(area) > _FLAT)
-    low, high = triangles[level, :, :2].min(axis=1), triangles[level, :, :2].max(axis=1)
-    tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
-    point, box = tree.query(shapely.points(plan), predicate="intersects")
-    t = level[box]
-    offset = plan[point] - corner[t, :2]
-    u = (offset[:, 0] * across[t, 1] - offset[:, 1] * across[t, 0]) / area[t]
-    v = (along[t, 0] * offset[:, 1] - along[t, 1] * offset[:, 0]) / area[t]
-    inside = (u >= -_SEAM) & (v >= -_SEAM) & (u + v <= 1 + _SEAM)
-    z = corner[t, 2] + u * along[t, 2] + v * across[t, 2]
-    np.maximum.at(height, point[inside], z[inside])
-    height[np.isneginf(height)] = np.nan
-    return height

@@ -1,8 +1,10 @@
-"""Sober materials for a street: one colour each, for renders and for the viewport."""
+"""Sober materials for a street and its sensors: one colour each, for renders and for the viewport."""
 
 from __future__ import annotations
 
 import bpy
+
+from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_WORDS
 
 PREFIX = "SEIP "
 VIEWPORT_GAMMA = 0.65  # the viewport's studio light is dimmer than the sun
@@ -45,20 +47,46 @@ VEIL_OPACITY = 0.25
 
 ROUGHNESS = {"glass": 0.15, "steel": 0.4}
 
+RESULT_COLOURS = {"sensor": "#f2c230", "post": INK, **dict(zip(SEEN_WORDS, SEEN_COLOURS, strict=True))}
+"""Web colour of each material of a result: matt, and the same in the viewport and in the legends of pictures."""
+
 
 def material(name: str) -> bpy.types.Material:
     """Return the material of that name, made where the file has none yet."""
     existing = bpy.data.materials.get(PREFIX + name)
     if existing is not None:
         return existing
-    made = bpy.data.materials.new(PREFIX + name)
-    colour = (*COLOURS[name], 1.0)
+    if name in RESULT_COLOURS:
+        colour = linear(RESULT_COLOURS[name])
+        return _made(name, colour, colour, roughness=1.0, specular=0.0)
     opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
-    made.diffuse_color = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
-    made.roughness = ROUGHNESS.get(name, 0.9)
-    if made.node_tree is None:  # from Blender 5.0 on nodes are always there
-        made.use_nodes = True
-    surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shown = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
+    return _made(name, (*COLOURS[name], 1.0), shown, roughness=ROUGHNESS.get(name, 0.9), specular=0.5)
+
+
+def linear(colour: str) -> tuple[float, float, float, float]:
+    """Return a web colour (sRGB) as Blender's linear RGBA (IEC 61966-2-1)."""
+    srgb = [int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)
+    return red, green, blue, 1.0
+
+
+def nodes_of(owner: bpy.types.Material | bpy.types.World) -> bpy.types.Nodes:
+    """Return the shader nodes of a material or world, the default ones where it had none."""
+    if owner.node_tree is None:  # from Blender 5.0 on nodes are always there
+        owner.use_nodes = True
+    return owner.node_tree.nodes
+
+
+def _made(
+    name: str, colour: tuple[float, ...], shown: tuple[float, ...], *, roughness: float, specular: float
+) -> bpy.types.Material:
+    """Return a new material with its colour in renders and the one that the viewport shows."""
+    made = bpy.data.materials.new(PREFIX + name)
+    made.diffuse_color = shown
+    made.roughness = roughness
+    surface = next(node for node in nodes_of(made) if node.type == "BSDF_PRINCIPLED")
     surface.inputs["Base Color"].default_value = colour
-    surface.inputs["Roughness"].default_value = made.roughness
+    surface.inputs["Roughness"].default_value = roughness
+    surface.inputs["Specular IOR Level"].default_value = specular
     return made

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ..core.arrays import Float
-from ..core.candidates import plan_outline
 from ..core.errors import SeipError
-from ..core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
-from . import collections as names
+from ..core.plan_geometry import outline
+from ..core.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
+from . import contract
+
+SHAFT_REACH = 0.5
+"""Of a pole's faces those within this (metres, in plan) of its foot are its shaft: arms may rise above it."""
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 """Types of object that Blender can turn into faces."""
@@ -35,10 +39,16 @@ class SceneReading:
 
 
 @dataclass(frozen=True)
-class _Part:
-    """One object or instance as the viewport shows it."""
+class _Shown:
+    """One object or instance as the viewport shows it.
+
+    ``source`` is what the user put into the scene: the object or what instances
+    it. ``own`` are the collections that the object itself is in, ``collections``
+    these and those of its source.
+    """
 
     name: str
+    own: frozenset[str]
     collections: frozenset[str]
     matrix: Float
     triangles: Float | None
@@ -65,63 +75,70 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
         The region or the road is missing; an object that must have faces has
         none, has a coordinate that is no number, or has no area at all.
     """
-    members = _members()
-    parts = list(_parts(scene, members))
-    region = plan_outline(_meshes(parts, names.REGION))
+    members = contract.members(scene)
+    _require_libraries(scene, members)
+    parts = list(_shown(scene, members))
+    region = outline(joined(_meshes(parts, contract.REGION)))
     if region.is_empty:
         raise SeipError(
             f"scene {scene.name!r} has no region of interest: "
-            f"put a mesh that covers the road to be watched into the collection {names.REGION!r}"
+            f"put a mesh that covers the road to be watched into the collection {contract.REGION!r}"
         )
-    roads = _meshes(parts, names.ROADS)
+    roads = _meshes(parts, contract.ROADS)
     if not roads:
         raise SeipError(
-            f"scene {scene.name!r} has no road: put the meshes of the carriageway into the collection {names.ROADS!r}"
+            f"scene {scene.name!r} has no road: "
+            f"put the meshes of the carriageway into the collection {contract.ROADS!r}"
         )
     # An object that lies in several collections is cast against once.
-    taken = {id(part) for part in parts if names.ROADS in part.collections}
-    ground = _meshes([p for p in parts if id(p) not in taken], names.GROUND)
-    taken |= {id(part) for part in parts if names.GROUND in part.collections}
+    taken = {id(part) for part in parts if contract.ROADS in part.collections}
+    ground = _meshes([p for p in parts if id(p) not in taken], contract.GROUND)
+    taken |= {id(part) for part in parts if contract.GROUND in part.collections}
     free = [part for part in parts if id(part) not in taken]
-    poles_with_faces = [p for p in free if names.OCCLUDERS not in p.collections and p.triangles is not None]
+    poles_with_faces = [p for p in free if contract.OCCLUDERS not in p.collections and p.triangles is not None]
     geometry = SceneGeometry(
-        name=str(scene.get(names.TITLE, scene.name)),
+        name=str(scene.get(contract.TITLE, scene.name)),
         origin=_origin(scene),
         roads=roads,
         ground=ground,
-        occluders=_meshes(free, names.OCCLUDERS) + _meshes(poles_with_faces, names.POLES),
+        occluders=_meshes(free, contract.OCCLUDERS) + _meshes(poles_with_faces, contract.POLES),
         region=region,
-        candidate_areas=plan_outline(_meshes(parts, names.CANDIDATE_AREAS)),
-        weighted_regions=_areas(parts, names.WEIGHTED_REGIONS),
-        forbidden_areas=_areas(parts, names.FORBIDDEN_AREAS),
-        mandatory_areas=_areas(parts, names.MANDATORY_AREAS),
+        candidate_areas=outline(joined(_meshes(parts, contract.CANDIDATE_AREAS))),
+        weighted_regions=_areas(parts, contract.WEIGHTED_REGIONS),
+        forbidden_areas=_areas(parts, contract.FORBIDDEN_AREAS),
+        mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
         poles=_poles(parts),
     )
     return SceneReading(geometry, _hidden(scene, members))
 
 
-def _members() -> dict[str, set[bpy.types.Object]]:
-    """Objects of each collection of the contract; linked collections may share a name with local ones."""
-    members: dict[str, set[bpy.types.Object]] = {name: set() for name in names.INPUTS}
-    for collection in bpy.data.collections:
-        if collection.name in members:
-            members[collection.name].update(collection.all_objects)
-    return members
+def _require_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> None:
+    """Refuse a scene that lacks a library: Blender shows nothing, or placeholders, in its place."""
+    objects = set().union(*members.values())
+    instanced = {item.instance_collection for item in objects if item.instance_collection is not None}
+    objects.update(*(collection.all_objects for collection in instanced))
+    data = {item.data for item in objects if item.data is not None}
+    for thing in (*scene.collection.children_recursive, *instanced, *objects, *data):
+        library = thing.library
+        if library is not None and not Path(bpy.path.abspath(library.filepath)).is_file():
+            raise SeipError(
+                f"{thing.name!r} is linked from {library.filepath}, which is not there: "
+                "bring the file back, relocate the library, or delete what is linked from it"
+            )
 
 
-def _parts(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[_Part]:
+def _shown(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[_Shown]:
     depsgraph = _depsgraph(scene)
     faces: dict[int, Float | None] = {}
     counts: dict[str, int] = {}
     for instance in depsgraph.object_instances:
         shown = instance.object
-        owners = [shown.original]
-        if instance.is_instance:
-            owners.append(instance.parent.original)
-        found = frozenset(name for name, objects in members.items() if not objects.isdisjoint(owners))
+        source = instance.parent.original if instance.is_instance else shown.original
+        own = frozenset(name for name, objects in members.items() if shown.original in objects)
+        found = own | {name for name, objects in members.items() if source in objects}
         if not found or (not instance.is_instance and not instance.show_self):
             continue
-        name = owners[-1].name
+        name = source.name
         if instance.is_instance:
             counts[name] = counts.get(name, 0) + 1
             name = f"{name} {counts[name]}"
@@ -133,7 +150,7 @@ def _parts(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) ->
                 faces[key] = _local_triangles(shown)
             local = faces[key]
         matrix = np.array(instance.matrix_world, dtype=np.float64)
-        yield _Part(name, found, matrix, None if local is None else _place(local, matrix, name), owners[-1])
+        yield _Shown(name, own, found, matrix, None if local is None else _place(local, matrix, name), source)
 
 
 def _depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
@@ -171,7 +188,7 @@ def _place(local: Float, matrix: Float, name: str) -> Float:
     return kept
 
 
-def _meshes(parts: list[_Part], collection: str) -> tuple[Mesh, ...]:
+def _meshes(parts: list[_Shown], collection: str) -> tuple[Mesh, ...]:
     meshes = []
     instancers = {part.source for part in parts if part.triangles is not None}
     for part in parts:
@@ -179,46 +196,68 @@ def _meshes(parts: list[_Part], collection: str) -> tuple[Mesh, ...]:
             continue
         if part.triangles is not None:
             meshes.append(Mesh(part.name, part.triangles))
-        elif part.source not in instancers and collection != names.POLES:
+        elif part.source not in instancers and collection != contract.POLES:
             raise SeipError(
                 f"object {part.name!r} in {collection!r} has no mesh: give it faces or take it out of the collection"
             )
     return tuple(meshes)
 
 
-def _areas(parts: list[_Part], collection: str) -> tuple[NamedArea, ...]:
+def _areas(parts: list[_Shown], collection: str) -> tuple[NamedArea, ...]:
     areas = []
     for part in parts:
         if collection in part.collections:
             (mesh,) = _meshes([part], collection)
-            outline = plan_outline([mesh])
-            if outline.is_empty:
+            plan = outline(mesh.triangles)
+            if plan.is_empty:
                 raise SeipError(f"object {part.name!r} in {collection!r} covers no area in plan: lay it flat")
-            areas.append(NamedArea(part.name, outline, _weight(part)))
+            areas.append(NamedArea(part.name, plan, _weight(part)))
     return tuple(areas)
 
 
-def _weight(part: _Part) -> float:
-    weight = part.source.get(names.WEIGHT, names.DEFAULT_WEIGHT)
+def _weight(part: _Shown) -> float:
+    weight = part.source.get(contract.WEIGHT, DEFAULT_WEIGHT)
     if isinstance(weight, bool) or not isinstance(weight, int | float):
-        raise SeipError(f"property {names.WEIGHT} of object {part.name!r} must be a number, not {weight!r}")
+        raise SeipError(f"property {contract.WEIGHT} of object {part.name!r} must be a number, not {weight!r}")
     return float(weight)
 
 
-def _poles(parts: list[_Part]) -> tuple[Pole, ...]:
+def _poles(parts: list[_Shown]) -> tuple[Pole, ...]:
+    """Return one pole for each member that stands in the scene.
+
+    A collection instance that is a member is one pole at its own foot,
+    whatever it is made of. What merely scatters posts, and shows no face of
+    its own, is none.
+    """
+    members = [part for part in parts if contract.POLES in part.collections]
+    pieces = [part for part in members if contract.POLES not in part.own]
+    scattered = [part for part in pieces if part.source.instance_type != "COLLECTION"]
+    scatterers = {part.source for part in scattered}
+    whole = [p for p in members if contract.POLES in p.own and (p.triangles is not None or p.source not in scatterers)]
     return tuple(
         Pole(
             part.name,
             _finite_foot(part),
-            forbidden=bool(part.source.get(names.FORBIDDEN, False)),
-            mandatory=bool(part.source.get(names.MANDATORY, False)),
+            _height(part, pieces),
+            forbidden=bool(part.source.get(contract.FORBIDDEN, False)),
+            mandatory=bool(part.source.get(contract.MANDATORY, False)),
         )
-        for part in parts
-        if names.POLES in part.collections
+        for part in (*whole, *scattered)
     )
 
 
-def _finite_foot(part: _Part) -> Float:
+def _height(pole: _Shown, pieces: list[_Shown]) -> float | None:
+    """Return how far the shaft reaches above the foot, or None where there are no faces to tell."""
+    made_of = [pole] if pole.triangles is not None else [part for part in pieces if part.source == pole.source]
+    corners = [part.triangles.reshape(-1, 3) for part in made_of if part.triangles is not None]
+    if not corners:
+        return None
+    above = np.concatenate(corners) - pole.matrix[:3, 3]
+    near = np.hypot(above[:, 0], above[:, 1]) <= SHAFT_REACH
+    return float(above[near if near.any() else slice(None), 2].max())
+
+
+def _finite_foot(part: _Shown) -> Float:
     foot: Float = part.matrix[:3, 3]
     if not np.isfinite(foot).all():
         raise SeipError(f"pole {part.name!r} stands at a place that is no finite number: set its location")
@@ -226,13 +265,13 @@ def _finite_foot(part: _Part) -> Float:
 
 
 def _origin(scene: bpy.types.Scene) -> Float:
-    stored = scene.get(names.ORIGIN, (0.0, 0.0, 0.0))
+    stored = scene.get(contract.ORIGIN, (0.0, 0.0, 0.0))
     try:
-        values = [float(value) for value in stored]
-    except TypeError:
+        values = [] if isinstance(stored, str) else [float(value) for value in stored]
+    except (TypeError, ValueError):
         values = []
     if len(values) != 3 or not all(map(math.isfinite, values)):
-        raise SeipError(f"scene property {names.ORIGIN} must be three finite numbers (metres), not {stored!r}")
+        raise SeipError(f"scene property {contract.ORIGIN} must be three finite numbers (metres), not {stored!r}")
     return np.array(values)
 
 

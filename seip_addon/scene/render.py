@@ -6,9 +6,9 @@ import math
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -17,14 +17,11 @@ from mathutils import Matrix, Vector
 from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
-from . import collections as contract
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from ..core.results.deployment import Deployment
-    from ..core.site import Site
-
+from ..core.results.deployment import Deployment
+from ..core.site import Site
+from . import contract
+from .daylight import add_daylight
+from .interrupts import held_interrupts
 
 WIDTH, HEIGHT = 1440, 810  # pixels
 SAMPLES = 12
@@ -32,14 +29,6 @@ AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, 
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
-SUN_DIRECTION = (math.radians(38.0), math.radians(-18.0), math.radians(20.0))
-AREAS = {
-    contract.REGION,
-    contract.CANDIDATE_AREAS,
-    contract.WEIGHTED_REGIONS,
-    contract.FORBIDDEN_AREAS,
-    contract.MANDATORY_AREAS,
-}
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
 
 
@@ -66,9 +55,9 @@ def save_rendered_view(
     with tempfile.TemporaryDirectory(prefix="seip-") as folder, _stage(scene) as stage:
         raw = Path(folder) / "view.png"
         viewpoint = _add_camera(stage, site)
-        _add_light(stage)
+        add_daylight(stage, stage.collection)
         _set_up(stage, raw)
-        with _silence():
+        with _silence(), held_interrupts():
             bpy.ops.render.render(scene=stage.name, write_still=True)
         sight = _sight(stage, viewpoint, site, deployment)
         save_labelled_view(path, raw, site, deployment, sight)
@@ -111,7 +100,7 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     layers = [scene.view_layers[0].layer_collection]
     while layers:
         layer = layers.pop()
-        if layer.exclude or layer.collection.hide_render or layer.collection.name in AREAS:
+        if layer.exclude or layer.collection.hide_render or contract.kind(layer.collection) in contract.AREAS:
             continue
         layers.extend(layer.children)
         found |= {thing.name_full: thing for thing in layer.collection.objects}
@@ -133,25 +122,6 @@ def _add_camera(stage: bpy.types.Scene, site: Site) -> Viewpoint:
     stage.collection.objects.link(camera)
     stage.camera = camera
     return Viewpoint(tight.place, tight.axes, slopes)
-
-
-def _add_light(stage: bpy.types.Scene) -> None:
-    sun = bpy.data.lights.new("SEIP view", "SUN")
-    sun.energy = 2.3
-    sun.angle = math.radians(3.0)
-    lamp = bpy.data.objects.new("SEIP view sun", sun)
-    lamp.rotation_euler = SUN_DIRECTION
-    stage.collection.objects.link(lamp)
-    world = bpy.data.worlds.new("SEIP view")
-    if world.node_tree is None:
-        world.use_nodes = True
-    nodes = world.node_tree.nodes
-    nodes.clear()
-    sky = nodes.new("ShaderNodeBackground")
-    sky.inputs["Color"].default_value = (0.80, 0.88, 1.0, 1.0)
-    sky.inputs["Strength"].default_value = 0.42
-    world.node_tree.links.new(sky.outputs["Background"], nodes.new("ShaderNodeOutputWorld").inputs["Surface"])
-    stage.world = world
 
 
 def _set_up(stage: bpy.types.Scene, raw: Path) -> None:

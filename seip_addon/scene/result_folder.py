@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import bpy
@@ -16,7 +16,7 @@ from ..core.results.carla import save_carla_spawns
 from ..core.results.placement_record import Record, save_placement_record
 from ..core.scene_geometry import SceneGeometry
 from ..core.site import Site
-from .build import save_blend
+from .blend_file import save_blend
 from .render import save_rendered_view
 from .write import write_result
 
@@ -61,9 +61,16 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     deployment = plan.deployment
     save_candidate_table(folder / "candidates.csv", site, models, visible, deployment)
     save_carla_spawns(folder / "carla_spawn.json", deployment, site.origin)
-    save_plan_view(folder / "plan.png", geometry, site, deployment)
+    save_plan_view(folder / "plan.png", geometry, site, deployment, _notes(plan, record["warnings"], models))
     write_result(scene, site, deployment)
     save_blend(folder / "placed.blend")
     if render:
         save_rendered_view(folder / "view.png", scene, site, deployment)
     save_placement_record(folder / "placement.json", record)
+
+
+def _notes(plan: Plan, warnings: Sequence[str], models: Mapping[str, LidarModel]) -> list[str]:
+    """Return what the plan's reader should know: its certificate, and warnings but those of types not chosen."""
+    used = {sensor.model.key for sensor in plan.deployment.sensors}
+    others = set(models) - used
+    return [plan.certificate, *(warning for warning in warnings if warning.partition(":")[0] not in others)]

@@ -1,6 +1,6 @@
 """Small OpenDRIVE files as text, for the tests of the reader."""
 
-from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive import lane_surfaces, read_map
 
 
 def lane(number, width=3.5, kind="driving", inside="", level="false"):
@@ -44,3 +44,8 @@ def read_text(folder, text, name="map.xodr"):
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return read_map(path)
+
+
+def map_lanes(road_map, **options):
+    """All lanes of a map in the order of the file."""
+    return tuple(lane for each in road_map.roads for lane in lane_surfaces(each, **options))

@@ -26,7 +26,10 @@ def small_problems(draw: st.DrawFn, *, limits: bool = True, seen: bool = True) -
         visible[0, 0], weights[0] = True, 1.0
     groups = draw(st.integers(0, 2)) if limits else 0
     mandatory = rng.random((groups, number)) < 0.4
-    mandatory[:, 0] = True
+    mandatory[~(mandatory & ~forbidden).any(axis=1), 0] = True
+    if seen and draw(st.booleans()):
+        visible[mandatory.any(axis=0)] = False  # mandatory poses that see nothing, but for the first
+        visible[0, 0] = True
     places = len(np.unique(positions[~forbidden]))
     return PlacementProblem(
         visible=visible,

@@ -8,8 +8,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.candidates import CandidateSettings, lay_candidates, spread, winding_number
+from seip_addon.core.candidates import CandidateSettings, lay_candidates
 from seip_addon.core.errors import SeipError
+from seip_addon.core.obstruction import winding_number
+from seip_addon.core.pavement_sampling import spread
 from seip_addon.core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 
 PLAIN = CandidateSettings(sensors=("type1",), heights=(3.5, 8.0), spacing=4.0)
@@ -92,6 +94,17 @@ def test_a_pole_serves_its_surroundings():
     assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
 
 
+def test_no_sensor_hangs_above_its_pole():
+    poles = (Pole("low", np.array((0.0, 9.0, 0.1)), 6.0), Pole("mark", np.array((20.0, 9.0, 0.1))))
+    candidates = lay_candidates(
+        street(candidate_areas=shapely.Polygon(), poles=poles), replace(PLAIN, heights=(3.5, 6.5, 6.6, 8.0))
+    )
+    heights = {name: candidates.height[candidates.position_of == i] for i, name in enumerate(candidates.position_name)}
+    assert heights["low"].tolist() == [3.5, 6.5]
+    assert heights["mark"].tolist() == [3.5, 6.5, 6.6, 8.0]
+    assert candidates.dropped["higher than their pole"] == 2
+
+
 def test_what_lies_inside_an_object_is_dropped_and_counted():
     shed = Mesh("shed", block((-5, 6.5, 0), (5, 12, 5)))
     candidates = lay_candidates(street(occluders=(shed,)), replace(PLAIN, heights=(3.5,)))
@@ -161,6 +174,11 @@ def test_winding_number_tells_inside_whatever_the_normals():
         ({}, {"sensors": ()}, "no sensor type"),
         ({}, {"spacing": 0.0}, "candidate spacing must be"),
         ({}, {"clearance": -1.0}, "clearance must be"),
+        (
+            {"poles": (Pole("stub", np.array((0.0, 9.0, 0.1)), 2.0, mandatory=True),)},
+            {},
+            "'stub' must carry.*lower heights",
+        ),
         ({"mandatory_areas": (NamedArea("moon", shapely.box(900, 900, 901, 901)),)}, {}, "'moon' must carry a sensor"),
         (
             {"poles": (Pole("p", np.array((0.0, 9.0, 0.1)), forbidden=True, mandatory=True),)},

@@ -66,6 +66,27 @@ def test_uneven_beams_are_named_with_how_far_off_they_are(example):
     assert "5.0 degrees" in note  # 0 and 1 where even spacing has -5 and 5
 
 
+def note_on(example, **changes):
+    sensor = replace(example.deployment.sensors[0], model=replace(load_catalogue()["type1"], **changes))
+    return carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["note"]
+
+
+def test_azimuth_offsets_and_a_blind_near_range_are_named(example):
+    assert note_on(example, min_range=0.0) == ""
+    offsets = np.radians(np.where(np.arange(16) % 2, 6.354, -6.354))
+    assert "up to 6.35 degrees" in note_on(example, azimuth_offsets=offsets)
+    assert "0.9 m" in note_on(example, min_range=0.9)
+
+
+def test_all_that_carla_cannot_express_stands_in_one_note(example):
+    model = load_catalogue()["vls128"]
+    sensor = replace(example.deployment.sensors[0], model=model)
+    note = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["note"]
+    assert "unevenly" in note
+    assert "6.35 degrees" in note
+    assert f"{model.min_range:g} m" in note
+
+
 def test_every_shipped_model_has_a_field_of_view_that_holds_its_beams(example):
     for model in load_catalogue().values():
         sensor = replace(example.deployment.sensors[0], model=model)

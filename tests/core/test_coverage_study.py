@@ -1,14 +1,18 @@
-"""The study solves every cell, and its verdicts follow from the figures."""
+"""The study solves every cell, and records those that have no answer."""
 
-from dataclasses import dataclass, replace
+import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from small_junction import make_example
 
-from seip_addon.core.coverage_study import NUMBERS, WEIGHTS, CoverageStudy, coverage_study, judge
-from seip_addon.core.pictures.study_charts import save_claims, save_height_chart, save_study_table, save_weight_chart
+from seip_addon.core.coverage_study import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_study, judge
+from seip_addon.core.errors import SeipError
+from seip_addon.core.pictures.study_charts import save_height_chart, save_weight_chart
 from seip_addon.core.progress import finish
+from seip_addon.core.results.study_tables import save_claims, save_study_table
+from seip_addon.core.site import Site
 
 
 @pytest.fixture(scope="module")
@@ -52,80 +56,125 @@ def test_greedy_keeps_its_promise(study):
     assert claim.verdict == "holds"
 
 
-@dataclass(frozen=True)
-class _Answer:
-    objective: float
-    bound: float
-    chosen: tuple[int, ...]
+def test_the_weight_shown_in_plans_is_one_that_is_solved(study):
+    assert all(study.find(sensor, NUMBERS[-1], weight=WEIGHT_SHOWN) for sensor in study.sensors)
 
 
-@dataclass(frozen=True)
-class _View:
-    coverage: float
-    central: float
+def test_a_cell_that_was_not_asked_for_is_an_error_in_words(study):
+    with pytest.raises(SeipError, match="no placement of type1 at 99 m, N = 1"):
+        study.case("type1", 1, 99.0)
 
 
-def told(study, change):
-    """The study with each vanilla cell's answer replaced by ``change(case) -> (low, high, sensors used)``."""
-    cases = []
-    for case in study.cases:
-        low, high, used = change(case)
-        answer = _Answer(low * study.targets, high * study.targets, tuple(range(used)))
-        cases.append(replace(case, placement=answer, deployment=_View(low, low)))
-    return CoverageStudy(study.sensors, study.heights, tuple(cases), study.targets)
+def solved(example, site: Site | None = None, visible=None):
+    return finish(coverage_study(site or example.site, example.models, example.visible if visible is None else visible))
 
 
-def verdict(study, number):
-    return next(claim.verdict for claim in judge(study) if claim.number == number)
+def only_positions(example, count) -> tuple[Site, np.ndarray]:
+    """The example with its first few positions alone, and its grid."""
+    candidates = example.site.candidates
+    kept = candidates.position_of < count
+    per_pose = {name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw")}
+    per_position = {name: getattr(candidates, name)[:count] for name in ("position", "position_name", "on_pole")}
+    fewer = replace(candidates, **per_pose, **per_position, mandatory=np.zeros((0, count), bool))
+    return replace(example.site, candidates=fewer), example.visible[kept]
 
 
-def test_claim_2_needs_all_targets_and_a_sensor_to_spare(study):
-    assert verdict(told(study, lambda case: (1.0, 1.0, 3)), 2) == "holds"
-    assert verdict(told(study, lambda case: (1.0, 1.0, 4)), 2) == "does not hold"
-    assert verdict(told(study, lambda case: (0.97, 0.97, 3)), 2) == "does not hold"
-    assert verdict(told(study, lambda case: (0.97, 1.0, 3)), 2) == "undecided"
+def test_more_sensors_than_positions_leave_those_cells_empty_and_the_rest_solved(example, tmp_path):
+    study = solved(example, *only_positions(example, 3))
+    empty = [cell for cell in study.cells if isinstance(cell, EmptyCell)]
+    assert {cell.count for cell in empty} == {4}
+    assert {cell.note for cell in empty} == {
+        "asked for 4 sensors, but there are 3 positions; ask for at most 3",
+    }
+    assert {case.count for case in study.cases} == {1, 2}
+    verdicts = {claim.number: claim.verdict for claim in judge(study)}
+    assert verdicts[2] == verdicts[4] == "undecided"
+    write_all(tmp_path, study)
+    rows = read_table(tmp_path / "coverage.csv")
+    assert len(rows) == len(study.cells)
+    assert {row["note"] for row in rows if not row["coverage"]} == {cell.note for cell in empty}
+    assert all((row["coverage"] == "") == (row["count"] == "4") for row in rows)
 
 
-def test_claim_3_follows_the_heights(study):
-    lowest = study.heights[0]
-
-    def as_claimed(case):
-        likes_low = case.sensor == study.sensors[0]
-        share = 0.6 if (case.height == lowest) == likes_low else 0.5
-        return share, share, 1
-
-    assert verdict(told(study, as_claimed), 3) == "holds"
-    assert verdict(told(study, lambda case: (0.5, 0.6, 1)), 3) == "undecided"
-    assert verdict(told(study, lambda case: (1.1 - as_claimed(case)[0],) * 2 + (1,)), 3) == "does not hold"
-
-
-def test_claim_4_weighs_gain_against_loss(study):
-    def weighted(gain, loss, best_gain):
-        def change(case):
-            on = case.weight != 1.0
-            best = case.sensor == study.sensors[-1]
-            return 0.5 - loss * on, 0.5 + on * (best_gain if best else gain), 1
-
-        cases = told(study, change)
-        views = [replace(c, deployment=_View(c.placement.objective / study.targets, c.placement.bound / study.targets))
-                 for c in cases.cases]  # fmt: skip
-        return verdict(replace(cases, cases=tuple(views)), 4)
-
-    assert weighted(gain=0.1, loss=0.0, best_gain=0.0) == "holds"
-    assert weighted(gain=0.1, loss=0.2, best_gain=0.0) == "does not hold"
-    assert weighted(gain=0.0, loss=0.0, best_gain=0.0) == "does not hold"
-    assert weighted(gain=0.1, loss=0.0, best_gain=0.1) == "does not hold"
+def test_a_type_that_is_blind_from_one_height_leaves_that_height_empty(example, tmp_path):
+    candidates = example.site.candidates
+    visible = example.visible.copy()
+    visible[(candidates.sensor == "type1") & (candidates.height == 5.4)] = False
+    study = solved(example, visible=visible)
+    assert study.find("type1", 1, 5.4) is None
+    assert study.find("type1", 1) is not None
+    assert study.possible("type1", 1, 5.4) is None
+    heights = next(claim for claim in judge(study) if claim.number == 3)
+    assert heights.verdict != "holds"
+    write_all(tmp_path, study)
 
 
-def test_pictures_and_tables_are_the_same_bytes_each_time(study, example, tmp_path):
-    heights = example.site.candidates.height.tolist()
+def test_mandatory_places_that_one_sensor_cannot_serve_leave_that_number_empty(example):
+    candidates = example.site.candidates
+    mandatory = np.zeros((2, len(candidates.position)), bool)
+    mandatory[[0, 1], [0, 5]] = True
+    names = np.array(["pole A", "pole B"])
+    site = replace(example.site, candidates=replace(candidates, mandatory=mandatory, mandatory_name=names))
+    study = solved(example, site)
+    assert {cell.count for cell in study.cells if isinstance(cell, EmptyCell)} == {1}
+    assert all("pole A, pole B" in cell.note for cell in study.cells if isinstance(cell, EmptyCell))
+
+
+def test_a_mandatory_pole_without_pose_at_a_height_leaves_that_height_empty(example):
+    candidates = example.site.candidates
+    kept = (candidates.position_of != 0) | (candidates.height == 5.4)
+    mandatory = np.zeros((1, len(candidates.position)), bool)
+    mandatory[0, 0] = True
+    per_pose = {name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw")}
+    fewer = replace(candidates, **per_pose, mandatory=mandatory, mandatory_name=np.array(["pole A"]))
+    study = solved(example, replace(example.site, candidates=fewer), example.visible[kept])
+    empty = [cell for cell in study.cells if isinstance(cell, EmptyCell)]
+    assert {cell.height for cell in empty} == {3.5}
+    assert all("pole A must carry a sensor" in cell.note for cell in empty)
+
+
+def test_what_no_cell_can_do_is_an_error(example):
+    with pytest.raises(SeipError, match="no candidate sees"):
+        solved(example, visible=np.zeros_like(example.visible))
+    with pytest.raises(SeipError, match="cplex"):
+        finish(coverage_study(example.site, example.models, example.visible, solver="cplex"))
+
+
+def write_all(folder, study):
+    save_height_chart(folder / "heights.png", study, "Small junction")
+    save_weight_chart(folder / "weights.png", study, "Small junction")
+    save_study_table(folder / "coverage.csv", study)
+    save_claims(folder / "claims.md", judge(study), "Small junction")
+
+
+def read_table(path):
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def test_pictures_and_tables_are_the_same_bytes_each_time(study, tmp_path):
     for name in ("one", "two"):
-        folder = tmp_path / name
-        save_height_chart(folder / "heights.png", study, "Small junction")
-        save_weight_chart(folder / "weights.png", study, "Small junction")
-        save_study_table(folder / "coverage.csv", study, heights)
-        save_claims(folder / "claims.md", judge(study), "Small junction")
+        write_all(tmp_path / name, study)
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
-    table = np.genfromtxt(tmp_path / "one" / "coverage.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
-    assert len(table) == len(study.cases)
+    assert len(read_table(tmp_path / "one" / "coverage.csv")) == len(study.cells)
+
+
+def test_the_table_gives_each_sensors_height(study, tmp_path):
+    save_study_table(tmp_path / "coverage.csv", study)
+    for row, case in zip(read_table(tmp_path / "coverage.csv"), study.cases, strict=True):
+        assert [float(height) for height in row["heights_used_m"].split()] == [
+            sensor.height for sensor in case.deployment.sensors
+        ]
+
+
+def test_a_name_with_a_bar_stays_in_its_markdown_cell(tmp_path, study):
+    claims = [replace(claim, text="a | b") for claim in judge(study)]
+    save_claims(tmp_path / "claims.md", claims, "Small junction")
+    assert "| a \\| b |" in (tmp_path / "claims.md").read_text(encoding="utf-8")
+
+
+def test_charts_take_more_types_than_there_are_colours(study, tmp_path):
+    keys = [f"type {index} for $1 and $2" for index in range(8)]
+    cells = [replace(cell, sensor=key) for key in keys for cell in study.cells if cell.sensor == study.sensors[0]]
+    write_all(tmp_path, replace(study, sensors=tuple(keys), cells=tuple(cells)))
+    assert (tmp_path / "heights.png").stat().st_size > 10_000

@@ -124,9 +124,13 @@ def test_each_record_of_a_profile_counts_from_its_own_start():
     s = np.array([0.0, 2.0, 4.0, 10.0, 12.0])
     np.testing.assert_allclose(records(s), [1.0, 1.0, 3.0, 7.0, 13.0])
     np.testing.assert_allclose(records.slope(s), [0.0, 0.0, 2.0, 2.0, 5.0])
-    assert records.bound(12.0) >= 33.0
+
+
+def test_the_zeros_of_a_profile_are_found_within_its_records():
+    records = profile([(0.0, (2.0, -1.0, 0.0, 0.0)), (5.0, (-1.0, 0.0, 1.0, 0.0)), (8.0, (1.0, 1e-300, 0.0, 0.0))])
+    np.testing.assert_allclose(np.sort(records.zeros(9.0)), [2.0, 6.0])
+    assert NONE.zeros(9.0).tolist() == []
 
 
 def test_a_profile_without_records_is_zero():
     np.testing.assert_array_equal(NONE(np.array([0.0, 5.0])), [0.0, 0.0])
-    assert NONE.bound(100.0) == 0.0

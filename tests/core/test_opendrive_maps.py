@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from opendrive_text import map_lanes
 
 from seip_addon.core.opendrive import (
     find_junction,
     junction_area,
-    lane_surfaces,
     nearest_junctions,
     placed_objects,
     placed_signals,
@@ -32,7 +32,7 @@ def map_file(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_real_map_has_sound_surfaces_objects_and_signals(name):
     road_map = read_map(map_file(name))
-    surfaces = lane_surfaces(road_map)
+    surfaces = map_lanes(road_map)
     assert surfaces
     for surface in surfaces:
         normals = np.cross(*np.diff(surface.triangles, axis=1).swapaxes(0, 1))
@@ -79,14 +79,14 @@ def test_the_figures_of_town05():
         "shoulder": 200,
         "parking": 18,
     }
-    found = areas((surface.lane_type, surface.polygon) for surface in lane_surfaces(road_map))
+    found = areas((surface.lane_type, surface.polygon) for surface in map_lanes(road_map))
     assert found["driving"] == pytest.approx((82_184, 71_979), rel=5e-3)
     assert found["sidewalk"][1] == pytest.approx(26_443, rel=5e-3)
 
 
 def test_the_junction_of_town05_near_the_origin():
     road_map = read_map(map_file("Town05"))
-    surfaces = lane_surfaces(road_map, area=shapely.Point(-49, -1).buffer(80))
+    surfaces = map_lanes(road_map)
     (junction, distance), *others = nearest_junctions(road_map, surfaces, -49.0, -1.0, 3)
     assert distance == 0.0
     assert all(further > 0 for _, further in others)
@@ -99,7 +99,7 @@ def test_the_junction_of_town05_near_the_origin():
 def test_the_lights_of_town01_stand_beside_the_carriageway():
     road_map = read_map(map_file("Town01"))
     carriageway = shapely.union_all(
-        [surface.polygon for surface in lane_surfaces(road_map) if surface.lane_type == "driving"]
+        [surface.polygon for surface in map_lanes(road_map) if surface.lane_type == "driving"]
     )
     posts = [signal for signal in placed_signals(road_map) if signal.kind == "1000001"]
     assert len(posts) == 36
@@ -128,6 +128,6 @@ def test_another_reader_finds_the_same_areas(name):
         for lane in section.lanes
     )
     theirs = areas((kind, shapely.force_2d(polygon)) for kind, polygon in lanes)
-    ours = areas((surface.lane_type, surface.polygon) for surface in lane_surfaces(read_map(path)))
+    ours = areas((surface.lane_type, surface.polygon) for surface in map_lanes(read_map(path)))
     for kind in ("driving", "sidewalk", "shoulder"):
         assert ours[kind] == pytest.approx(theirs[kind], rel=1e-3), kind

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from opendrive_text import document, geometry, lane, read_text, road, section
+from opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import (
     find_junction,
-    lane_surfaces,
     nearest_junctions,
     placed_objects,
     placed_signals,
@@ -27,7 +26,7 @@ def test_the_header_is_kept_and_not_applied(tmp_path):
     road_map = read_text(tmp_path, document(road(), header=header, rest='<junction id="5" name="Market"/>'))
     assert (road_map.name, road_map.geo_reference) == ("Old town", "+proj=nonsense")
     np.testing.assert_array_equal(road_map.header_offset, [1.5, -2, 3, 0.25])
-    assert lane_surfaces(road_map)[0].left[0].tolist() == [0, 0, 0]
+    assert map_lanes(road_map)[0].left[0].tolist() == [0, 0, 0]
     assert [(junction.id, junction.name) for junction in road_map.junctions] == [("5", "Market")]
 
 
@@ -45,7 +44,7 @@ def test_namespaces_do_not_matter(tmp_path, opening):
     text = document(road()).replace("<OpenDRIVE>", opening)
     if "o:" in opening:
         text = text.replace("</OpenDRIVE>", "</o:OpenDRIVE>")
-    assert len(lane_surfaces(read_text(tmp_path, text))) == 1
+    assert len(map_lanes(read_text(tmp_path, text))) == 1
 
 
 def test_a_byte_order_mark_and_crlf_are_fine(tmp_path):
@@ -57,7 +56,7 @@ def test_a_byte_order_mark_and_crlf_are_fine(tmp_path):
 def test_sections_and_geometries_may_come_in_any_order(tmp_path):
     plan = geometry(s=40.0, length=60.0, x=40.0) + geometry(length=40.0)
     sections = section(lane(-1, 5.0), s=50.0) + section(lane(-1, 3.0)) + section(lane(-1), s=250.0)
-    first, second = lane_surfaces(read_text(tmp_path, document(road(plan, sections))))
+    first, second = map_lanes(read_text(tmp_path, document(road(plan, sections))))
     assert first.polygon.area == pytest.approx(150)
     assert second.polygon.area == pytest.approx(250)
 
@@ -158,7 +157,7 @@ def three_junctions(tmp_path):
     names = ["North gate", "South gate", "South gate"]
     rest = "".join(f'<junction id="70{i}" name="{name}"/>' for i, name in enumerate(names)) + '<junction id="800"/>'
     road_map = read_text(tmp_path, document(*roads, rest=rest))
-    return road_map, lane_surfaces(road_map)
+    return road_map, map_lanes(road_map)
 
 
 def test_a_junction_is_found_by_its_id_or_its_name(three_junctions):
@@ -183,7 +182,7 @@ def test_a_junction_that_is_not_there_has_its_neighbours_named(three_junctions, 
 def test_a_map_without_junctions_says_so(tmp_path):
     road_map = read_text(tmp_path, document(road()))
     with pytest.raises(SeipError, match="the map has no junctions"):
-        find_junction(road_map, lane_surfaces(road_map), "1")
+        find_junction(road_map, map_lanes(road_map), "1")
 
 
 def test_the_nearest_junctions_come_first(three_junctions):
@@ -234,7 +233,7 @@ def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, 
     folder = tmp_path_factory.getbasetemp()
     try:
         road_map = read_text(folder, text, "mutant.xodr")
-        surfaces = lane_surfaces(road_map)
+        surfaces = map_lanes(road_map)
         things = (*placed_objects(road_map), *placed_signals(road_map))
     except SeipError:
         return

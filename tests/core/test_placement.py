@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import stat
+import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from headless.measures.streets import street_problem
+from headless.street_visibility import street_problem
 
 import numpy as np
 import pulp.apis.coin_api
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, integer_program, solve, solve_greedy
-from seip_addon.core.placement.instance import make_instance, merge_targets
-from seip_addon.core.placement.integer_program import cover_by_cliques
-from seip_addon.core.progress import finish
+from seip_addon.core.placement import (
+    PlacementProblem,
+    cheapest_for_coverage,
+    exact,
+    integer_program,
+    solve,
+    solve_greedy,
+    ties,
+)
+from seip_addon.core.placement.instance import common_unit, make_instance, merge_targets
+from seip_addon.core.placement.integer_program import Outcome, cover_by_cliques
+from seip_addon.core.progress import Progress, finish
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
     from pathlib import Path
 
 
@@ -61,9 +72,9 @@ def test_a_bound_that_only_a_better_placement_meets_proves_nothing() -> None:
     assert finish(solve(problem)).chosen.tolist() == [1, 3]
 
 
-def test_seen_by_counts_the_chosen_sensors() -> None:
+def test_a_mandatory_group_is_served_and_paid_for() -> None:
     placement = finish(solve(row_problem(halves, count=3, mandatory=np.array([[0, 0, 1, 0]], bool))))
-    assert placement.seen_by.tolist() == [1, 2, 2, 1]
+    assert placement.chosen.tolist() == [0, 1, 2]
     assert placement.covered == 4
     assert placement.price == 18000
 
@@ -115,7 +126,7 @@ def test_weights_of_very_different_size() -> None:
     assert placement.chosen.tolist() == [0]
 
 
-@pytest.mark.parametrize("limit", [0.0, 0.01, 0.3])
+@pytest.mark.parametrize("limit", [1e-6, 0.01, 0.3])
 def test_a_short_time_limit_gives_an_incumbent_and_a_valid_bound(limit: float) -> None:
     problem = street_problem(66, 1000, blocks=3, count=5)
     short, greedy = finish(solve(problem, time_limit=limit)), solve_greedy(problem)
@@ -154,12 +165,12 @@ def test_cbc_without_its_run_bit_is_copied(tmp_path: Path, monkeypatch: pytest.M
 
 def test_merging_targets_keeps_weight_and_does_not_depend_on_order() -> None:
     rng = np.random.default_rng(3)
-    visible, weight = rng.random((4, 300)) < 0.5, rng.random(300)
+    visible, weight = rng.random((4, 300)) < 0.5, rng.integers(0, 9, 300).astype(float)
     order = rng.permutation(300)
     merged, sums = merge_targets(visible, weight)
     again, same = merge_targets(visible[:, order], weight[order])
     assert len(np.unique(merged, axis=1).T) == len(sums) == 15
-    assert sums.sum() == pytest.approx(weight[visible.any(axis=0)].sum())
+    assert sums.sum() == weight[visible.any(axis=0)].sum()
     np.testing.assert_array_equal(merged, again)
     np.testing.assert_array_equal(sums, same)
 
@@ -177,7 +188,7 @@ def test_of_many_pairs_that_see_all_the_one_that_sees_most_twice() -> None:
     placement = finish(solve(problem))
     assert pairs.sum() > 40
     assert pairs[tuple(placement.chosen)]
-    assert (placement.seen_by > 1).sum() == (numbers @ numbers.T)[pairs].max()
+    assert visible[placement.chosen].all(axis=0).sum() == (numbers @ numbers.T)[pairs].max()
     assert len(placement.notes) == 1
 
 
@@ -198,6 +209,86 @@ def test_cliques_cover_every_conflict_and_nothing_else() -> None:
         covered[np.ix_(clique, clique)] = True
     np.fill_diagonal(covered, val=False)
     np.testing.assert_array_equal(covered, conflict)
+
+
+def test_a_mandatory_pose_that_sees_nothing() -> None:
+    problem = row_problem([[0, 0], [1, 1]], mandatory=np.array([[1, 0]], bool), count=1)
+    assert solve_greedy(problem).chosen.tolist() == [0]
+    placement = finish(solve(problem))
+    assert placement.chosen.tolist() == [0]
+    assert (placement.objective, placement.bound, placement.gap, placement.status) == (0, 0, 0, "optimal")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_greedy_bound_holds_on_many_targets_of_two_weights(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    visible = rng.random((20, 20_000)) < 0.5
+    visible[1] = ~visible[0]
+    problem = row_problem(visible, weights=rng.choice([1.0, 4.0], 20_000), count=2)
+    assert solve_greedy(problem).bound >= problem.weights.sum()
+
+
+@pytest.mark.parametrize("weights", [[1.0] * 4, [0.1, 0.2, 0.3, 0.3], [1.0, 1.5, 2.0, 2.5], [0.7, 1.9, np.pi, 2.0]])
+def test_greedy_takes_the_first_of_equal_gains(weights: list[float]) -> None:
+    problem = row_problem([[1, 1, 0, 0]] * 3 + [[0, 0, 1, 1]] * 3, weights=np.array(weights), count=2)
+    assert solve_greedy(problem).chosen.tolist() == [0, 3]
+
+
+@pytest.mark.parametrize(
+    ("weights", "unit"),
+    [([2.0, 2.0], 2.0), ([1.0, 1.5], 0.5), ([0.1, 0.3], 0.1), ([2.0, 3.0, 7.0], 1.0), ([3.0, 3.0 + 1e-12], 3.0)],
+)
+def test_weights_have_a_common_unit(weights: list[float], unit: float) -> None:
+    assert common_unit(np.array(weights)) == (pytest.approx(unit), True)
+
+
+@pytest.mark.parametrize("weights", [[1.0, np.pi], [3.0, 3.0 + 1e-7], [1.0, 1e10]])
+def test_weights_without_a_common_unit_get_a_fine_grain(weights: list[float]) -> None:
+    unit, whole = common_unit(np.array(weights))
+    assert not whole
+    assert np.rint(np.array(weights) / unit).sum() < 2**53
+
+
+def test_a_program_out_of_time_is_not_called_infeasible(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unfinished(*_: object) -> Generator[Progress, None, Outcome]:
+        yield Progress(0, 0, "")
+        return Outcome(None, np.inf, finished=False)
+
+    monkeypatch.setattr(integer_program.CoverProgram, "maximise", unfinished)
+    with pytest.raises(SeipError, match="too short to tell whether the mandatory places"):
+        finish(solve(row_problem(halves, mandatory=first_two)))
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
+def test_a_time_limit_is_positive(limit: float) -> None:
+    with pytest.raises(SeipError, match="give a positive number of seconds"):
+        finish(solve(row_problem(halves), time_limit=limit))
+    with pytest.raises(SeipError, match="give a positive number of seconds"):
+        finish(cheapest_for_coverage(row_problem(halves), 0.5, time_limit=limit))
+
+
+@pytest.mark.parametrize("solver", ["highs", "cbc"])
+def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exact, "is_worthwhile", lambda *_: False)
+    monkeypatch.setattr(ties, "is_worthwhile", lambda *_: False)
+    problem = street_problem(12, 100, blocks=1, count=3)
+    placement = finish(solve(problem, solver=solver, time_limit=math.inf))
+    assert placement.status == "optimal"
+    dearer = replace(problem, count=None, prices=np.linspace(1, 2, len(problem.prices)))
+    assert finish(cheapest_for_coverage(dearer, 0.3, solver=solver, time_limit=math.inf)).status == "optimal"
+
+
+def test_a_long_program_can_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exact, "is_worthwhile", lambda *_: False)
+    before = set(threading.enumerate())
+    steps = solve(street_problem(60, 1000, blocks=2, count=8), time_limit=60.0)
+    while "integer program" not in next(steps).what:
+        pass
+    next(steps)
+    steps.close()
+    for thread in set(threading.enumerate()) - before:
+        thread.join(5.0)
+        assert not thread.is_alive()
 
 
 nowhere = np.array([[0, 0, 0, 0]], bool)
@@ -271,3 +362,19 @@ def test_greedy_states_its_guarantee() -> None:
     assert "one half" in solve_greedy(row_problem(halves, count=2, positions=np.array([0, 0, 1, 1]))).notes[0]
     assert "(1 - 1/e)/2" in solve_greedy(row_problem(halves, budget=12000.0)).notes[0]
     assert "no guarantee" in solve_greedy(row_problem(halves, count=2, min_distance=5.0)).notes[0]
+
+
+@pytest.mark.parametrize("offset", [0.0, 1000.0, 5e6])
+def test_posts_exactly_as_far_apart_as_asked_for_may_both_carry_a_sensor(offset):
+    xyz = np.array([(offset + x, offset, 4.0) for x in (0.0, 0.3, 0.6)])
+    problem = PlacementProblem(
+        visible=np.eye(3, dtype=bool),
+        weights=np.ones(3),
+        prices=np.ones(3),
+        positions=np.arange(3),
+        xyz=xyz,
+        labels=np.full(3, "type1"),
+        count=3,
+        min_distance=0.3,
+    )
+    assert len(finish(solve(problem)).chosen) == 3

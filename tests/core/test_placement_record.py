@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,7 +13,6 @@ from seip_addon.core.placement import Placement
 from seip_addon.core.results.placement_record import (
     Run,
     comparable,
-    degrees,
     load_placement_record,
     placement_record,
     save_placement_record,
@@ -26,7 +26,7 @@ SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "placement.schema.json
 
 def solution(chosen, **values) -> Placement:
     more = {"status": "feasible", "solver": "HiGHS", "seconds": 0.5, "covered": values["objective"], "price": 0.0}
-    return Placement(chosen=np.array(chosen), seen_by=np.zeros(0, np.int64), notes=("3 suffice",), **{**more, **values})
+    return Placement(chosen=np.array(chosen), notes=("3 suffice",), **{**more, **values})
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +70,18 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
     assert violations({**record, "more": 1}, SCHEMA)
 
 
+def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
+    work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
+    record = make_record(example, replace(run, settings=work))
+    assert violations(record, SCHEMA) == []
+    for name in work:
+        assert violations({**record, "settings": {**work, name: None}}, SCHEMA)
+
+
+def test_nothing_random_is_claimed(example, run):
+    assert make_record(example, run)["seeds"] == {}
+
+
 def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(example, run):
     record = make_record(example, run)
     for entry, sensor in zip(record["sensors"], example.deployment.sensors, strict=True):
@@ -95,12 +107,6 @@ def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
     save_placement_record(tmp_path / "placement.json", record)
     assert record["objective"]["bound"] is None
     assert violations(record, SCHEMA) == []
-
-
-def test_angles_are_written_from_zero_to_below_a_full_turn():
-    assert degrees(-math.pi / 2) == 270.0
-    assert degrees(2 * math.pi - 1e-12) == 0.0
-    assert degrees(-1e-12) == 0.0
 
 
 @pytest.mark.parametrize(

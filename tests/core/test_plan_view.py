@@ -85,6 +85,11 @@ def test_a_metre_is_as_long_across_as_upwards_and_the_whole_region_is_shown(exam
     assert shapely.box(left, bottom, right, top).contains(region)
 
 
+def test_the_legend_gives_the_weight_of_an_area_whether_or_not_it_counted(example):
+    figure = draw_plan(example.geometry, example.site, example.deployment)
+    assert "central box (weight 2 where weights count)" in [text.get_text() for text in figure.axes[1].texts]
+
+
 def test_names_are_taken_as_they_are(example, tmp_path):
     site = type(example.site)(**{**vars(example.site), "name": "Corner of $1 and $2_x"})
     save_plan_view(tmp_path / "plan.png", example.geometry, site, example.deployment)

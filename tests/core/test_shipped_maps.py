@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import shapely
 from defusedxml.ElementTree import parse
+from opendrive_text import map_lanes
 
 from scenes.author_maps import MAPS
 from scenes.opendrive_writer import opendrive
@@ -22,7 +23,6 @@ from seip_addon.core.opendrive import (
     PlacedObject,
     RoadMap,
     junction_area,
-    lane_surfaces,
     placed_objects,
     placed_signals,
     read_map,
@@ -85,7 +85,7 @@ def junction_site() -> dict[str, Any]:
 def load(name: str) -> Shipped:
     path = SCENES / name
     road_map = read_map(path)
-    return Shipped(path, parse(path).getroot(), road_map, lane_surfaces(road_map), placed_objects(road_map))
+    return Shipped(path, parse(path).getroot(), road_map, map_lanes(road_map), placed_objects(road_map))
 
 
 # --- Both maps ---------------------------------------------------------------------------------------------------

@@ -132,3 +132,21 @@ def test_a_missing_or_binary_file_is_named(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SeipError, match="no UTF-8 text"):
         read_site_description(tmp_path / "binary.toml")
+
+
+@pytest.mark.parametrize(
+    ("lines", "sentence"),
+    [
+        ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheigth = 3", "height is missing .is 'heigth' a slip?"),
+        ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheight = 2e6", "height must be at most 100000"),
+        ("[[building]]\noutline = [[0, 0], [1e8, 0], [9, 9]]\nheight = 9", "an outline of at most 100000 m"),
+        ("[[tree]]\nfrom = [0, 0]\nto = [1e6, 0]\nspacing = 0.001", "this row has 1e.09 places"),
+        ("near = [1e300, 0]", "near must be a point"),
+        (f"near = {'[' * 3000}", "is not valid TOML"),
+    ],
+)
+def test_slips_of_the_keyboard_are_caught(tmp_path, lines, sentence):
+    path = tmp_path / "site.toml"
+    path.write_text(f"{lines}\n", encoding="utf-8")
+    with pytest.raises(SeipError, match=sentence):
+        read_site_description(path)

@@ -10,6 +10,7 @@ from street_map import street_map
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
+from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import Area, Building, Poles, SiteDescription, Trees, WeightedRegion
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
@@ -25,7 +26,7 @@ BOX = '<object id="{id}" type="{kind}" name="{name}" s="80" t="{t}" zOffset="0" 
 def model(tmp_path, description=HERE, **options):
     path = tmp_path / "street.xodr"
     path.write_text(street_map(**options), encoding="utf-8")
-    return site_model(read_map(path), description)
+    return finish(site_model(read_map(path), description))
 
 
 def part(built, name):
@@ -192,6 +193,32 @@ def lamp_direction(pole):
     return normal / np.linalg.norm(normal)
 
 
+def test_where_traffic_keeps_left_lines_and_lamps_change_sides(tmp_path):
+    poles = replace(HERE, signal_poles=(Poles(np.array([[-12.0, -6.0]]), 6.0, 4.0, math.pi / 2),))
+    right, left = model(tmp_path, poles), model(tmp_path, poles, rule="LHT")
+    assert stop_line_sides(right) == {(-1, -1), (1, 1)}
+    assert stop_line_sides(left) == {(-1, 1), (1, -1)}
+    lamps = [with_role(built, Role.POLES)[0] for built in (right, left)]
+    assert [math.copysign(1, lamp_direction(pole)[0]) for pole in lamps] == [-1, 1]
+
+
+def stop_line_sides(built):
+    """Return the signs of x and y of each stop line: where bars, 0.4 m long, are 3.5 m wide."""
+    solid = part(built, "Lane markings").solid
+    quads = solid.vertices[np.array(solid.faces)]
+    bars = quads[np.ptp(quads[:, :, 1], axis=1) > 3]
+    return {tuple(side) for side in np.sign(bars.mean(axis=1)[:, :2]).astype(int).tolist()}
+
+
+def test_progress_comes_to_its_end(tmp_path):
+    path = tmp_path / "street.xodr"
+    path.write_text(street_map(), encoding="utf-8")
+    seen = []
+    finish(site_model(read_map(path), HERE), seen.append)
+    assert (seen[-1].done, seen[-1].what) == (seen[-1].total, "streets")
+    assert all(step.done <= step.total for step in seen)
+
+
 def test_signals_of_one_pole_share_it_and_signs_have_none(tmp_path):
     pair = SIGNAL.format(s=95, t=-5, to="+", dynamic="yes") + SIGNAL.format(s=95.5, t=-5, to="+", dynamic="yes")
     sign = SIGNAL.format(s=60, t=-5, to="+", dynamic="no")
@@ -294,7 +321,7 @@ def test_a_junction_is_found_by_id_and_by_name(tmp_path):
     ],
 )
 def test_real_maps_become_one_sound_layer(name, place):
-    built = site_model(read_map(MAPS / f"{name}.xodr"), SiteDescription(**place))
+    built = finish(site_model(read_map(MAPS / f"{name}.xodr"), SiteDescription(**place)))
     assert all(np.isfinite(each.solid.vertices).all() for each in built.parts)
     assert len(with_role(built, Role.REGION)) == 1
     assert with_role(built, Role.CANDIDATE_AREAS)

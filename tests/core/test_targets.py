@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.plan_geometry import surface_height
 from seip_addon.core.scene_geometry import NamedArea
-from seip_addon.core.targets import lay_targets, surface_height
+from seip_addon.core.targets import lay_targets
 
 
 def rectangle(low_x, low_y, high_x, high_y, slope=0.0):
@@ -19,15 +20,15 @@ def rectangle(low_x, low_y, high_x, high_y, slope=0.0):
 
 def test_a_square_holds_a_centred_grid():
     targets = lay_targets(shapely.box(0, 0, 4, 2), rectangle(-10, -10, 10, 10), 1.0)
-    assert len(targets) == 5 * 3
-    assert targets.xyz.min(axis=0).tolist() == [0, 0, 0]
-    assert targets.xyz.max(axis=0).tolist() == [4, 2, 0]
+    assert len(targets) == 4 * 2
+    assert targets.xyz.min(axis=0).tolist() == [0.5, 0.5, 0]
+    assert targets.xyz.max(axis=0).tolist() == [3.5, 1.5, 0]
 
 
 def test_targets_off_the_road_are_left_out():
     targets = lay_targets(shapely.box(0, 0, 10, 10), rectangle(0, 0, 5, 10), 1.0)
     assert targets.xyz[:, 0].max() <= 5
-    assert len(targets) == 6 * 11
+    assert len(targets) == 5 * 10
 
 
 def test_the_height_is_the_roads():
@@ -46,7 +47,7 @@ def test_the_highest_of_two_roads_counts():
 def test_weights_multiply_where_regions_overlap():
     regions = (NamedArea("a", shapely.box(-1, -1, 2, 9), 2.0), NamedArea("b", shapely.box(1, -1, 9, 9), 3.0))
     targets = lay_targets(shapely.box(0, 0, 4, 0.5), rectangle(-9, -9, 9, 9), 1.0, regions)
-    assert targets.weight.tolist() == [2, 6, 6, 3, 3]
+    assert targets.weight.tolist() == [2, 6, 3, 3]
     assert targets.central.all()
 
 
@@ -66,11 +67,12 @@ def test_moving_the_scene_moves_the_targets(shift, spacing):
 @pytest.mark.parametrize(
     ("region", "spacing", "sentence"),
     [
-        (shapely.box(0, 0, 4, 4), 0.0, "must be a positive number"),
-        (shapely.box(0, 0, 4, 4), float("nan"), "must be a positive number"),
+        (shapely.box(0, 0, 4, 4), 0.0, "grid spacing must be"),
+        (shapely.box(0, 0, 4, 4), float("nan"), "grid spacing must be"),
         (shapely.Polygon(), 1.0, "region of interest is empty"),
         (shapely.box(500, 500, 510, 510), 1.0, "no target"),
-        (shapely.box(0, 0, 4, 4), 1e-5, "choose a coarser one"),
+        (shapely.box(0, 0, 4, 4), 1e-5, "grid spacing must be"),
+        (shapely.box(0, 0, 4000, 4000), 0.5, "choose a coarser one"),
     ],
 )
 def test_each_fault_has_its_sentence(region, spacing, sentence):

@@ -13,7 +13,7 @@ from headless.measures.growth import repeated
 from headless.measures.placement import compare
 from headless.measures.programme import Scope
 from headless.measures.rivals import RIVALS, can_run
-from headless.measures.streets import street_problem
+from headless.street_visibility import street_problem
 
 import bpy
 import numpy as np

@@ -70,15 +70,6 @@ def test_control_c_ends_with_130_and_one_line() -> None:
     assert complaint == "stopped, no result written\n"
 
 
-@pytest.mark.parametrize("content", [None, b"", b"no blend"])
-def test_what_is_no_blend_is_refused_by_name(tmp_path, content) -> None:
-    path = tmp_path / "site.blend"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(SeipError, match=r"site\.blend"):
-        session.open_blend(path)
-
-
 def test_progress_reaches_the_total_and_restarts(capsys) -> None:
     def work():
         for total in (3, 5):

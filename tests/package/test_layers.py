@@ -93,7 +93,7 @@ def test_the_add_on_never_names_itself(path):
 def test_what_is_imported_is_pinned(path):
     """Torch may be imported by the detector alone, Dask and spopt where they are of use; SciPy is for oracles."""
     own = {"seip_addon", "headless"}
-    ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "pulp", "shapely", "tqdm"}
+    ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "PIL", "pulp", "shapely", "tqdm"}
     detector = {"torch"} if "detection" in path.parts else set()
     cluster = {"dask", "distributed"} if path.name == "work_force.py" else set()
     rival = {"spopt"} if path.name == "rivals.py" else set()

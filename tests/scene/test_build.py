@@ -6,14 +6,15 @@ import pytest
 import shapely
 from mathutils import Vector
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.model import SiteModel
 from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree
-from seip_addon.scene import collections as names
-from seip_addon.scene.build import COLLECTIONS, build_scene, save_blend
+from seip_addon.scene import contract
+from seip_addon.scene.blend_file import new_file
+from seip_addon.scene.build import COLLECTIONS, build_scene
 from seip_addon.scene.materials import COLOURS
+from seip_addon.scene.read import read_scene
 
 SQUARE = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]], dtype=float)
 ORIGIN = np.array([5_412_345.0, -4_987_654.0, 312.0])
@@ -42,8 +43,27 @@ def model():
     )
 
 
+def built(model):
+    scene = new_file()
+    finish(build_scene(scene, model, "map.xodr"))
+    return scene
+
+
+def test_a_scene_beside_others_leaves_them_alone(model):
+    first = built(model)
+    note = bpy.data.objects.new("a note of mine", None)
+    first.collection.objects.link(note)
+    before = sorted(thing.name for thing in first.objects)
+    second = bpy.data.scenes.new("second")
+    finish(build_scene(second, model, "map.xodr"))
+    assert sorted(thing.name for thing in first.objects) == before
+    assert not set(first.objects) & set(second.objects)
+    assert len(second.objects) == len(before) - 1
+    assert [len(read_scene(scene).geometry.roads) for scene in (first, second)] == [1, 1]
+
+
 def test_each_part_is_in_the_collections_of_its_roles(model):
-    scene = finish(build_scene(model, "map.xodr"))
+    scene = built(model)
     for part in model.parts:
         homes = {collection.name for collection in bpy.data.objects[part.name].users_collection}
         assert homes == {COLLECTIONS[role] for role in part.roles}
@@ -51,13 +71,13 @@ def test_each_part_is_in_the_collections_of_its_roles(model):
 
 
 def test_looks_alone_are_in_no_collection_of_the_contract(model):
-    finish(build_scene(model, "map.xodr"))
+    built(model)
     for name in ("Panes", "Sun", "Overview"):
         assert not any(c.name.startswith("SEIP") for c in bpy.data.objects[name].users_collection)
 
 
 def test_shapes_arrive_as_they_are(model):
-    finish(build_scene(model, "map.xodr"))
+    built(model)
     bpy.context.view_layer.update()
     for part in model.parts:
         thing = bpy.data.objects[part.name]
@@ -71,23 +91,23 @@ def test_shapes_arrive_as_they_are(model):
 
 
 def test_equal_shapes_share_a_mesh(model):
-    finish(build_scene(model, "map.xodr"))
+    built(model)
     assert bpy.data.objects["Tree 1"].data == bpy.data.objects["Tree 2"].data
     assert len(bpy.data.meshes) == 2
 
 
 def test_the_scene_knows_where_it_is(model):
-    scene = finish(build_scene(model, "map.xodr"))
-    assert list(scene[names.ORIGIN]) == ORIGIN.tolist()
-    assert scene[names.TITLE] == model.name
-    assert scene[names.MAP] == "map.xodr"
-    assert list(scene[names.HEADER_OFFSET]) == [0, 1, 2, 3]
-    assert bpy.data.objects["Middle"][names.WEIGHT] == 3.0
+    scene = built(model)
+    assert list(scene[contract.ORIGIN]) == ORIGIN.tolist()
+    assert scene[contract.TITLE] == model.name
+    assert scene[contract.MAP] == "map.xodr"
+    assert list(scene[contract.HEADER_OFFSET]) == [0, 1, 2, 3]
+    assert bpy.data.objects["Middle"][contract.WEIGHT] == 3.0
     assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
 
 
 def test_areas_that_only_mean_something_are_not_rendered(model):
-    finish(build_scene(model, "map.xodr"))
+    built(model)
     for name, is_outline in (("Region", True), ("Middle", True), ("Road", False), ("Pavement", False)):
         thing = bpy.data.objects[name]
         assert thing.hide_render == is_outline
@@ -95,7 +115,7 @@ def test_areas_that_only_mean_something_are_not_rendered(model):
 
 
 def test_the_camera_sees_the_whole_region(model):
-    scene = finish(build_scene(model, "map.xodr"))
+    scene = built(model)
     bpy.context.view_layer.update()
     camera = scene.camera
     to_camera = camera.matrix_world.inverted()
@@ -105,20 +125,6 @@ def test_the_camera_sees_the_whole_region(model):
         seen = projection @ to_camera @ Vector((x, y, 0, 1))
         assert abs(seen.x / seen.w) < 1
         assert abs(seen.y / seen.w) < 1
-
-
-def test_a_saved_scene_opens_again_and_leaves_no_other_file(model, tmp_path):
-    finish(build_scene(model, "map.xodr"))
-    save_blend(tmp_path / "deeper" / "site.blend")
-    assert [path.name for path in (tmp_path / "deeper").iterdir()] == ["site.blend"]
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "deeper" / "site.blend"))
-    assert list(bpy.context.scene[names.ORIGIN]) == ORIGIN.tolist()
-    assert len(bpy.data.collections[names.OCCLUDERS].objects) == 2
-
-
-def test_a_name_that_is_none_of_a_blend_is_refused(tmp_path):
-    with pytest.raises(SeipError, match=r"let it end in \.blend"):
-        save_blend(tmp_path / "site.txt")
 
 
 def test_every_material_has_a_colour_that_light_can_have():

@@ -15,7 +15,8 @@ from seip_addon.core.site import make_site
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
-from seip_addon.scene import collections as names
+from seip_addon.scene import contract
+from seip_addon.scene.blend_file import new_file
 from seip_addon.scene.build import build_scene
 from seip_addon.scene.read import read_scene
 
@@ -37,8 +38,8 @@ def test_names_and_order_of_objects_change_nothing():
     scene = bpy.context.scene
     before = site_of(scene)
     rng = np.random.default_rng(7)
-    for name in names.INPUTS:
-        collection = names.find(scene, name)
+    for name in contract.INPUTS:
+        collection = contract.find(scene, name)
         members = list(collection.objects) if collection else []
         for item in members:
             collection.objects.unlink(item)
@@ -69,9 +70,10 @@ def far_map(tmp_path):
 
 
 def built(path, near):
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    model = site_model(read_map(path), SiteDescription(map=path, near=near, radius=60.0))
-    return site_of(finish(build_scene(model, path.name)))
+    model = finish(site_model(read_map(path), SiteDescription(map=path, near=near, radius=60.0)))
+    scene = new_file()
+    finish(build_scene(scene, model, path.name))
+    return site_of(scene)
 
 
 def test_five_thousand_kilometres_change_nothing(far_map):

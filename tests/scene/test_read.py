@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.scene import collections as names
+from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene
 
 
@@ -15,14 +15,14 @@ from seip_addon.scene.read import read_scene
 def scene():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    sheet(scene, "region", (names.REGION,), 40, 5)
-    sheet(scene, "road", (names.ROADS,), 60, 7)
+    sheet(scene, "region", (contract.REGION,), 40, 5)
+    sheet(scene, "road", (contract.ROADS,), 60, 7)
     return scene
 
 
 def collection(scene, name):
-    found = names.find(scene, name)
-    return found or names.find_or_make(scene, name)
+    found = contract.find(scene, name)
+    return found or contract.find_or_make(scene, name)
 
 
 def sheet(scene, name, where, half_x, half_y, at=(0, 0, 0)):
@@ -53,7 +53,7 @@ def test_region_road_and_origin_arrive_in_metres(scene):
 
 
 def test_modifiers_count(scene):
-    wall = sheet(scene, "wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0))
+    wall = sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
     array = wall.modifiers.new("row", "ARRAY")
     array.count = 3
     triangles = occluders(scene)["wall"]
@@ -64,7 +64,7 @@ def test_modifiers_count(scene):
 def test_parents_count(scene):
     parent = put(scene, bpy.data.objects.new("parent", None), (), (100, 0, 0))
     scene.collection.objects.link(parent)
-    wall = sheet(scene, "wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0))
+    wall = sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
     wall.parent = parent
     assert occluders(scene)["wall"][..., 0].mean() == pytest.approx(100, abs=1)
 
@@ -76,14 +76,14 @@ def test_collection_instances_count_by_the_instancers_collection(scene):
     for x in (5, 15):
         instancer = bpy.data.objects.new("tree", None)
         instancer.instance_type, instancer.instance_collection = "COLLECTION", asset
-        put(scene, instancer, (names.OCCLUDERS,), (x, 20, 3))
+        put(scene, instancer, (contract.OCCLUDERS,), (x, 20, 3))
     found = occluders(scene)
     assert sorted(found) == ["tree 1", "tree.001 1"]
     assert found["tree 1"][..., 0].mean() == pytest.approx(5, abs=0.5)
 
 
 def test_geometry_nodes_instances_count(scene):
-    host = sheet(scene, "host", (names.OCCLUDERS,), 10, 10, (0, 40, 0))
+    host = sheet(scene, "host", (contract.OCCLUDERS,), 10, 10, (0, 40, 0))
     tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -108,25 +108,25 @@ def test_curves_and_text_with_faces_count(scene):
     spline.points.add(1)
     spline.points[0].co, spline.points[1].co = (0, 20, 1, 1), (10, 20, 1, 1)
     curve.bevel_depth = 0.1
-    put(scene, bpy.data.objects.new("rail", curve), (names.OCCLUDERS,))
+    put(scene, bpy.data.objects.new("rail", curve), (contract.OCCLUDERS,))
     assert len(occluders(scene)["rail"]) > 8
 
 
 def test_linked_collections_count(scene, tmp_path):
     library = tmp_path / "library.blend"
-    sheet(scene, "linked wall", (names.OCCLUDERS,), 1, 1, (0, 30, 0))
-    bpy.data.libraries.write(str(library), {names.find(scene, names.OCCLUDERS)}, fake_user=True)
+    sheet(scene, "linked wall", (contract.OCCLUDERS,), 1, 1, (0, 30, 0))
+    bpy.data.libraries.write(str(library), {contract.find(scene, contract.OCCLUDERS)}, fake_user=True)
     bpy.data.objects.remove(bpy.data.objects["linked wall"])
-    bpy.data.collections.remove(names.find(scene, names.OCCLUDERS))
-    sheet(scene, "own wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0))
+    bpy.data.collections.remove(contract.find(scene, contract.OCCLUDERS))
+    sheet(scene, "own wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
     with bpy.data.libraries.load(str(library), link=True) as (_source, target):
-        target.collections = [names.OCCLUDERS]
+        target.collections = [contract.OCCLUDERS]
     scene.collection.children.link(target.collections[0])
     assert sorted(occluders(scene)) == ["linked wall", "own wall"]
 
 
 def test_an_object_in_two_collections_is_cast_against_once(scene):
-    sheet(scene, "pavement", (names.GROUND, names.CANDIDATE_AREAS, names.OCCLUDERS), 60, 2, (0, 9, 0))
+    sheet(scene, "pavement", (contract.GROUND, contract.CANDIDATE_AREAS, contract.OCCLUDERS), 60, 2, (0, 9, 0))
     geometry = read_scene(scene).geometry
     assert [mesh.name for mesh in geometry.ground] == ["pavement"]
     assert geometry.occluders == ()
@@ -134,9 +134,9 @@ def test_an_object_in_two_collections_is_cast_against_once(scene):
 
 
 def test_poles_stand_at_their_origins_and_their_faces_occlude(scene):
-    post = sheet(scene, "post", (names.POLES,), 0.1, 0.1, (3, 9, 0.1))
+    post = sheet(scene, "post", (contract.POLES,), 0.1, 0.1, (3, 9, 0.1))
     post["seip_mandatory"] = True
-    put(scene, bpy.data.objects.new("mark", None), (names.POLES,), (8, 9, 0.1))
+    put(scene, bpy.data.objects.new("mark", None), (contract.POLES,), (8, 9, 0.1))
     geometry = read_scene(scene).geometry
     poles = {pole.name: pole for pole in geometry.poles}
     np.testing.assert_allclose(poles["post"].base, (3, 9, 0.1), atol=1e-6)
@@ -145,22 +145,111 @@ def test_poles_stand_at_their_origins_and_their_faces_occlude(scene):
     assert [mesh.name for mesh in geometry.occluders] == ["post"]
 
 
+def box(scene, name, where, low, high, at=(0, 0, 0)):
+    mesh = bpy.data.meshes.new(name)
+    corners = [(x, y, z) for z in (low[2], high[2]) for x, y in ((low[0], low[1]), (high[0], low[1]), high[:2])]
+    mesh.from_pydata(corners, [], [(0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)])
+    return put(scene, bpy.data.objects.new(name, mesh), where, at)
+
+
+def lamp_asset(scene, where=()):
+    """A shaft of 8 m and, as an object of its own, a lamp head on it."""
+    asset = bpy.data.collections.new("lamp asset")
+    for thing in (
+        box(scene, "shaft", where, (-0.1, -0.1, 0), (0.1, 0.1, 8)),
+        box(scene, "head", (), (0, -0.2, 0), (1.5, 0.2, 0.3), (0.4, 0, 8)),
+    ):
+        asset.objects.link(thing)
+    return asset
+
+
+def test_a_pole_made_of_several_objects_and_instanced_is_one_pole(scene):
+    instancer = bpy.data.objects.new("Lamp", None)
+    instancer.instance_type, instancer.instance_collection = "COLLECTION", lamp_asset(scene)
+    put(scene, instancer, (contract.POLES,), (3, 9, 0.1))
+    geometry = read_scene(scene).geometry
+    (pole,) = geometry.poles
+    assert pole.name == "Lamp"
+    np.testing.assert_allclose(pole.base, (3, 9, 0.1), atol=1e-6)
+    assert pole.height == pytest.approx(8.3)
+    assert sorted(mesh.name for mesh in geometry.occluders) == ["Lamp 1", "Lamp 2"]
+
+
+def test_a_member_within_an_instanced_collection_is_a_pole_at_each_instance(scene):
+    asset = lamp_asset(scene)
+    poles = bpy.data.collections.new(contract.POLES)
+    asset.children.link(poles)
+    poles.objects.link(bpy.data.objects["shaft"])
+    asset.objects.unlink(bpy.data.objects["shaft"])
+    for x in (3, 13):
+        instancer = bpy.data.objects.new("Lamp", None)
+        instancer.instance_type, instancer.instance_collection = "COLLECTION", asset
+        instancer.location = (x, 9, 0)
+        scene.collection.objects.link(instancer)
+    poles = read_scene(scene).geometry.poles
+    assert sorted(pole.base[0] for pole in poles) == pytest.approx([3, 13])
+    assert [pole.height for pole in poles] == pytest.approx([8, 8])
+
+
+def test_scattered_posts_are_a_pole_each_and_their_host_is_none(scene):
+    host = sheet(scene, "host", (contract.POLES,), 10, 5, (0, 20, 0))
+    post = box(scene, "post", (), (-0.1, -0.1, 0), (0.1, 0.1, 6))
+    scene.collection.objects.link(post)
+    post.parent = host
+    host.instance_type = "VERTS"
+    host.show_instancer_for_viewport = False
+    poles = read_scene(scene).geometry.poles
+    assert sorted(tuple(pole.base[:2].round(3)) for pole in poles) == [(-10, 15), (-10, 25), (10, 15), (10, 25)]
+
+
+def test_a_pole_is_as_high_as_its_shaft(scene):
+    post = box(scene, "post", (contract.POLES,), (-0.1, -0.1, -0.2), (0.1, 0.1, 6), (3, 9, 0.5))
+    arm = box(scene, "arm", (), (1, -0.1, 6), (4, 0.1, 7.5))
+    both = bpy.data.meshes.new("both")
+    vertices = [tuple(v.co) for thing in (post, arm) for v in thing.data.vertices]
+    faces = [
+        tuple(i + 6 * n for i in face.vertices) for n, thing in enumerate((post, arm)) for face in thing.data.polygons
+    ]
+    both.from_pydata(vertices, [], faces)
+    post.data = both
+    put(scene, bpy.data.objects.new("mark", None), (contract.POLES,), (8, 9, 0.1))
+    heights = {pole.name: pole.height for pole in read_scene(scene).geometry.poles}
+    assert heights["post"] == pytest.approx(6.0)
+    assert heights["mark"] is None
+
+
+def test_two_scenes_of_one_file_keep_apart(scene):
+    sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
+    other = bpy.data.scenes.new("other")
+    sheet(other, "other region", (contract.REGION,), 10, 5)
+    sheet(other, "other road", (contract.ROADS,), 20, 7)
+    sheet(other, "other wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0))
+    assert contract.find(scene, contract.OCCLUDERS) != contract.find(other, contract.OCCLUDERS)
+    assert set(occluders(scene)) == {"wall"}
+    assert set(occluders(other)) == {"other wall"}
+    other_geometry = read_scene(other).geometry
+    assert other_geometry.region.area == pytest.approx(200)
+    # One object may be shown in both scenes and mean something in one of them alone.
+    other.collection.objects.link(bpy.data.objects["wall"])
+    assert set(occluders(other)) == {"other wall"}
+
+
 def test_hidden_objects_do_not_count_and_are_reported(scene):
-    sheet(scene, "ghost", (names.OCCLUDERS,), 1, 1, (0, 20, 0)).hide_set(True)
+    sheet(scene, "ghost", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).hide_set(True)
     reading = read_scene(scene)
     assert reading.geometry.occluders == ()
     assert reading.warnings == ("1 hidden object in 'SEIP Occluders' did not count: show them if they should",)
 
 
 def test_weights_come_from_the_property(scene):
-    sheet(scene, "centre", (names.WEIGHTED_REGIONS,), 4, 4)["seip_weight"] = 3.5
-    sheet(scene, "plain", (names.WEIGHTED_REGIONS,), 2, 2)
+    sheet(scene, "centre", (contract.WEIGHTED_REGIONS,), 4, 4)["seip_weight"] = 3.5
+    sheet(scene, "plain", (contract.WEIGHTED_REGIONS,), 2, 2)
     weights = {area.name: area.weight for area in read_scene(scene).geometry.weighted_regions}
     assert weights == {"centre": 3.5, "plain": 2.0}
 
 
 def test_reading_changes_nothing(scene):
-    sheet(scene, "wall", (names.OCCLUDERS,), 1, 1, (0, 20, 0)).modifiers.new("row", "ARRAY")
+    sheet(scene, "wall", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).modifiers.new("row", "ARRAY")
 
     def state():
         text = []
@@ -181,15 +270,17 @@ def test_reading_changes_nothing(scene):
     [
         (lambda s: bpy.data.objects.remove(bpy.data.objects["region"]), "has no region of interest"),
         (lambda s: bpy.data.objects.remove(bpy.data.objects["road"]), "has no road"),
-        (lambda s: put(s, bpy.data.objects.new("bare", None), (names.OCCLUDERS,)), "'bare' .* has no mesh"),
-        (lambda s: sheet(s, "flat", (names.OCCLUDERS,), 1, 0), "'flat' has only faces of zero area"),
+        (lambda s: put(s, bpy.data.objects.new("bare", None), (contract.OCCLUDERS,)), "'bare' .* has no mesh"),
+        (lambda s: sheet(s, "flat", (contract.OCCLUDERS,), 1, 0), "'flat' has only faces of zero area"),
         (
-            lambda s: setattr(sheet(s, "n", (names.OCCLUDERS,), 1, 1).data.vertices[0], "co", (np.nan, 0, 0)),
+            lambda s: setattr(sheet(s, "n", (contract.OCCLUDERS,), 1, 1).data.vertices[0], "co", (np.nan, 0, 0)),
             "'n' has a",
         ),
         (lambda s: s.__setitem__("seip_origin", [1.0, 2.0]), "seip_origin must be three finite numbers"),
+        (lambda s: s.__setitem__("seip_origin", "1,2,3"), "seip_origin must be three finite numbers .* not '1,2,3'"),
+        (lambda s: s.__setitem__("seip_origin", "123"), "seip_origin must be three finite numbers"),
         (
-            lambda s: sheet(s, "w", (names.WEIGHTED_REGIONS,), 1, 1).__setitem__("seip_weight", "high"),
+            lambda s: sheet(s, "w", (contract.WEIGHTED_REGIONS,), 1, 1).__setitem__("seip_weight", "high"),
             "seip_weight of object 'w' must be a number",
         ),
     ],
@@ -198,3 +289,19 @@ def test_each_fault_has_its_sentence(scene, spoil, sentence):
     spoil(scene)
     with pytest.raises(SeipError, match=sentence):
         read_scene(scene)
+
+
+def test_a_missing_library_is_named(scene, tmp_path):
+    library = tmp_path / "library.blend"
+    sheet(scene, "linked wall", (contract.OCCLUDERS,), 1, 1, (0, 30, 0))
+    bpy.data.libraries.write(str(library), {contract.find(scene, contract.OCCLUDERS)}, fake_user=True)
+    bpy.data.objects.remove(bpy.data.objects["linked wall"])
+    bpy.data.collections.remove(contract.find(scene, contract.OCCLUDERS))
+    with bpy.data.libraries.load(str(library), link=True) as (_source, target):
+        target.collections = [contract.OCCLUDERS]
+    scene.collection.children.link(target.collections[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    library.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
+    with pytest.raises(SeipError, match=r"is linked from .*library\.blend, which is not there"):
+        read_scene(bpy.context.scene)

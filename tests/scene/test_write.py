@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from seip_addon.core.results.deployment import deploy
-from seip_addon.scene import collections as contract
+from seip_addon.scene import contract
 from seip_addon.scene.render import save_rendered_view
-from seip_addon.scene.write import clear_result, write_result
+from seip_addon.scene.write import LIFT, clear_result, write_result
 from tests.scene_by_hand import make_scene
 from tests.small_junction import make_example
 
@@ -90,7 +90,7 @@ def test_coverage_has_one_square_per_target_with_how_often_it_is_seen(example, s
     mesh.attributes["seip_seen"].data.foreach_get("value", seen)
     assert np.array_equal(seen, example.deployment.seen_by)
     middles = np.array([polygon.center for polygon in mesh.polygons])
-    assert np.allclose(middles, example.site.targets.xyz + np.array((0, 0, 0.08)), atol=1e-4)
+    assert np.allclose(middles, example.site.targets.xyz + np.array((0, 0, LIFT)), atol=1e-4)
     classes = np.array([polygon.material_index for polygon in mesh.polygons])
     assert np.array_equal(classes, np.minimum(seen, 2))
     assert mesh.color_attributes.active_color_name == "seip_colour"
@@ -107,8 +107,8 @@ def test_squares_follow_a_slope(example, scene):
     write_result(scene, site, example.deployment)
     corners = np.array([v.co for v in coverage(scene).data.vertices])
     inner = np.abs(corners[:, 0]) < 50
-    assert np.allclose(corners[inner, 2], 0.1 * corners[inner, 0] + 0.08, atol=0.11)
-    assert np.median(np.abs(corners[inner, 2] - 0.1 * corners[inner, 0] - 0.08)) < 1e-4
+    assert np.allclose(corners[inner, 2], 0.1 * corners[inner, 0] + LIFT, atol=0.11)
+    assert np.median(np.abs(corners[inner, 2] - 0.1 * corners[inner, 0] - LIFT)) < 1e-4
 
 
 def test_the_users_objects_are_left_alone(example, scene):

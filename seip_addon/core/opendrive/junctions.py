@@ -10,6 +10,7 @@ from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
+from ..plan_geometry import closed
 from .lanes import LaneSurface
 from .road_map import Junction, RoadMap
 
@@ -20,7 +21,7 @@ def junction_area(surfaces: Iterable[LaneSurface], junction_id: str) -> BaseGeom
     """Return the union of all lanes of a junction in plan, map coordinates; empty if it has none."""
     lanes = [surface.polygon for surface in surfaces if surface.junction_id == junction_id]
     # Neighbouring lanes of different roads meet to within rounding: hairline cracks are closed.
-    return shapely.union_all(lanes).buffer(_CRACK, join_style="mitre").buffer(-_CRACK, join_style="mitre")
+    return closed(shapely.union_all(lanes), _CRACK)
 
 
 def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name: str) -> Junction:

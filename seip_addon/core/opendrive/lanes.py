@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from .road_map import Frame, Lane, LaneSection, Road, RoadMap
+from .road_map import Frame, Lane, LaneSection, Road
 from .sampling import sample
 
 _SMALLEST_TRIANGLE = 1e-9  # square metres
@@ -34,6 +34,8 @@ class LaneSurface:
         Positive to the left of the centre lane, negative to the right.
     lane_type : str
         As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
+    keeps_left : bool
+        Whether traffic on the road keeps to the left.
     left, right : (n, 3) float64, metres
         Edges in map coordinates, as seen along the reference line.
     """
@@ -43,6 +45,7 @@ class LaneSurface:
     section: int
     lane_id: int
     lane_type: str
+    keeps_left: bool
     left: Float
     right: Float
 
@@ -68,10 +71,8 @@ class LaneSurface:
         return shapely.union_all(faces[shapely.is_valid(faces)])
 
 
-def lane_surfaces(
-    road_map: RoadMap, *, area: BaseGeometry | None = None, tolerance: float = 0.02
-) -> tuple[LaneSurface, ...]:
-    """Return the surfaces of all lanes that have an area.
+def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...]:
+    """Return the surfaces of all lanes of a road that have an area.
 
     Elevation, superelevation, crossfall, shape, level lanes and lane heights
     are part of them; across, a lane is straight from edge to edge. Lane
@@ -79,49 +80,23 @@ def lane_surfaces(
 
     Parameters
     ----------
-    road_map : RoadMap
-    area : shapely geometry, optional
-        In plan, map coordinates. Only roads that meet it count, and these whole.
+    road : Road
     tolerance : float, metres
         Greatest distance between a true edge and the straight lines that stand for it.
 
     Returns
     -------
     tuple of LaneSurface
-        In the order of the file, sections along the road, lanes from left to right.
+        Sections along the road, lanes from left to right.
 
     Raises
     ------
     SeipError
-        The tolerance is not above zero, or a road cannot be followed within it.
+        The tolerance is not above zero, or the road cannot be followed within it.
     """
     if not tolerance > 0.0:
         raise SeipError(f"a tolerance of {tolerance:g} m cannot be met; choose one above zero, such as 0.02")
-    surfaces: list[LaneSurface] = []
-    for road in road_map.roads:
-        if area is not None and not road.may_meet(area):
-            continue
-        own = list(_surfaces(road, tolerance))
-        if area is None or any(surface.polygon.intersects(area) for surface in own):
-            surfaces += own
-    return tuple(surfaces)
-
-
-def ground_elevation(road: Road, s: float, t: float) -> float:
-    """Return the elevation of the road surface at s and t (metres), or of its nearer edge beside the road."""
-    along = np.clip(np.array([s]), 0.0, road.length)
-    frame = road.frame(along)
-    offset = t * frame.left[0]
-    begun = [section for section in road.sections if section.start <= along[0]]
-    if not begun or not (begun[-1].left or begun[-1].right):
-        return float(frame.origin[0, 2] + offset[2])
-    edges = _edges(road, begun[-1], along).reshape(-1, 2, 3)
-    across = (edges - frame.origin[0]) @ frame.level_left[0]
-    lateral = float(offset @ frame.level_left[0])
-    beside = np.maximum(np.maximum(across[:, 1] - lateral, lateral - across[:, 0]), 0.0)
-    lane = int(np.argmin(beside))
-    (left, right), (z_left, z_right) = across[lane], edges[lane, :, 2]
-    return float(np.interp(lateral, [right, left], [z_right, z_left]))
+    return tuple(_surfaces(road, tolerance))
 
 
 def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
@@ -137,19 +112,20 @@ def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
         ).reshape(-1, len(lanes), 2, 3)
         for index, lane in enumerate(lanes):
             left, right = points[:, index, 0], points[:, index, 1]
-            surface = LaneSurface(road.id, road.junction_id, number, lane.id, lane.type, left, right)
+            surface = LaneSurface(road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, left, right)
             if len(surface.triangles):
                 yield surface
 
 
 def _knots(road: Road, section: LaneSection) -> list[float]:
-    """Return the section's ends and the places between them where some record begins."""
+    """Return the section's ends and the places between them where some record begins or a width comes to nothing."""
     lanes = (*section.left, *section.right)
     profiles = (
         *(road.elevation, road.superelevation, road.left_crossfall, road.right_crossfall, road.lane_offset),
         *(of_lane for lane in lanes for of_lane in (lane.width, lane.border, lane.inner_height, lane.outer_height)),
     )
-    starts = np.concatenate([road.reference_line.s, road.shape.s, *(profile.start for profile in profiles)])
+    vanishing = (lane.width.zeros(section.end) for lane in lanes)
+    starts = np.concatenate([road.reference_line.s, road.shape.s, *(p.start for p in profiles), *vanishing])
     inside = starts[(starts > section.start) & (starts < section.end)]
     return [section.start, *inside.tolist(), section.end]
 

@@ -8,6 +8,11 @@ import numpy as np
 
 from ..arrays import Float
 
+_NOUGHT = 1e-12
+"""Terms of a cubic smaller than this, in relation to the largest, move no zero that can be told."""
+_REAL = 1e-9
+"""Imaginary parts below this come from rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class Profile:
@@ -46,12 +51,18 @@ class Profile:
         (_, b, c, d), ds = self._in_force(s)
         return np.asarray(b + ds * (2.0 * c + ds * 3.0 * d))
 
-    def bound(self, end: float) -> float:
-        """Return a number that no absolute value before ``end`` exceeds."""
-        if len(self) == 0:
-            return 0.0
-        span = np.maximum(np.append(self.start[1:], end) - self.start, 0.0)
-        return float((np.abs(self.coefficients) * span[:, None] ** np.arange(4)).sum(axis=1).max())
+    def zeros(self, end: float) -> Float:
+        """Return where the values pass through zero before ``end``, (k,) metres along the road in any order."""
+        span = np.append(self.start[1:], end) - self.start
+        scaled = self.coefficients * span[:, None] ** np.arange(4)
+        may_cross = (span > 0.0) & (np.abs(scaled[:, 1:]).sum(axis=1) >= np.abs(scaled[:, 0]))
+        found = [np.empty(0)]
+        for record in np.flatnonzero(may_cross):
+            cubic = np.where(np.abs(scaled[record]) > _NOUGHT * np.abs(scaled[record]).max(), scaled[record], 0.0)
+            roots = np.roots(cubic[::-1])
+            share = roots[np.abs(roots.imag) < _REAL].real
+            found.append(self.start[record] + span[record] * share[(share > 0.0) & (share < 1.0)])
+        return np.concatenate(found)
 
     def _in_force(self, s: Float) -> tuple[Float, Float]:
         record = np.maximum(np.searchsorted(self.start, s, side="right") - 1, 0)

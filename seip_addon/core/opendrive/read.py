@@ -89,6 +89,7 @@ def _road(node: Node) -> Road:
         id=node.text("id"),
         name=node.text("name", ""),
         junction_id=None if junction in ("-1", "") else junction,
+        keeps_left=node.text("rule", "RHT").upper() == "LHT",
         reference_line=line,
         elevation=_profile(node, "elevationProfile", "elevation"),
         superelevation=_profile(node, "lateralProfile", "superelevation"),
@@ -181,13 +182,19 @@ def _cubic(node: Node) -> tuple[float, float, float, float]:
 
 
 def _sections(road: Node, end: float) -> tuple[LaneSection, ...]:
+    """Return the lane sections; a side that a one-sided section does not carry goes on as it was before."""
     nodes = sorted(road.children("lanes", "laneSection"), key=lambda node: node.number("s"))
     starts = [max(node.number("s"), 0.0) for node in nodes]
-    return tuple(
-        LaneSection(start, min(stop, end), _side(node, "left", start), _side(node, "right", start))
-        for node, start, stop in zip(nodes, starts, [*starts, end][1:], strict=True)
-        if start < min(stop, end)
-    )
+    sections = []
+    left: tuple[Lane, ...] = ()
+    right: tuple[Lane, ...] = ()
+    for node, start, stop in zip(nodes, starts, [*starts, end][1:], strict=True):
+        one_sided = node.flag("singleSide")
+        left = _side(node, "left", start) or (left if one_sided else ())
+        right = _side(node, "right", start) or (right if one_sided else ())
+        if start < min(stop, end):
+            sections.append(LaneSection(start, min(stop, end), left, right))
+    return tuple(sections)
 
 
 def _side(section: Node, side: str, start: float) -> tuple[Lane, ...]:
@@ -298,14 +305,11 @@ def _signal(node: Node) -> RoadSignal:
         id=node.text("id", ""),
         name=node.text("name", ""),
         kind=node.text("type", ""),
-        subtype=node.text("subtype", ""),
         dynamic=node.flag("dynamic"),
         s=node.number("s"),
         t=node.number("t"),
         z_offset=node.number("zOffset", 0.0),
         heading=turned + node.number("hOffset", 0.0),
-        height=node.number("height", 0.0),
-        width=node.number("width", 0.0),
         place=_signal_place(node, turned),
     )
 

@@ -26,9 +26,6 @@ class Piece(Protocol):
     def __call__(self, distance: Float) -> tuple[Float, Float, Float]:
         """Return local x, y and heading, (k,) each, at distances (k,) from the start."""
 
-    def reach(self, length: float) -> float:
-        """Return how far from its start the curve gets at most over a length, metres."""
-
 
 @dataclass(frozen=True)
 class Clothoid:
@@ -68,10 +65,6 @@ class Clothoid:
         heading = along * (self.curvature + along * self.rate / 2.0)
         return np.stack([length * (np.cos(heading) @ _WEIGHTS), length * (np.sin(heading) @ _WEIGHTS)])
 
-    def reach(self, length: float) -> float:
-        """Return how far from its start the curve gets at most over a length, metres."""
-        return length
-
     def turn(self, length: float) -> float:
         """Return an upper bound of the angle, in radians, that the curve turns through over a length."""
         return length * max(abs(self.curvature), abs(self.curvature + length * self.rate))
@@ -105,10 +98,6 @@ class Cubic:
         powers = p[:, None] ** np.arange(4)
         du, dv = _derivative(self.u, p), _derivative(self.v, p)
         return powers @ self.u, powers @ self.v, np.arctan2(dv, du)
-
-    def reach(self, length: float) -> float:
-        """Return how far from its start the curve gets at most over a length, metres."""
-        return float(np.hypot(self.u[0], self.v[0])) + length * self.stretch
 
     def _parameter(self, arc: Float) -> Float:
         """Invert the arc length by Newton's method, held between the knots by bisection."""
@@ -186,11 +175,6 @@ class ReferenceLine:
     def end(self) -> float:
         """Where the last piece ends, metres along the road."""
         return float(self.s[-1] + self.length[-1])
-
-    @property
-    def reach(self) -> float:
-        """How far from its start any piece gets at most, metres."""
-        return max(piece.reach(float(length)) for piece, length in zip(self.pieces, self.length, strict=True))
 
     def __call__(self, s: Float) -> tuple[Float, Float, Float]:
         """Return x, y and heading, (k,) each, at ``s``, (k,) metres along the road."""

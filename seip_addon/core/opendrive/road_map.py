@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from shapely.geometry import MultiPoint
-from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from .profile import Profile, Shape
@@ -153,14 +151,11 @@ class RoadSignal:
     id: str
     name: str
     kind: str
-    subtype: str
     dynamic: bool
     s: float
     t: float
     z_offset: float
     heading: float
-    height: float
-    width: float
     place: RoadPlace | MapPlace | None
 
 
@@ -174,6 +169,8 @@ class Road:
         As in the file; the name may be empty.
     junction_id : str or None
         The junction it belongs to.
+    keeps_left : bool
+        Whether traffic on it keeps to the left.
     reference_line : ReferenceLine
     elevation, lane_offset : Profile
         Metres over metres along the road.
@@ -191,6 +188,7 @@ class Road:
     id: str
     name: str
     junction_id: str | None
+    keeps_left: bool
     reference_line: ReferenceLine
     elevation: Profile
     superelevation: Profile
@@ -222,21 +220,6 @@ class Road:
         """Return the points, (k, 3) metres, at ``s`` along and ``t`` to the left of the road, (k,) metres each."""
         frame = self.frame(s)
         return frame.origin + t[:, None] * frame.left
-
-    def may_meet(self, area: BaseGeometry) -> bool:
-        """Return False only if no lane of the road can reach an area in plan."""
-        starts = MultiPoint(self.reference_line.start[:, :2])
-        # Twice, because crossfall on a superelevated road leads a little further out than t.
-        return bool(starts.distance(area) <= self.reference_line.reach + 2.0 * self._reach())
-
-    def _reach(self) -> float:
-        """Bound how far any lane lies from the reference line, metres."""
-        widths = (
-            sum(max(lane.width.bound(section.end), lane.border.bound(section.end)) for lane in side)
-            for section in self.sections
-            for side in (section.left, section.right)
-        )
-        return self.lane_offset.bound(self.length) + max(widths, default=0.0)
 
 
 @dataclass(frozen=True, eq=False)

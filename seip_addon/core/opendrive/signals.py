@@ -10,7 +10,6 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from .lanes import ground_elevation
 from .road_map import MapPlace, Road, RoadMap, RoadPlace, RoadSignal
 
 
@@ -19,13 +18,14 @@ class PlacedSignal:
     """A signal where it stands or hangs.
 
     Maps disagree on what is given, the foot of the post or the lamp above the
-    carriageway; ``ground`` helps to tell.
+    carriageway.
 
     Parameters
     ----------
     road_id : str
-        The road beside which it stands, not always the one that it applies to.
-    id, name, kind, subtype : str
+        The road that its place is given on, not always the one that it applies to;
+        where the place is given in map coordinates, the one that it applies to.
+    id, name, kind : str
         As in the file; ``kind`` is its type.
     dynamic : bool
         Whether it changes, as a traffic light does.
@@ -34,28 +34,15 @@ class PlacedSignal:
     yaw : float, radians
         By the standard the direction of the traffic that it is meant for,
         counter-clockwise from +x; some exporters give the one it faces.
-    height, width : float, metres
-        Zero where the file says nothing.
-    s, t, z_offset : float, metres
-        On that road, as in the file.
-    ground : float, metres
-        Elevation of the road surface below, or of its edge beside the road.
     """
 
     road_id: str
     id: str
     name: str
     kind: str
-    subtype: str
     dynamic: bool
     position: Float
     yaw: float
-    height: float
-    width: float
-    s: float
-    t: float
-    z_offset: float
-    ground: float
 
 
 def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tuple[PlacedSignal, ...]:
@@ -92,14 +79,7 @@ def _on_road(road: Road, signal: RoadSignal) -> PlacedSignal:
         id=signal.id,
         name=signal.name,
         kind=signal.kind,
-        subtype=signal.subtype,
         dynamic=signal.dynamic,
         position=road.place(s, t)[0] + np.array([0.0, 0.0, signal.z_offset]),
         yaw=float(road.frame(s).heading[0]) + signal.heading,
-        height=signal.height,
-        width=signal.width,
-        s=signal.s,
-        t=signal.t,
-        z_offset=signal.z_offset,
-        ground=ground_elevation(road, signal.s, signal.t),
     )

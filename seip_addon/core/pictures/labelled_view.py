@@ -12,8 +12,7 @@ from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 
 from ..arrays import Boolean, Float
-from ..storage import whole_file
-from .drawing import draw_sensors, draw_title, percent
+from .drawing import draw_sensors, draw_title, percent, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 
 if TYPE_CHECKING:
@@ -77,8 +76,7 @@ def save_labelled_view(
     draw_sensors(view, deployment, sight.sensors * size, sight.targets * size, zorder=2, hidden=sight.hidden)
     draw_title(figure, site, deployment, MARGIN)
     _draw_legend(figure, deployment, any_hidden=bool(sight.hidden.any()))
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
+    save_png(path, figure)
 
 
 def _draw_legend(figure: Figure, deployment: Deployment, *, any_hidden: bool) -> None:

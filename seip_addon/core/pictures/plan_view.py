@@ -9,19 +9,22 @@ import numpy as np
 import shapely
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
 from ..arrays import Float
-from ..storage import whole_file
-from .drawing import SENSOR_MARK, draw_sensors, draw_title, markers_of, percent
-from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
+from ..plan_geometry import closed, outline
+from ..target_squares import target_squares
+from .drawing import draw_sensors, draw_title, save_png
+from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
+from .plan_legend import LEGEND_WIDTH, PlanLegend
+from .plan_style import FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from matplotlib.axes import Axes
     from shapely.geometry.base import BaseGeometry
@@ -30,25 +33,26 @@ if TYPE_CHECKING:
     from ..scene_geometry import Mesh, SceneGeometry
     from ..site import Site
 
-    Style = dict[str, Any]
-
 DPI = 160
-PANEL_WIDTH, MARGIN, HEAD = 3.7, 0.3, 0.95  # inches
+MARGIN, HEAD = 0.3, 0.95  # inches
 NARROWEST_MAP, WIDEST_MAP = 9.6, 15.0  # inches
 SHORTEST_MAP, TALLEST_MAP = 6.6, 10.5  # inches
 AROUND = 0.06  # of the region's size, shown around it
 
 LAND, PAVEMENT, ROAD, KERB = "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
-HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
-WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
-ROW, LINE = 0.42, 0.24  # inches that a sensor and a line of the legend take in the panel
 CRACK = 0.06  # metres
 FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
 
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
-def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment) -> None:
+def save_plan_view(
+    path: str | os.PathLike[str],
+    geometry: SceneGeometry,
+    site: Site,
+    deployment: Deployment,
+    notes: Sequence[str] = (),
+) -> None:
     """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
 
     The same arguments give the same bytes.
@@ -63,17 +67,18 @@ def save_plan_view(path: str | os.PathLike[str], geometry: SceneGeometry, site: 
         Targets and candidates made from it.
     deployment : Deployment
         The chosen sensors and what they see.
+    notes : sequence of str
+        What a reader of the plan should know, in sentences.
     """
-    figure = draw_plan(geometry, site, deployment)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
+    figure = draw_plan(geometry, site, deployment, notes)
+    save_png(path, figure)
 
 
-def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Figure:
+def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = ()) -> Figure:
     """Return the plan as a figure."""
     map_width, map_height = _map_size(site.region)
     window = _window(site.region, map_height / map_width)
-    figure = Figure((map_width + PANEL_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
+    figure = Figure((map_width + LEGEND_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)  # measures text
     plan = _axes(figure, MARGIN, MARGIN, map_width, map_height)
     plan.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
@@ -90,10 +95,8 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment) -> Fi
     _draw_scale(plan, inch)
     _draw_north(plan, inch)
     draw_title(figure, site, deployment, MARGIN)
-    panel = _axes(figure, map_width + 2 * MARGIN, MARGIN, PANEL_WIDTH, map_height)
-    panel.set(xlim=(0.0, PANEL_WIDTH), ylim=(map_height, 0.0), facecolor=PAPER)
-    panel.axis("off")
-    _Panel(panel).draw(geometry, site, deployment, norm, map_height)
+    panel = _axes(figure, map_width + 2 * MARGIN, MARGIN, LEGEND_WIDTH, map_height)
+    PlanLegend(panel, map_height).draw(geometry, site, deployment, norm, notes)
     return figure
 
 
@@ -130,28 +133,20 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
     pavement = shapely.intersection(geometry.candidate_areas, shown)
-    _draw_area(plan, _healed(pavement), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
+    _draw_area(plan, closed(pavement, CRACK), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
-    _draw_area(plan, _healed(roads), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+    _draw_area(plan, closed(roads, CRACK), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
 
 
 def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
     """Return what a mesh covers in plan, near the part that is shown."""
-    flat = shapely.polygons(mesh.triangles[:, :, :2])
-    flat = flat[(shapely.area(flat) > FLAT) & shapely.intersects(flat, shown)]
-    return shapely.union_all(flat, grid_size=1e-3)
-
-
-def _healed(area: BaseGeometry) -> BaseGeometry:
-    """Close the cracks between surfaces that were modelled one by one."""
-    return area.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre")
+    near = shapely.intersects(shapely.polygons(mesh.triangles[:, :, :2]), shown)
+    return outline(mesh.triangles[near])
 
 
 def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
-    half = site.targets.spacing / 2
-    corners = np.array([(-half, -half), (half, -half), (half, half), (-half, half)])
     colours = np.array(SEEN_COLOURS)[np.minimum(deployment.seen_by, SEEN_TWICE)]
-    squares = site.targets.xyz[:, None, :2] + corners
+    squares = list(target_squares(site.targets)[:, :, :2])
     plan.add_collection(
         PolyCollection(squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET),
         autolim=False,
@@ -174,8 +169,7 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
         ),
         autolim=False,
     )
-    outline = shapely.union_all(flat, grid_size=1e-3)
-    _draw_area(plan, outline, facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    _draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
     return norm
 
 
@@ -188,7 +182,7 @@ def _road_level(site: Site, points: Float) -> Float:
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
-    _draw_area(plan, _healed(region), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    _draw_area(plan, closed(region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
         (geometry.forbidden_areas, FORBIDDEN, "////"),
         (geometry.mandatory_areas, MANDATORY, "...."),
@@ -223,10 +217,6 @@ def _draw_candidates(plan: Axes, site: Site) -> None:
     position, on_pole = site.candidates.position, site.candidates.on_pole
     for these, style in ((~on_pole, SIDEWALK_MARK), (on_pole, POLE_MARK)):
         plan.plot(position[these, 0], position[these, 1], zorder=CANDIDATE, **style)
-
-
-SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
-POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}
 
 
 def _draw_scale(plan: Axes, inch: float) -> None:
@@ -280,115 +270,3 @@ def _draw_north(plan: Axes, inch: float) -> None:
     arrow = np.array([(0.0, 0.42), (0.12, 0.0), (0.0, 0.09), (-0.12, 0.0)]) * inch + (x, y)
     plan.fill(arrow[:, 0], arrow[:, 1], facecolor=INK, edgecolor="none", zorder=TEXT)
     plan.text(x, y + 0.46 * inch, "N", ha="center", va="bottom", size=9, weight="bold", color=INK, zorder=TEXT)
-
-
-class _Panel:
-    """The legend, written from top to bottom; lengths in inches."""
-
-    def __init__(self, axes: Axes) -> None:
-        self.axes = axes
-        self.y = 0.0
-
-    def draw(
-        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, height: float
-    ) -> None:
-        """Write all parts, with as many sensors as there is room for in the height."""
-        weights = sorted({area.weight for area in geometry.weighted_regions})
-        below = 3.72 + LINE * (3 + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas))
-        self._sensors(deployment, height - below)
-        self._targets(site, deployment)
-        self._map(geometry, site, weights)
-        self._heights(heights)
-
-    def _sensors(self, deployment: Deployment, room: float) -> None:
-        """List the sensors, without their positions where room is short, and as many as fit."""
-        detailed = len(deployment.sensors) * ROW <= room
-        rows = max(1, int(room / (ROW if detailed else LINE)))
-        self._heading("Sensors")
-        markers = markers_of(deployment)
-        for sensor in deployment.sensors[:rows]:
-            self._mark(marker=markers[sensor.model.key], **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
-            self._text(0.34, sensor.label, weight="bold")
-            self._text(0.70, f"{_short(sensor.model.name, 28)}, {sensor.height:.3g} m")
-            self._text(PANEL_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
-            if detailed:
-                self._text(0.70, _short(sensor.position_name, 40), y=self.y + ROW - LINE, color=SOFT_INK, size=8)
-            self.y += ROW if detailed else LINE
-        if len(deployment.sensors) > rows:
-            self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
-            self.y += LINE
-        self._text(0.0, "Share of the road that each sees by itself", color=SOFT_INK, size=8)
-        self.y += 0.38
-
-    def _targets(self, site: Site, deployment: Deployment) -> None:
-        self._heading("Road")
-        counts = np.bincount(np.minimum(deployment.seen_by, SEEN_TWICE), minlength=SEEN_TWICE + 1)
-        for times in reversed(range(SEEN_TWICE + 1)):
-            self._swatch(facecolor=SEEN_COLOURS[times])
-            self._text(0.34, SEEN_WORDS[times])
-            self._text(PANEL_WIDTH, percent(counts[times] / len(site.targets)), ha="right", weight="bold")
-            self.y += LINE
-        self._text(0.0, f"{len(site.targets):,} points, {site.targets.spacing:g} m apart", color=SOFT_INK, size=8)
-        self.y += 0.38
-
-    def _map(self, geometry: SceneGeometry, site: Site, weights: Iterable[float]) -> None:
-        self._heading("Map")
-        self._swatch(facecolor="none", edgecolor=INK, linewidth=1.1)
-        self._line("region of interest")
-        for weight in weights:
-            names = [area.name for area in geometry.weighted_regions if area.weight == weight]
-            words = f"{_short(names[0], 26)} counts" if len(names) == 1 else f"{len(names)} areas that count"
-            self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
-            self._line(f"{words} {weight:g} times")
-        for areas, colour, hatch, words in (
-            (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
-            (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
-        ):
-            if areas:
-                self._swatch(facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9)
-                self._line(words)
-        on_pole = site.candidates.on_pole
-        for these, mark, words in (
-            (~on_pole, SIDEWALK_MARK, "possible new posts"),
-            (on_pole, POLE_MARK, "existing poles"),
-        ):
-            if these.any():
-                self._mark(**mark | {"markersize": mark["markersize"] * 1.4})
-                self._line(f"{np.count_nonzero(these)} {words}")
-        self.y += 0.14
-
-    def _heights(self, norm: Normalize) -> None:
-        self._heading("Obstacles, height above the road")
-        highest = float(norm.vmax or 0.0)
-        ramp = np.linspace(0.0, highest, 128)[None, :]
-        self.axes.imshow(
-            HEIGHTS(norm(ramp)), extent=(0.0, 2.2, self.y + 0.16, self.y), aspect="auto", interpolation="nearest"
-        )
-        self.axes.set(xlim=(0.0, PANEL_WIDTH), ylim=self.axes.get_ylim())
-        self.y += 0.3
-        for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
-            unit = " m" if share == 1.0 else ""
-            self._text(2.2 * share, f"{highest * share:g}{unit}", ha=align, size=8)
-
-    def _heading(self, words: str) -> None:
-        self._text(0.0, words, weight="bold", size=11, y=self.y + 0.04)
-        self.axes.plot((0.0, PANEL_WIDTH), (self.y + 0.16,) * 2, color=SOFT_INK, linewidth=0.6)
-        self.y += 0.36
-
-    def _line(self, words: str) -> None:
-        self._text(0.34, words)
-        self.y += LINE
-
-    def _text(self, x: float, words: str, *, y: float | None = None, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        plain: Style = {"size": 9, "color": INK, "ha": "left", "va": "center", "parse_math": False}
-        self.axes.text(x, self.y if y is None else y, words, **plain | style)
-
-    def _swatch(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self.axes.add_patch(Rectangle((0.02, self.y - 0.07), 0.2, 0.14, **style))
-
-    def _mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-        self.axes.plot(0.12, self.y, clip_on=False, **style)
-
-
-def _short(words: str, length: int) -> str:
-    return words if len(words) <= length else f"{words[: length - 1]}…"

@@ -1,8 +1,8 @@
-"""Charts and tables of a coverage study, for a report."""
+"""Charts of a coverage study, for a report."""
 
 from __future__ import annotations
 
-import csv
+import math
 import os
 from collections.abc import Sequence
 
@@ -10,126 +10,96 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from ..coverage_study import NUMBERS, WEIGHTS, Case, Claim, CoverageStudy
-from ..storage import whole_file
+from ..coverage_study import NUMBERS, WEIGHTS, CoverageStudy
+from .drawing import save_png
 from .palette import INK, PAPER, SOFT_INK
 
 SERIES = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Colours of sensor types, told apart by colour-blind people (Okabe and Ito 2008)."""
 
-MARKS = ("o", "s", "^", "D", "v", "P")
-
-COLUMNS = (
-    "sensor",
-    "height_m",
-    "count",
-    "central_weight",
-    "sensors_used",
-    "heights_used_m",
-    "coverage",
-    "central_coverage",
-    "seen_twice",
-    "objective",
-    "bound",
-    "gap",
-    "status",
-    "greedy_objective",
-    "price_usd",
-)
+MARKS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours: 42 types before a pair comes again
+HEIGHT, PANEL_WIDTH, FEWEST_PANELS = 4.2, 3.65, 3  # inches, inches, panels that a chart is wide at least
+BESIDE = 0.09  # of the step between two heights, from one type to the next
 
 
 def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
-    """Draw coverage against mounting height, a panel for each number of sensors, as PNG."""
-    figure = Figure((11, 4.2), dpi=160, facecolor=PAPER, layout="constrained")
-    panels = figure.subplots(1, len(NUMBERS), sharey=True)
+    """Draw coverage against mounting height, a panel for each number of sensors, as PNG.
+
+    A bar above a mark ends at the coverage that the solver could not rule out.
+    Cells without a placement are left out.
+    """
+    figure, panels = _figure(len(NUMBERS))
     ticks = [*(f"{height:g}" for height in study.heights), "free"]
     for panel, count in zip(panels, NUMBERS, strict=True):
         for row, sensor in enumerate(study.sensors):
-            cases = [study.case(sensor, count, height) for height in (*study.heights, None)]
-            _line(panel, row, sensor, range(len(cases)), [case.deployment.coverage for case in cases])
-            for x, case in enumerate(cases):
-                # What the solver could not rule out, above what it found.
-                panel.vlines(x, *(value / study.targets for value in case.span), color=SERIES[row], linewidth=1.2)
+            # Side by side, so that no type's bar stands on another's mark.
+            aside = BESIDE * (row - (len(study.sensors) - 1) / 2)
+            spans = [study.possible(sensor, count, height) or NOTHING for height in (*study.heights, None)]
+            x = [place + aside for place in range(len(spans))]
+            _line(panel, row, x[:-1], [low for low, _ in spans[:-1]], label=sensor)
+            _line(panel, row, x[-1:], [spans[-1][0]])
+            for place, (low, high) in zip(x, spans, strict=True):
+                if high > low:
+                    panel.plot((place, place), (low, high), color=_colour(row), linewidth=1.1, marker="_", markersize=5)
         panel.set_title(f"N = {count}", color=INK, fontsize=10)
         panel.set_xticks(range(len(ticks)), ticks)
+        panel.set_xlim(-0.5, len(ticks) - 0.5)
         panel.set_xlabel("mounting height (m)", color=INK)
         _dress(panel)
-    panels[0].set_ylabel("share of targets seen", color=INK)
-    panels[-1].legend(frameon=False, fontsize=9, loc="lower right")
-    figure.suptitle(f"{title}: coverage by sensor type, height and number", color=INK, fontsize=12)
-    _save(figure, path)
+    if any(case.span[1] > case.span[0] for case in study.cases if case.weight == 1.0):
+        panels[0].plot([], [], color=SOFT_INK, linewidth=1.1, marker="_", label="left open by the solver")
+    _finish(figure, panels, f"{title}: coverage by sensor type, height and number")
+    save_png(path, figure)
 
 
 def save_weight_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
     """Draw whole and central coverage against the weight of the centre, a panel for each type, as PNG."""
-    figure = Figure((11, 4.2), dpi=160, facecolor=PAPER, layout="constrained")
-    panels = figure.subplots(1, len(study.sensors), sharey=True, squeeze=False)[0]
+    figure, panels = _figure(len(study.sensors))
     weights = (1.0, *WEIGHTS)
     for panel, sensor in zip(panels, study.sensors, strict=True):
         for row, count in enumerate(NUMBERS):
-            found = [study.case(sensor, count, weight=weight).deployment for weight in weights]
-            _line(panel, row, f"N = {count}, centre", range(len(weights)), [d.central or 0.0 for d in found])
-            _line(panel, row, f"N = {count}, whole", range(len(weights)), [d.coverage for d in found], dashed=True)
-        panel.set_title(sensor, color=INK, fontsize=10)
+            found = [study.find(sensor, count, weight=weight) for weight in weights]
+            central = [math.nan if case is None else case.deployment.central or 0.0 for case in found]
+            whole = [math.nan if case is None else case.deployment.coverage for case in found]
+            _line(panel, row, range(len(weights)), central, label=f"N = {count}, centre")
+            _line(panel, row, range(len(weights)), whole, label=f"N = {count}, whole", dashed=True)
+        panel.set_title(sensor, color=INK, fontsize=10, parse_math=False)
         panel.set_xticks(range(len(weights)), ["1\n(vanilla)", *(f"{weight:g}" for weight in WEIGHTS)])
         panel.set_xlabel("weight of the centre", color=INK)
         _dress(panel)
+    _finish(figure, panels, f"{title}: vanilla against weighted placement")
+    save_png(path, figure)
+
+
+NOTHING = (math.nan, math.nan)
+
+
+def _figure(count: int) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure with that many panels side by side."""
+    size = (PANEL_WIDTH * max(count, FEWEST_PANELS), HEIGHT)
+    figure = Figure(size, dpi=160, facecolor=PAPER, layout="constrained")
+    return figure, figure.subplots(1, count, sharey=True, squeeze=False)[0]
+
+
+def _finish(figure: Figure, panels: Sequence[Axes], title: str) -> None:
+    """Write what the panels share: the axis, the legend below them and the title."""
     panels[0].set_ylabel("share of targets seen", color=INK)
-    panels[-1].legend(frameon=False, fontsize=8, loc="lower right")
-    figure.suptitle(f"{title}: vanilla against weighted placement", color=INK, fontsize=12)
-    _save(figure, path)
+    handles, labels = panels[0].get_legend_handles_labels()
+    legend = figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
 
 
-def save_study_table(path: str | os.PathLike[str], study: CoverageStudy, heights: Sequence[float]) -> None:
-    """Write one row for each case as CSV; ``heights`` are those of the site's poses, (c,) metres."""
-    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(_row(case, heights) for case in study.cases)
-
-
-def _row(case: Case, heights: Sequence[float]) -> list[object]:
-    chosen = case.placement.chosen
-    central = case.deployment.central
-    return [
-        case.sensor,
-        "free" if case.height is None else f"{case.height:g}",
-        case.count,
-        f"{case.weight:g}",
-        len(chosen),
-        " ".join(f"{heights[pose]:g}" for pose in chosen),
-        f"{case.deployment.coverage:.6f}",
-        "" if central is None else f"{central:.6f}",
-        f"{case.deployment.seen_twice:.6f}",
-        f"{case.placement.objective:.12g}",
-        f"{case.placement.bound:.12g}",
-        f"{case.placement.gap:.6g}",
-        case.placement.status,
-        f"{case.greedy.objective:.12g}",
-        f"{case.deployment.price:.2f}",
-    ]
-
-
-def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: str) -> None:
-    """Write the claims with their verdicts and figures as a Markdown table."""
-    lines = [
-        f"# {title}: claims of the study on this site",
-        "",
-        "| # | claim | verdict | figures |",
-        "|---|---|---|---|",
-    ]
-    lines += [f"| {c.number} | {c.text} | **{c.verdict}** | {c.evidence} |" for c in claims]
-    with whole_file(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _line(  # one drawn line is all of these
-    panel: Axes, row: int, label: str, x: Sequence[int], y: Sequence[float], *, dashed: bool = False
+def _line(
+    panel: Axes, row: int, x: Sequence[float], y: Sequence[float], *, label: str | None = None, dashed: bool = False
 ) -> None:
     style = {"linestyle": (0, (4, 2)), "mfc": PAPER, "linewidth": 1.0} if dashed else {"linewidth": 1.6}
-    panel.plot(
-        x, y, color=SERIES[row % len(SERIES)], marker=MARKS[row % len(MARKS)], markersize=5, label=label, **style
-    )
+    panel.plot(x, y, color=_colour(row), marker=MARKS[row % len(MARKS)], markersize=5, label=label, **style)
+
+
+def _colour(row: int) -> str:
+    return SERIES[row % len(SERIES)]
 
 
 def _dress(panel: Axes) -> None:
@@ -139,8 +109,3 @@ def _dress(panel: Axes) -> None:
     panel.tick_params(colors=SOFT_INK)
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
-
-
-def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})

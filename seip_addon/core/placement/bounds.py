@@ -25,13 +25,16 @@ import numpy as np
 from ..arrays import Float, Integer
 from ..progress import Progress
 from .clock import Clock
-from .instance import SLACK, Instance
+from .instance import Instance
 
 ITERATIONS = 1000
 PATIENCE = 20
 SHRINK = 0.7
 DEFLECTION = 0.85
 SMALLEST_STEP = 1e-3
+
+NEAR = (0.8, 0.95, 1.0, 1.05, 1.25)
+"""Factors by which the budget's multiplier may change in a step."""
 
 PRICES = 200
 """Multipliers of the price that are tried for a bound on it."""
@@ -81,14 +84,17 @@ class Bound:
     selection: Selection
 
 
-def select(instance: Instance, score: Float) -> Selection:
+def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
     """Choose the candidates of largest scores, one per clique, within the number and the budget.
 
-    The budget is relaxed; its multiplier minimises the bound, by bisection.
+    The budget is relaxed; its multiplier minimises the bound, by bisection,
+    or is the best of a few near the one given.
     """
     free = _select(instance, score, 0.0)
     if instance.affordable(float(instance.price[free.picked].sum())):
         return free
+    if near > 0:
+        return min((_select(instance, score, near * factor) for factor in NEAR), key=lambda choice: choice.value)
     priced = instance.price > 0
     low, high = 0.0, float((score[priced] / instance.price[priced]).max())
     best = _select(instance, score, high)
@@ -104,19 +110,22 @@ def select(instance: Instance, score: Float) -> Selection:
     return best
 
 
-def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool) -> Bound:
-    """Return the bound that some multipliers give, in double precision where ``exact``."""
+def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool, near: float = 0.0) -> Bound:
+    """Return the bound that some multipliers give, in double precision where ``exact``.
+
+    The budget's multiplier is sought near the one given, if any.
+    """
     if exact:
         score = np.concatenate([block @ targets for block in np.array_split(instance.visible, 16)])
     else:
-        score = (instance.matrix @ targets.astype(np.float32)).astype(np.float64)
-    selection = select(instance, score + groups @ instance.mandatory)
+        score = instance.gains(targets)
+    selection = select(instance, score + groups @ instance.mandatory, near)
     value = math.fsum(instance.weight - targets) - math.fsum(groups) + selection.value
     return Bound(value, targets, groups, selection)
 
 
 def lagrangian_bound(
-    instance: Instance, goal: float, clock: Clock, start: Bound | None = None
+    instance: Instance, goal: float, clock: Clock, start: Float | None = None, iterations: int = ITERATIONS
 ) -> Generator[Progress, None, Bound]:
     """Search for multipliers with a small bound by deflected subgradients.
 
@@ -127,8 +136,10 @@ def lagrangian_bound(
         Covered weight to reach; the search ends when the bound falls below.
     clock : Clock
         Ends the search when the time is up.
-    start : Bound, optional
-        Multipliers to begin from.
+    start : (t,) float64, optional
+        Multipliers of the targets to begin from.
+    iterations : int
+        At most so many steps.
 
     Yields
     ------
@@ -139,21 +150,20 @@ def lagrangian_bound(
     Bound
         The best one found, evaluated in double precision.
     """
-    targets = start.targets if start else instance.weight / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5
-    groups = start.groups if start else np.zeros(len(instance.mandatory))
+    targets = instance.weight / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5 if start is None else start
+    groups = np.zeros(len(instance.mandatory))
     # group multipliers live on the scale of scores, those of targets on that of weights
     stretch = instance.visible.sum() / len(instance) if len(groups) else 1.0
     best = bound_from(instance, targets, groups, exact=False)
     direction, group_direction = np.zeros(len(targets)), np.zeros(len(groups))
     step, stale = 1.0, 0
     current = best
-    for iteration in range(ITERATIONS):
-        if best.value < goal - SLACK or step < SMALLEST_STEP or clock.left <= 0:
+    for iteration in range(iterations):
+        if best.value < goal - instance.slack or step < SMALLEST_STEP or clock.left <= 0:
             break
-        if iteration % 20 == 0:
-            yield Progress(iteration, ITERATIONS, "bounding what any placement can cover")
+        yield Progress(iteration, iterations, "bounding what any placement can cover")
         picked = current.selection.picked
-        seen = instance.matrix[picked].sum(axis=0)
+        seen = instance.visible[picked].sum(axis=0)
         slope = np.where(targets < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
         direction = slope + DEFLECTION * direction
         group_direction = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0) + DEFLECTION * group_direction
@@ -163,7 +173,7 @@ def lagrangian_bound(
         length = step * max(current.value - goal, 1e-6 * instance.total) / size
         targets = np.clip(targets - length * direction, 0.0, instance.weight)
         groups = np.maximum(groups - length * stretch * group_direction, 0.0)
-        current = bound_from(instance, targets, groups, exact=False)
+        current = bound_from(instance, targets, groups, exact=False, near=current.selection.multiplier)
         if current.value < best.value - 1e-7 * instance.total:
             best, stale = current, 0
         else:
@@ -207,7 +217,7 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     in_clique[:] = net[picked].min() if len(picked) == instance.count else 0.0
     in_clique[instance.clique[picked]] = net[picked]
     forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
-    return np.flatnonzero(forced >= goal - SLACK)
+    return np.flatnonzero(forced >= goal - instance.slack)
 
 
 def _select(instance: Instance, score: Float, multiplier: float) -> Selection:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
+
+from ..errors import SeipError
 
 
 class Clock:
@@ -11,9 +14,17 @@ class Clock:
     Parameters
     ----------
     limit : float, seconds
+        May be infinite.
+
+    Raises
+    ------
+    SeipError
+        The limit is no positive number.
     """
 
     def __init__(self, limit: float) -> None:
+        if math.isnan(limit) or limit <= 0:
+            raise SeipError(f"the time limit is {limit:g} s; give a positive number of seconds")
         self._start = time.perf_counter()
         self._limit = limit
 

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Integer
-from ..progress import Progress
+from ..progress import Progress, finish
 from .bounds import Bound, can_reach, lagrangian_bound
-from .branch_and_bound import best_reaching, is_worthwhile
+from .branch_and_bound import best_placements, is_worthwhile
 from .clock import Clock
 from .feasibility import starting_choice
-from .greedy import exchange, greedy, greedy_and_exchange, without_idle
-from .instance import SLACK, Instance, make_instance
+from .greedy import exchange, greedy_and_exchange, greedy_choices, without_idle
+from .instance import Instance, make_instance
 from .integer_program import check_solver, reaching
-from .problem import Placement, PlacementProblem, placement
-from .ties import canonical_optimum
+from .problem import Placement, PlacementProblem, record_choice
+from .ties import MANY, canonical_optimum
 
 KERNELS = ((6, 0.15), (12, 0.3))
 """Small programs over the candidates of best scores: how many per sensor, and what share of the time left."""
@@ -26,17 +26,31 @@ KERNELS = ((6, 0.15), (12, 0.3))
 BRANCHING = 0.6
 """Share of the time for branch and bound, where that is worthwhile, before programs are tried."""
 
+BRANCHING_ALONE = 0.9
+"""The same where the whole program is too large for a solver."""
+
 LARGEST = 1_000_000
 """Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """A placement and the smallest proven upper bound on the covered weight."""
+    """What is proven about a placement.
+
+    Parameters
+    ----------
+    chosen : (k,) int64
+    bound : float
+        No placement covers more.
+    optimal : bool
+    ties : tuple of (k,) int64, optional
+        All placements that cover as much, but for those with idle sensors, where they are known.
+    """
 
     chosen: Integer
     bound: float
     optimal: bool
+    ties: tuple[Integer, ...] | None = None
 
 
 def solve(
@@ -79,11 +93,12 @@ def solve(
     clock = Clock(time_limit)
     version = check_solver(solver)
     instance, factor = make_instance(problem)
-    start = starting_choice(problem, instance, solver)
-    proof = yield from prove(instance, greedy_and_exchange(instance, start), solver, clock)
+    start = yield from starting_choice(problem, instance, solver)
+    first = yield from greedy_and_exchange(instance, start)
+    proof = yield from prove(instance, first, solver, clock)
     chosen, notes = without_idle(instance, proof.chosen, instance.covered(proof.chosen)), []
     if proof.optimal:
-        chosen, settled = yield from canonical_optimum(instance, chosen, solver, clock)
+        chosen, settled = yield from canonical_optimum(instance, chosen, proof.ties, solver, clock)
         if not settled:
             notes.append("the time was too short to break all ties: another placement may cover as much")
     else:
@@ -93,7 +108,7 @@ def solve(
     if problem.count is not None and len(chosen) < problem.count:
         notes.append(_surplus(problem.count, len(chosen)))
     original = instance.original[chosen]
-    return placement(
+    return record_choice(
         problem,
         original,
         proof.bound / factor,
@@ -129,14 +144,12 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
     """
     clock = Clock(math.inf)
     instance, factor = make_instance(problem)
-    start = starting_choice(problem, instance, "highs")
-    per_price = [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
-    runs = [greedy(instance, start, per_price=divided) for divided in per_price]
+    runs = greedy_choices(instance, finish(starting_choice(problem, instance, "highs")))
     chosen = max((choice for choice, _ in runs), key=instance.covered)
     bound = min(bound for _, bound in runs)
-    optimal = bound <= instance.covered(chosen) + SLACK
+    optimal = bound < _better(instance, chosen) - instance.slack
     original = instance.original[chosen]
-    return placement(
+    return record_choice(
         problem,
         original,
         bound / factor,
@@ -167,27 +180,32 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     Proof
     """
     bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
-    chosen = max(chosen, _from_relaxation(instance, bound, chosen), key=instance.covered)
-    keep = can_reach(instance, bound, _better(instance, chosen))
-    if len(keep) and is_worthwhile(instance, keep):
-        part = instance.part(keep)
-        found = yield from best_reaching(part, _better(instance, chosen), clock, BRANCHING * clock.left)
-        chosen = keep[found.placements[0]] if found.placements else chosen
+    relaxed = yield from _from_relaxation(instance, bound, chosen)
+    chosen = max(chosen, relaxed, key=instance.covered)
+    as_good = np.union1d(can_reach(instance, bound, instance.covered(chosen)), chosen)
+    if is_worthwhile(instance, as_good):
+        part, value, most = instance.part(as_good), instance.covered(chosen), min(bound.value, instance.total)
+        share = BRANCHING if np.count_nonzero(part.visible) <= LARGEST else BRANCHING_ALONE
+        found = yield from best_placements(part, value, MANY, most, clock, share * clock.left)
+        equal = [as_good[choice] for choice in found.placements]
+        chosen = max([chosen, *equal[:1]], key=instance.covered)
         if found.finished:
-            return Proof(chosen, instance.covered(chosen), optimal=True)
+            ties = (chosen, *equal) if found.complete else None
+            return Proof(chosen, instance.covered(chosen), optimal=True, ties=ties)
+    keep = can_reach(instance, bound, _better(instance, chosen))
     for factor, share in KERNELS:
         size = factor * max(len(chosen), 1)
         if len(keep) <= size or clock.left <= 0:
             break
-        yield Progress(0, 1, f"improving the placement among the {size} best candidates")
-        chosen = _within_kernel(instance, bound, size, chosen, solver, share * clock.left)
+        yield Progress(0, 0, f"improving the placement among the {size} best candidates")
+        chosen = yield from _within_kernel(instance, bound, size, chosen, solver, share * clock.left)
         keep = can_reach(instance, bound, _better(instance, chosen))
-    if bound.value < _better(instance, chosen) - SLACK or len(keep) == 0:
+    if bound.value < _better(instance, chosen) - instance.slack or len(keep) == 0:
         return Proof(chosen, instance.covered(chosen), optimal=True)
     if clock.left <= 0 or np.count_nonzero(instance.visible[keep]) > LARGEST:
         return Proof(chosen, bound.value, optimal=False)
-    yield Progress(0, 1, f"proving with {len(keep)} of {len(instance)} candidates")
-    return _decide(instance, keep, bound.value, chosen, solver, clock.left)
+    yield Progress(0, 0, f"proving with {len(keep)} of {len(instance)} candidates")
+    return (yield from _decide(instance, keep, bound.value, chosen, solver, clock.left))
 
 
 def _better(instance: Instance, chosen: Integer) -> float:
@@ -195,28 +213,34 @@ def _better(instance: Instance, chosen: Integer) -> float:
     return instance.covered(chosen) + instance.step
 
 
-def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Integer:
+def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Generator[Progress, None, Integer]:
     """Return a placement made from the relaxation's own selection, where that meets the constraints."""
     picked = np.sort(bound.selection.picked)
-    return exchange(instance, picked) if instance.feasible(picked) else chosen
+    if not instance.feasible(picked):
+        return chosen
+    return (yield from exchange(instance, picked))
 
 
 def _within_kernel(
     instance: Instance, bound: Bound, size: int, chosen: Integer, solver: str, seconds: float
-) -> Integer:
+) -> Generator[Progress, None, Integer]:
     """Return the best placement among the candidates of best scores, at least as good as the one given."""
     keep = np.sort(np.argsort(-bound.selection.net, kind="stable")[:size])
-    outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
-    return chosen if outcome.chosen is None else exchange(instance, keep[outcome.chosen])
+    outcome = yield from reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    if outcome.chosen is None:
+        return chosen
+    return (yield from exchange(instance, keep[outcome.chosen]))
 
 
-def _decide(instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float) -> Proof:
+def _decide(
+    instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float
+) -> Generator[Progress, None, Proof]:
     """Look for a better placement among the candidates that one may contain; that there is none is the proof."""
-    outcome = reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    outcome = yield from reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
     chosen = chosen if outcome.chosen is None else keep[outcome.chosen]
     value = instance.covered(chosen)
     bound = value if outcome.finished else max(value, min(bound, outcome.bound))
-    return Proof(chosen, bound, optimal=bound < _better(instance, chosen) - SLACK)
+    return Proof(chosen, bound, optimal=bound < _better(instance, chosen) - instance.slack)
 
 
 def _surplus(asked: int, used: int) -> str:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 
 import numpy as np
 
 from ..arrays import Boolean, Integer
+from ..progress import Progress
 from .bounds import select
-from .instance import SLACK, Instance
+from .instance import Instance
 from .problem import TIE
-
-SINGLE = 1e-6
-"""Relative error of a sum of positive numbers in single precision, with room to spare."""
 
 
 def greedy(
@@ -41,9 +40,8 @@ def greedy(
     """
     chosen, bound = start, instance.total
     while True:
-        uncovered = ~instance.visible[chosen].any(axis=0)
-        gain = (instance.matrix @ (instance.weight * uncovered).astype(np.float32)).astype(np.float64)
-        bound = min(bound, (instance.covered(chosen) + select(instance, gain).value) * (1 + SINGLE))
+        gain = instance.gains(instance.uncovered(chosen))
+        bound = min(bound, instance.covered(chosen) + select(instance, gain).value)
         gain[~addable(instance, chosen)] = 0.0
         score = gain / np.maximum(instance.price, TIE * instance.price.max()) if per_price else gain
         best = int(np.argmax(score))
@@ -52,19 +50,31 @@ def greedy(
         chosen = np.append(chosen, best)
 
 
-def greedy_and_exchange(instance: Instance, start: Integer) -> Integer:
-    """Return the best of the greedy choices after exchanges, ascending."""
+def greedy_choices(instance: Instance, start: Integer) -> list[tuple[Integer, float]]:
+    """Return the greedy choice by gain and, under a budget, the one by gain per price, each with its bound."""
     by_price = [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
-    choices = [exchange(instance, greedy(instance, start, per_price=per_price)[0]) for per_price in by_price]
-    return max(choices, key=instance.covered)
+    return [greedy(instance, start, per_price=per_price) for per_price in by_price]
 
 
-def exchange(instance: Instance, chosen: Integer) -> Integer:
+def greedy_and_exchange(instance: Instance, start: Integer) -> Generator[Progress, None, Integer]:
+    """Return the best of the greedy choices after exchanges, ascending."""
+    best = start
+    for chosen, _ in greedy_choices(instance, start):
+        improved = yield from exchange(instance, chosen)
+        best = max(best, improved, key=instance.covered)
+    return best
+
+
+def exchange(instance: Instance, chosen: Integer) -> Generator[Progress, None, Integer]:
     """Swap one sensor for another, and add sensors, for as long as coverage grows."""
     while True:
         chosen = greedy(instance, chosen)[0]
+        covered = instance.covered(chosen)
+        if covered == instance.total:
+            return chosen
+        yield Progress(0, 0, "exchanging sensors")
         swapped = _best_swap(instance, chosen)
-        if instance.covered(swapped) <= instance.covered(chosen) + SLACK:
+        if instance.covered(swapped) <= covered + instance.slack:
             return chosen
         chosen = swapped
 
@@ -73,7 +83,7 @@ def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
     """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != candidate]
-        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - SLACK:
+        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - instance.slack:
             chosen = rest
     return chosen
 
@@ -100,9 +110,8 @@ def _best_swap(instance: Instance, chosen: Integer) -> Integer:
     times = instance.visible[chosen].sum(axis=0)
     rests = [chosen[chosen != candidate] for candidate in chosen]
     uncovered = np.array([(times - instance.visible[candidate]) == 0 for candidate in chosen])
-    gain = instance.matrix @ (uncovered * instance.weight).T.astype(np.float32)
-    loss = (uncovered * instance.weight).sum(axis=1)
-    gain -= loss.astype(np.float32)
+    gain = instance.gains((uncovered * instance.weight).T)
+    gain -= (uncovered * instance.weight).sum(axis=1)
     for column, rest in zip(gain.T, rests, strict=True):
         column[~addable(instance, rest)] = -np.inf
     new, gone = np.unravel_index(int(np.argmax(gain)), gain.shape)

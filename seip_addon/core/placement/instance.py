@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,20 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from .problem import TIE, PlacementProblem, canonical_order
 
-SCALE = 1e4
-"""Total weight after scaling: far from the solvers' absolute tolerances (1e-6) on both sides of `SLACK`."""
+SINGLE = 2**24
+"""Sums of whole numbers up to here are exact in single precision, whatever the order of summation."""
 
-SLACK = TIE * SCALE
-"""Scaled weights that differ by less count as equal."""
+FINEST = 2**50
+"""Total of weights that have no common unit: sums stay exact in double precision, rounding far below `TIE`."""
 
-SOLVER_SLACK = 2e-6 * SCALE
-"""What a solver's tolerance of 1e-6 on every variable may add up to, doubled."""
+MICROMETRE = 1e-6
+"""Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
+
+DENOMINATORS = range(1, 13)
+"""A common unit of all weights is sought among these parts of the smallest one."""
+
+
+Numbers = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +39,18 @@ class Instance:
     visible : (c, t) bool
         No column is empty and no two are equal.
     weight : (t,) float64
-        Weights of the merged targets, scaled.
+        Weights of the merged targets: whole numbers, so that sums are exact and
+        ties are ties on every machine.
+    step : float
+        Smallest difference between two covered weights that counts.
+    slack : float
+        Covered weights that differ by no more count as equal.
     price : (c,) float64
     conflict : (c, c) bool
         Pairs that exclude each other: same position, or too close. The diagonal is false.
+    clique : (c,) int64
+        A partition of the candidates into sets of which one at most can be
+        chosen. Without a minimum distance these are the positions.
     mandatory : (g, c) bool
     original : (c,) int64
         Index of each candidate in the problem.
@@ -47,8 +62,11 @@ class Instance:
 
     visible: Boolean
     weight: Float
+    step: float
+    slack: float
     price: Float
     conflict: Boolean
+    clique: Integer
     mandatory: Boolean
     original: Integer
     count: int
@@ -59,56 +77,42 @@ class Instance:
         return len(self.visible)
 
     @cached_property
-    def matrix(self) -> NDArray[np.float32]:
-        """``visible`` as numbers, for products."""
-        return self.visible.astype(np.float32)
+    def matrix(self) -> Numbers:
+        """``visible`` as numbers, in the smallest precision in which products with weights are exact."""
+        return self.visible.astype(np.float32 if self.total < SINGLE else np.float64)
 
     @cached_property
     def total(self) -> float:
-        """Weight that all candidates together cover, scaled."""
-        return math.fsum(self.weight)
-
-    @cached_property
-    def clique(self) -> Integer:
-        """A partition of the candidates into sets of which one at most can be chosen, (c,) int64.
-
-        Without a minimum distance these are the positions.
-        """
-        clique = np.full(len(self), -1)
-        for first in range(len(self)):
-            if clique[first] < 0:
-                members = [first]
-                common = self.conflict[first] & (clique < 0)
-                while common.any():
-                    members.append(int(np.argmax(common)))
-                    common &= self.conflict[members[-1]]
-                clique[members] = first
-        numbered: Integer = np.unique(clique, return_inverse=True)[1]
-        return numbered
-
-    @cached_property
-    def step(self) -> float:
-        """Smallest difference between two covered weights: unit weights allow no value between two counts."""
-        times = self.weight / self.weight.min()
-        whole = bool(np.abs(times - np.rint(times)).max() < 1e-6)
-        return max(2 * SLACK, float(self.weight.min()) if whole else 0.0)
-
-    @property
-    def margin(self) -> float:
-        """How far a coverage to reach is lowered for a solver, which may miss each target by its tolerance."""
-        return max(self.step / 2, SOLVER_SLACK)
+        """Weight that all candidates together cover."""
+        return float(self.weight.sum())
 
     def attainable(self, goal: float) -> float:
         """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
-        return math.ceil((goal - SLACK) / self.step) * self.step if self.step > 2 * SLACK else goal
+        return math.ceil(goal - self.slack) if self.step == 1 else goal
+
+    def uncovered(self, chosen: Integer) -> Float:
+        """Return the weights of the targets, zero where the chosen candidates see them, (t,) float64."""
+        rest: Float = self.weight * ~self.visible[chosen].any(axis=0)
+        return rest
+
+    def gains(self, rest: Float) -> Float:
+        """Return what each candidate sees of some weights per target, exactly, (c, ...) float64.
+
+        Parameters
+        ----------
+        rest : (t, ...) float64
+            Each is a target's weight or zero.
+        """
+        gained: Float = (self.matrix @ rest.astype(self.matrix.dtype)).astype(np.float64)
+        return gained
 
     def covered(self, chosen: Integer) -> float:
-        """Return the scaled weight that the chosen candidates cover."""
-        return math.fsum(self.weight[self.visible[chosen].any(axis=0)])
+        """Return the weight that the chosen candidates cover."""
+        return float(self.weight[self.visible[chosen].any(axis=0)].sum())
 
     def doubly(self, chosen: Integer) -> float:
-        """Return the scaled weight that two or more of the chosen candidates cover."""
-        return math.fsum(self.weight[self.visible[chosen].sum(axis=0) > 1])
+        """Return the weight that two or more of the chosen candidates cover."""
+        return float(self.weight[self.visible[chosen].sum(axis=0) > 1].sum())
 
     def affordable(self, price: Float | float) -> Boolean | bool:
         """Return whether a total price is within the budget, but for rounding."""
@@ -132,6 +136,7 @@ class Instance:
             weight=weight,
             price=self.price[keep],
             conflict=self.conflict[np.ix_(keep, keep)],
+            clique=self.clique[keep],
             mandatory=self.mandatory[:, keep],
             original=self.original[keep],
         )
@@ -147,35 +152,69 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     """
     order = canonical_order(problem)
     order = order[problem.allowed[order]]
-    visible, weight = merge_targets(problem.visible[order], problem.weights)
-    if len(weight) == 0:
+    seen = problem.visible[order].any(axis=0) & (problem.weights > 0)
+    if not seen.any():
         raise SeipError(
             "no candidate sees any target; raise the sensors, widen the tolerance or clear what stands in the way"
         )
-    factor = SCALE / math.fsum(weight)
+    unit, whole = common_unit(problem.weights[seen])
+    visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
+    slack = TIE * float(weight.sum())
     places = len(np.unique(problem.positions[order]))
+    conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
         visible=visible,
-        weight=weight * factor,
+        weight=weight,
+        step=1.0 if whole else 2 * slack,
+        slack=slack,
         price=problem.prices[order],
-        conflict=_conflicts(problem.positions[order], problem.xyz[order], problem.min_distance),
+        conflict=conflict,
+        clique=_cliques(conflict),
         mandatory=problem.mandatory_groups[:, order],
         original=order,
-        count=places if problem.count is None else problem.count,
+        count=min(places if problem.count is None else problem.count, _affordable_number(problem, order)),
         budget=math.inf if problem.budget is None else float(problem.budget),
     )
-    return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), factor
+    return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
+
+
+def _affordable_number(problem: PlacementProblem, order: Integer) -> int:
+    """Return how many sensors the budget buys at most, one at each position."""
+    if problem.budget is None:
+        return len(order)
+    cheapest = np.full(int(problem.positions.max()) + 1, math.inf)
+    np.minimum.at(cheapest, problem.positions[order], problem.prices[order])
+    return max(1, int(np.count_nonzero(np.cumsum(np.sort(cheapest)) <= problem.budget * (1 + TIE))))
+
+
+def common_unit(weights: Float) -> tuple[float, bool]:
+    """Return a unit in which all weights are whole numbers, and whether it is theirs or only a fine grain.
+
+    It is theirs where rounding all weights to its multiples moves no sum of
+    them by more than `TIE`, and a single unit counts for more than that.
+
+    Parameters
+    ----------
+    weights : (t,) float64
+        Positive.
+    """
+    total = math.fsum(weights)
+    for parts in DENOMINATORS:
+        unit = float(weights.min()) / parts
+        rounding = math.fsum(np.abs(weights - np.rint(weights / unit) * unit))
+        if unit > 4 * TIE * total and rounding <= TIE / 2 * total:
+            return unit, True
+    return total / FINEST, False
 
 
 def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
     """Merge targets that the same candidates see and drop those that none sees.
 
-    The result does not depend on the order of targets, rounding included.
-
     Parameters
     ----------
     visible : (c, t) bool
     weight : (t,) float64
+        Whole numbers.
 
     Returns
     -------
@@ -189,18 +228,31 @@ def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:
     packed = np.ascontiguousarray(np.packbits(visible, axis=0).T)
     keys = packed.view(np.dtype((np.void, packed.shape[1])))[:, 0]
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
-    by_group = np.lexsort((weight, group))
-    starts = np.searchsorted(group[by_group], np.arange(len(first)))
-    return visible[:, first], np.add.reduceat(weight[by_group], starts)
+    return visible[:, first], np.bincount(group, weight).astype(np.float64)
 
 
 def _conflicts(positions: Integer, xyz: Float, min_distance: float) -> Boolean:
     conflict: Boolean = positions[:, None] == positions[None, :]
     if min_distance > 0:
         for index, xy in enumerate(xyz[:, :2]):
-            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance
+            conflict[index] |= np.hypot(*(xyz[:, :2] - xy).T) < min_distance - MICROMETRE
     np.fill_diagonal(conflict, val=False)
     return conflict
+
+
+def _cliques(conflict: Boolean) -> Integer:
+    """Part the candidates into sets that all exclude each other, grown greedily in order, (c,) int64."""
+    clique = np.full(len(conflict), -1)
+    for first in range(len(conflict)):
+        if clique[first] < 0:
+            members = [first]
+            common = conflict[first] & (clique < 0)
+            while common.any():
+                members.append(int(np.argmax(common)))
+                common &= conflict[members[-1]]
+            clique[members] = first
+    numbered: Integer = np.unique(clique, return_inverse=True)[1]
+    return numbered
 
 
 def _superfluous(instance: Instance, positions: Integer) -> Boolean:

@@ -8,10 +8,11 @@ import os
 import shutil
 import stat
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,10 +23,21 @@ from pulp.apis.coin_api import pulp_cbc_path
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from .instance import SLACK, Instance
+from ..progress import Progress, in_thread
+from .instance import Instance
 from .problem import TIE
 
+SCALE = 1e4
+"""Total weight in a program: far above the solvers' absolute tolerances of 1e-6."""
+
+TOLERANCE = 2e-6
+"""Share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled."""
+
 SOLVERS = ("highs", "cbc", "gurobi")
+
+
+LONGEST = 1e7
+"""Seconds that solvers are given where there is no limit: not all of them take infinity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +81,23 @@ class CoverProgram:
 
     @cached_property
     def covered(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
-        """The covered weight."""
+        """The covered weight, scaled as `weight_scale` says."""
         for y, seen in zip(self._y, self._seen, strict=True):
             self.model += y <= seen
-        return _linear(self._y, self.instance.weight)
+        return _linear(self._y, self.instance.weight * self.weight_scale)
 
     @cached_property
     def doubly_covered(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
-        """The weight covered twice or more; `covered` must be required to be at its maximum."""
+        """The weight covered twice or more, scaled alike; `covered` must be required to be at its maximum."""
         z = [self.model.add_variable(f"z{j}", 0, 1) for j in range(len(self.instance.weight))]
         for z_j, y, seen in zip(z, self._y, self._seen, strict=True):
             self.model += z_j + y <= seen
-        return _linear(z, self.instance.weight)
+        return _linear(z, self.instance.weight * self.weight_scale)
+
+    @property
+    def weight_scale(self) -> float:
+        """Factor that brings the total weight to `SCALE`."""
+        return SCALE / self.instance.total if self.instance.total > 0 else 1.0
 
     @property
     def number(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
@@ -109,14 +126,14 @@ class CoverProgram:
             self._checks.append(check)
 
     def require_coverage(self, goal: float) -> None:
-        """Require a covered weight, but for `SLACK`."""
+        """Require a covered weight, but for the instance's slack."""
         instance = self.instance
-        self.require(self.covered >= goal - instance.margin, lambda c: instance.covered(c) >= goal - SLACK)
+        self.require(self._at_least(self.covered, goal), lambda c: instance.covered(c) >= goal - instance.slack)
 
     def require_double_coverage(self, goal: float) -> None:
-        """Require a doubly covered weight, but for `SLACK`."""
+        """Require a doubly covered weight, but for the instance's slack."""
         instance = self.instance
-        self.require(self.doubly_covered >= goal - instance.margin, lambda c: instance.doubly(c) >= goal - SLACK)
+        self.require(self._at_least(self.doubly_covered, goal), lambda c: instance.doubly(c) >= goal - instance.slack)
 
     def require_price(self, price: float) -> None:
         """Require a total price of at most ``price``, but for `TIE`."""
@@ -124,12 +141,24 @@ class CoverProgram:
         prices = self.instance.price
         self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
 
-    def maximise(self, objective: Any, solver: str, seconds: float) -> Outcome:  # noqa: ANN401 -- as above
-        """Solve for the largest objective within a time limit; the last requirement stays."""
+    def maximise(
+        self,
+        objective: Any,  # noqa: ANN401 -- as above
+        solver: str,
+        seconds: float,
+    ) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest objective within a time limit; the last requirement stays.
+
+        The solver works in a thread of its own; when the generator is closed it is told to stop.
+        """
         self.model.setObjective(objective)
         ends = time.perf_counter() + seconds
         while True:
-            outcome = self._solve(solver, ends - time.perf_counter())
+            left = max(ends - time.perf_counter(), 0.01)
+            outcome = yield from in_thread(
+                lambda stop, left=left: self._solve(solver, left, stop),  # type: ignore[misc]
+                f"solving an integer program of {len(self.x)} candidates",
+            )
             chosen = outcome.chosen
             if chosen is None or all(check(chosen) for check in self._checks):
                 return outcome
@@ -137,12 +166,18 @@ class CoverProgram:
             others = np.setdiff1d(np.arange(len(self.x)), chosen)
             self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
 
-    def maximise_coverage(self, solver: str, seconds: float) -> Outcome:
-        """Solve for the largest covered weight within a time limit."""
-        return self.maximise(self.covered, solver, seconds)
+    def maximise_coverage(self, solver: str, seconds: float) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest covered weight within a time limit; the outcome's bound is not scaled."""
+        outcome = yield from self.maximise(self.covered, solver, seconds)
+        return replace(outcome, bound=outcome.bound / self.weight_scale)
 
-    def _solve(self, solver: str, seconds: float) -> Outcome:
-        with _engine(solver, max(seconds, 0.01)) as engine:
+    def _at_least(self, covered: Any, goal: float) -> Any:  # noqa: ANN401 -- as above
+        """Return the requirement of a weight, lowered by what a solver may miss it by."""
+        margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
+        return covered >= (goal - margin) * self.weight_scale
+
+    def _solve(self, solver: str, seconds: float, stop: threading.Event) -> Outcome:
+        with _engine(solver, seconds, stop) as engine:
             try:
                 self.model.solve(engine)
             except (pulp.PulpSolverError, OSError) as error:
@@ -236,15 +271,32 @@ def _linear(variables: list[Any], factors: Float) -> Any:  # noqa: ANN401 -- PuL
 
 
 @contextmanager
-def _engine(solver: str, seconds: float) -> Iterator[Any]:
-    """Yield PuLP's interface to a solver, set to prove optimality."""
+def _engine(solver: str, seconds: float, stop: threading.Event) -> Iterator[Any]:
+    """Yield PuLP's interface to a solver, set to prove optimality.
+
+    HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
+    """
+    limit = min(seconds, LONGEST)
     if solver == "highs":
-        yield pulp.HiGHS(msg=False, timeLimit=seconds, gapRel=0.0, threads=1)
+        import highspy  # noqa: PLC0415 -- only where it is asked for: another solver may be all there is
+
+        def interrupt(kind: object, message: object, output: object, answer: Any, data: object) -> None:  # noqa: ANN401, ARG001
+            answer.user_interrupt = stop.is_set()
+
+        kinds = highspy.cb.HighsCallbackType
+        yield pulp.HiGHS(
+            msg=False,
+            timeLimit=limit,
+            gapRel=0.0,
+            threads=1,
+            callbackTuple=(interrupt, None),
+            callbacksToActivate=[kinds.kCallbackMipInterrupt, kinds.kCallbackSimplexInterrupt],
+        )
     elif solver == "cbc":
         with _executable_cbc() as path:
-            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=seconds, gapRel=0.0, threads=1)
+            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=limit, gapRel=0.0, threads=1)
     else:
-        yield pulp.GUROBI(msg=False, timeLimit=seconds, gapRel=0.0, Threads=1)
+        yield pulp.GUROBI(msg=False, timeLimit=limit, gapRel=0.0, Threads=1)
 
 
 def _bound(model: pulp.LpProblem, solver: str) -> float:

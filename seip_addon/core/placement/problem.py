@@ -151,7 +151,7 @@ class Placement:
     bound : float
         No placement has a better objective than this.
     gap : float
-        ``abs(bound - objective) / objective``.
+        ``abs(bound - objective) / objective``; 0 where the two are equal.
     status : str
         ``optimal`` (proven) or ``feasible``.
     solver : str
@@ -162,8 +162,6 @@ class Placement:
         Weight of the targets that some chosen sensor sees.
     price : float
         Total price.
-    seen_by : (t,) int64
-        How many of the chosen sensors see each target.
     notes : tuple of str
         What a person should know about this answer, in sentences.
     """
@@ -177,7 +175,6 @@ class Placement:
     seconds: float
     covered: float
     price: float
-    seen_by: Integer
     notes: tuple[str, ...] = ()
 
 
@@ -188,7 +185,7 @@ def canonical_order(problem: PlacementProblem) -> Integer:
     return order
 
 
-def placement(  # noqa: PLR0913 -- the fields of one record
+def record_choice(  # noqa: PLR0913 -- the fields of one record
     problem: PlacementProblem,
     chosen: Integer,
     bound: float,
@@ -199,19 +196,24 @@ def placement(  # noqa: PLR0913 -- the fields of one record
     notes: tuple[str, ...],
 ) -> Placement:
     """Make the record of a choice that was optimised for coverage."""
-    times = problem.visible[chosen].sum(axis=0, dtype=np.int64)
-    covered = math.fsum(problem.weights[times > 0])
+    covered = math.fsum(problem.weights[problem.visible[chosen].any(axis=0)])
     bound = covered if optimal else max(bound, covered)
     return Placement(
         chosen=chosen,
         objective=covered,
         bound=bound,
-        gap=(bound - covered) / covered if covered > 0 else math.inf,
+        gap=relative_gap(covered, bound),
         status="optimal" if optimal else "feasible",
         solver=solver,
         seconds=seconds,
         covered=covered,
         price=math.fsum(problem.prices[chosen]),
-        seen_by=times,
         notes=notes,
     )
+
+
+def relative_gap(objective: float, bound: float) -> float:
+    """Return how far a bound is from an objective, as a share of the objective."""
+    if bound == objective:
+        return 0.0
+    return abs(bound - objective) / objective if objective > 0 else math.inf

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Integer
+from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
@@ -16,9 +16,9 @@ from .clock import Clock
 from .exact import prove, solve
 from .feasibility import starting_choice
 from .greedy import greedy, greedy_and_exchange, without_idle
-from .instance import SLACK, Instance, make_instance
+from .instance import Instance, common_unit, make_instance
 from .integer_program import check_solver, reaching
-from .problem import TIE, Placement, PlacementProblem, placement
+from .problem import TIE, Placement, PlacementProblem, record_choice, relative_gap
 from .ties import fewest
 
 FINISH = 1.0
@@ -67,7 +67,7 @@ def cheapest_for_coverage(
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
     cheapest, bound = yield from _cheapest(instance, without_idle(instance, chosen, goal), goal, solver, clock)
     best = yield from solve(_no_dearer(problem, instance, cheapest), solver=solver, time_limit=max(clock.left, FINISH))
-    reached = best.covered * factor >= goal - SLACK
+    reached = best.covered * factor >= goal - instance.slack
     chosen = best.chosen if reached else instance.original[cheapest]
     return _record(problem, chosen, bound, best, clock)
 
@@ -76,16 +76,17 @@ def _reaching(
     problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, Integer]:
     """Return some placement that reaches the goal."""
-    start = starting_choice(problem, instance, solver)
-    chosen, _ = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - SLACK)
-    if instance.covered(chosen) >= goal - SLACK:
+    start = yield from starting_choice(problem, instance, solver)
+    chosen, _ = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
+    if instance.covered(chosen) >= goal - instance.slack:
         return chosen
-    proof = yield from prove(instance, greedy_and_exchange(instance, start), solver, clock)
+    first = yield from greedy_and_exchange(instance, start)
+    proof = yield from prove(instance, first, solver, clock)
     covered = instance.covered(proof.chosen)
-    if covered >= goal - SLACK:
+    if covered >= goal - instance.slack:
         return proof.chosen
     wanted = f"a coverage of {goal / whole:.2%}"
-    if proof.bound < goal - SLACK:
+    if proof.bound < goal - instance.slack:
         raise SeipError(
             f"{wanted} cannot be reached: no placement covers more than {proof.bound / whole:.2%}; "
             "ask for less, or allow more or better sensors"
@@ -110,18 +111,24 @@ def _cheapest(
         price = math.fsum(instance.price[chosen])
         single = float(instance.price[0])
         return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
-    cheaper = replace(instance, budget=price * (1 - 3 * TIE))
+    cheaper = replace(instance, budget=_below(price, instance.price))
     keep = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
     if len(keep) == 0:
         return chosen, price
-    yield Progress(0, 1, f"looking for a cheaper placement among {len(keep)} candidates")
+    yield Progress(0, 0, f"looking for a cheaper placement among {len(keep)} candidates")
     program = reaching(cheaper.part(keep), goal)
-    outcome = program.maximise(-1 * program.price, solver, clock.left)
+    outcome = yield from program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
     if outcome.finished:
         return chosen, price
     return chosen, min(price, max(least, -outcome.bound / program.price_scale))
+
+
+def _below(price: float, prices: Float) -> float:
+    """Return a budget that any lower total price meets, and that is as far below the price as it can be."""
+    unit, whole = common_unit(prices[prices > 0])
+    return price - unit / 2 if whole else price * (1 - 3 * TIE)
 
 
 def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
@@ -132,7 +139,9 @@ def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer)
 
 
 def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
-    record = placement(problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.elapsed, notes=())
+    record = record_choice(
+        problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.elapsed, notes=()
+    )
     price = record.price
     optimal = bound >= price * (1 - 3 * TIE)
     notes = []
@@ -146,7 +155,7 @@ def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Plac
         record,
         objective=price,
         bound=price if optimal else bound,
-        gap=0.0 if optimal else (price - bound) / price,
+        gap=0.0 if optimal else relative_gap(price, bound),
         status="optimal" if optimal else "feasible",
         notes=tuple(notes),
     )

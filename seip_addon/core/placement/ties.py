@@ -17,14 +17,14 @@ import numpy as np
 from ..arrays import Integer
 from ..progress import Progress
 from .bounds import can_reach, lagrangian_bound
-from .branch_and_bound import all_reaching, best_reaching, is_worthwhile
+from .branch_and_bound import best_placements, first_in_order, is_worthwhile, merit
 from .clock import Clock
 from .greedy import exchange, without_idle, without_weakest
-from .instance import SLACK, Instance
+from .instance import Instance
 from .integer_program import reaching
 
-MANY = 20_000
-"""Ties that branch and bound lists."""
+MANY = 2_000
+"""Ties that branch and bound lists; of more it looks for the first in order."""
 
 SOME = 12
 """Ties that are listed by one program each; beyond, each stage is a program of its own."""
@@ -34,7 +34,7 @@ BLOCK = 10
 
 
 def canonical_optimum(
-    instance: Instance, chosen: Integer, solver: str, clock: Clock
+    instance: Instance, chosen: Integer, ties: tuple[Integer, ...] | None, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, bool]]:
     """Return the canonical one of the placements that cover as much as an optimal one.
 
@@ -43,6 +43,8 @@ def canonical_optimum(
     instance : Instance
     chosen : (k,) int64
         An optimal placement.
+    ties : tuple of (k,) int64, optional
+        All optimal placements, but for those with idle sensors, where they are known.
     solver : str
     clock : Clock
 
@@ -57,6 +59,8 @@ def canonical_optimum(
     bool
         Whether every stage came to its end.
     """
+    if ties is not None:
+        return min(ties, key=lambda choice: merit(instance, choice)), True
     goal = instance.covered(chosen)
     chosen, settled = yield from fewest(instance, chosen, goal, solver, clock)
     if not settled:
@@ -64,17 +68,17 @@ def canonical_optimum(
     same_number = replace(instance, count=len(chosen))
     bound = yield from lagrangian_bound(same_number, goal, clock)
     keep = np.union1d(can_reach(same_number, bound, goal), chosen)
-    yield Progress(0, 1, f"breaking ties among {len(keep)} candidates")
+    yield Progress(0, 0, f"breaking ties among {len(keep)} candidates")
     part, within = same_number.part(keep), np.searchsorted(keep, chosen)
     if is_worthwhile(same_number, keep):
-        listed = yield from all_reaching(part, goal, MANY, clock, clock.left / 2)
-        if listed.finished:
-            return keep[min(listed.placements, key=lambda choice: _merit(part, choice))], True
-    equal, all_found = _all_equal(part, within, goal, solver, clock)
-    best = min(equal, key=lambda choice: _merit(part, choice))
+        found, finished = yield from first_in_order(part, goal, clock, clock.left)
+        candidates = [within] if found is None else [within, found]
+        return keep[min(candidates, key=lambda choice: merit(part, choice))], finished
+    equal, all_found = yield from _all_equal(part, within, goal, solver, clock)
+    best = min(equal, key=lambda choice: merit(part, choice))
     if all_found or len(equal) < SOME:
         return keep[best], all_found
-    best, settled = _settle(part, goal, best, solver, clock)
+    best, settled = yield from _settle(part, goal, best, solver, clock)
     return keep[best], settled
 
 
@@ -84,30 +88,32 @@ def fewest(
     """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
     while len(chosen) > 1:
         fewer = replace(instance, count=len(chosen) - 1)
-        exchanged = exchange(fewer, without_weakest(instance, chosen))
-        if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - SLACK:
+        exchanged = yield from exchange(fewer, without_weakest(instance, chosen))
+        if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - instance.slack:
             chosen = without_idle(fewer, exchanged, goal)
             continue
         bound = yield from lagrangian_bound(fewer, goal, clock)
         keep = can_reach(fewer, bound, goal)
-        if bound.value < goal - SLACK or len(keep) == 0:
+        if bound.value < goal - instance.slack or len(keep) == 0:
             break
-        yield Progress(0, 1, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
+        yield Progress(0, 0, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
         if is_worthwhile(fewer, keep):
-            found = yield from best_reaching(fewer.part(keep), goal, clock, clock.left / 2)
+            found = yield from best_placements(fewer.part(keep), goal, 0, goal, clock, clock.left / 2)
             if found.placements:
                 chosen = without_idle(fewer, keep[found.placements[0]], goal)
                 continue
             if found.finished:
                 break
-        outcome = reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
+        outcome = yield from reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
         if outcome.chosen is None:
             return chosen, outcome.finished
         chosen = without_idle(fewer, keep[outcome.chosen], goal)
     return chosen, True
 
 
-def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock: Clock) -> tuple[list[Integer], bool]:
+def _all_equal(
+    part: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[list[Integer], bool]]:
     """Return the placements that reach the goal, `SOME` at most, and whether these are all.
 
     Each is found by maximising coverage once more with those before forbidden:
@@ -117,18 +123,11 @@ def _all_equal(part: Instance, chosen: Integer, goal: float, solver: str, clock:
     found = [chosen]
     while len(found) < SOME:
         program.require(program.number_among(found[-1]) <= len(chosen) - 1)
-        outcome = program.maximise_coverage(solver, clock.left)
+        outcome = yield from program.maximise_coverage(solver, clock.left)
         if outcome.chosen is None:
             return found, outcome.finished
         found.append(outcome.chosen)
     return found, False
-
-
-def _merit(part: Instance, chosen: Integer) -> tuple[float, float, list[int]]:
-    """Return price, double coverage and order as a key, smallest first, rounded to what counts as equal."""
-    price = math.fsum(part.price[chosen])
-    dearest = float(part.price.max()) or 1.0
-    return round(price / dearest, 8), -round(part.doubly(chosen) / SLACK / 10), chosen.tolist()
 
 
 class _Stages:
@@ -141,27 +140,29 @@ class _Stages:
         self._solver = solver
         self._clock = clock
 
-    def maximise(self, objective: Any) -> None:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def maximise(self, objective: Any) -> Generator[Progress, None, None]:  # noqa: ANN401 -- PuLP's expressions are untyped
         if self.settled:
-            outcome = self.program.maximise(objective, self._solver, self._clock.left)
+            outcome = yield from self.program.maximise(objective, self._solver, self._clock.left)
             self.settled = outcome.finished and outcome.chosen is not None
             if self.settled and outcome.chosen is not None:
                 self.chosen = outcome.chosen
 
 
-def _settle(part: Instance, goal: float, chosen: Integer, solver: str, clock: Clock) -> tuple[Integer, bool]:
+def _settle(
+    part: Instance, goal: float, chosen: Integer, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Integer, bool]]:
     """Settle price, double coverage and order by integer programs: for ties too many to list."""
     stages = _Stages(part, goal, chosen, solver, clock)
     program = stages.program
     if np.ptp(part.price) > 0:
-        stages.maximise(-1 * program.price)
+        yield from stages.maximise(-1 * program.price)
         program.require_price(math.fsum(part.price[stages.chosen]))
     if len(chosen) > 1:
-        stages.maximise(program.doubly_covered)
+        yield from stages.maximise(program.doubly_covered)
         program.require_double_coverage(part.doubly(stages.chosen))
     for block in np.array_split(np.arange(len(part)), range(BLOCK, len(part), BLOCK)):
         # the indicator of the choice, read as a binary number, a block of digits at a time
-        stages.maximise(program.number_among(block, 2.0 ** np.arange(len(block))[::-1]))
+        yield from stages.maximise(program.number_among(block, 2.0 ** np.arange(len(block))[::-1]))
         for candidate in block:
             program.require(program.x[candidate] == int(candidate in stages.chosen))
         if stages.chosen.max() <= block[-1]:

@@ -13,7 +13,7 @@ from ..lidar import LidarModel
 from ..site import Site
 from ..storage import whole_file
 from .deployment import Deployment, weighted_share
-from .placement_record import degrees
+from .headings import degrees
 
 COLUMNS = (
     "pose",

@@ -12,7 +12,6 @@ clockwise there [1]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from typing import Any
@@ -21,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..lidar import LidarModel
-from ..storage import whole_file
+from ..storage import save_json
 from .deployment import Deployment, Sensor
+from .headings import clockwise_degrees
 
 BLUEPRINT = "sensor.lidar.ray_cast"
 EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print
@@ -48,9 +48,7 @@ def carla_spawns(deployment: Deployment, origin: NDArray[np.float64]) -> list[di
 
 def save_carla_spawns(path: str | os.PathLike[str], deployment: Deployment, origin: NDArray[np.float64]) -> None:
     """Write `carla_spawns` as JSON."""
-    with whole_file(path) as temporary:
-        text = json.dumps(carla_spawns(deployment, origin), indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    save_json(path, carla_spawns(deployment, origin))
 
 
 def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
@@ -60,7 +58,7 @@ def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
         "blueprint": BLUEPRINT,
         "transform": {
             "location": {"x": x, "y": -y + 0.0, "z": z},
-            "rotation": {"pitch": 0.0, "yaw": _clockwise_degrees(sensor.yaw), "roll": 0.0},
+            "rotation": {"pitch": 0.0, "yaw": clockwise_degrees(sensor.yaw), "roll": 0.0},
         },
         "attributes": _attributes(sensor),
         "note": _note(sensor.model),
@@ -88,18 +86,22 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
 
 
 def _note(model: LidarModel) -> str:
-    """Say what CARLA cannot express."""
+    """Say what CARLA cannot express, or nothing where it can express all."""
+    parts = []
     descending = np.sort(model.elevations)[::-1]
     even = np.linspace(descending[0], descending[-1], len(descending))
-    off = math.degrees(np.abs(descending - even).max())
-    if off <= math.degrees(EVEN_WITHIN):
-        return ""
-    return (
-        f"{model.name} spaces its {len(descending)} channels unevenly; CARLA spreads them evenly over the same field "
-        f"of view, so that its beams are up to {off:.1f} degrees off"
-    )
-
-
-def _clockwise_degrees(yaw: float) -> float:
-    """Return CARLA's yaw for ours, -180 <= yaw < 180."""
-    return (round(-math.degrees(yaw), 6) + 180.0) % 360.0 - 180.0 + 0.0
+    off = np.abs(descending - even).max()
+    if off > EVEN_WITHIN:
+        parts.append(
+            f"spaces its {len(descending)} channels unevenly, where CARLA spreads them evenly over the same field of "
+            f"view, so that its beams are up to {math.degrees(off):.1f} degrees off in elevation"
+        )
+    ahead = np.abs(model.azimuth_offsets).max()
+    if ahead > 0.0:
+        parts.append(
+            f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, where "
+            "CARLA fires all along it"
+        )
+    if model.min_range > 0.0:
+        parts.append(f"returns nothing nearer than {model.min_range:g} m, where CARLA does")
+    return f"{model.name} {'; it '.join(parts)}" if parts else ""

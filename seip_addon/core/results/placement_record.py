@@ -21,8 +21,9 @@ from ..errors import SeipError
 from ..goal import Plan
 from ..placement import Placement
 from ..site import Site
-from ..storage import whole_file
+from ..storage import save_json
 from .deployment import Sensor
+from .headings import degrees
 
 Record = dict[str, Any]
 
@@ -47,8 +48,6 @@ class Run:
         Of the program and what it stands on; see `versions`.
     inputs : mapping of str to str
         Digests or names of what went in.
-    seeds : mapping of str to int
-        Of every random number generator.
     warnings : tuple of str
         What the user should know before trusting the figures.
     """
@@ -58,7 +57,6 @@ class Run:
     durations: Mapping[str, float]
     versions: Mapping[str, str]
     inputs: Mapping[str, str] = field(default_factory=dict)
-    seeds: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
 
@@ -109,7 +107,7 @@ def placement_record(site: Site, plan: Plan, run: Run) -> Record:
         "greedy": None if greedy is None else _greedy(greedy, placement),
         "counts": _counts(site),
         "settings": dict(run.settings),
-        "seeds": dict(run.seeds),
+        "seeds": {},  # visibility and placement draw no random numbers
         "inputs": dict(run.inputs),
         "notes": list(placement.notes),
         "warnings": list(run.warnings),
@@ -128,9 +126,7 @@ def comparable(record: Record) -> Record:
 
 def save_placement_record(path: str | os.PathLike[str], record: Record) -> None:
     """Write ``placement.json``."""
-    with whole_file(path) as temporary:
-        text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    save_json(path, record)
 
 
 def load_placement_record(path: str | os.PathLike[str]) -> Record:
@@ -170,11 +166,6 @@ def _sensor(sensor: Sensor, origin: Float) -> Record:
         "coverage_added": _share(sensor.added),
         "coverage_marginal": _share(sensor.marginal),
     }
-
-
-def degrees(angle: float) -> float:
-    """Return an angle in degrees, 0 <= angle < 360, to the millionth."""
-    return _rounded(math.degrees(angle), 6) % 360.0
 
 
 def _greedy(greedy: Placement, placement: Placement) -> Record:

@@ -20,9 +20,15 @@ from shapely.validation import explain_validity
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..scene_geometry import DEFAULT_WEIGHT
 
 DEFAULT_RADIUS = 80.0
-DEFAULT_WEIGHT = 2.0
+
+LARGEST = 100_000.0
+"""Metres (or degrees, or a weight) that nothing described may exceed."""
+
+LONGEST_ROW = 10_000
+"""Trees or lights of a row beyond which its spacing is a slip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +153,7 @@ def read_site_description(path: Path) -> SiteDescription:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no UTF-8 text"
         raise SeipError(f"cannot read the site description {path}: {reason}") from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SeipError(f"{path} is not valid TOML: {error}") from error
     table = _Table(content, str(path))
     map_name = table.text("map", None)
@@ -253,10 +259,13 @@ class _Table:
         value = self._take(key)
         if value is None:
             if default is None:
-                raise SeipError(f"{self.where}: {key} is missing")
+                close = difflib.get_close_matches(key, set(self.content) - set(self.known), n=1, cutoff=0.6)
+                raise SeipError(f"{self.where}: {key} is missing{f' (is {close[0]!r} a slip?)' if close else ''}")
             return default
         if not _is_number(value):
-            raise self._wrong(key, "a number")
+            raise self._wrong(key, "a number below 1e9")
+        if abs(value) > LARGEST:
+            raise self._wrong(key, f"at most {LARGEST:g}, not {value:g}")
         if not (value > above and value >= least):
             raise self._wrong(
                 key, f"{'above' if above > -math.inf else 'at least'} {max(above, least):g}, not {value:g}"
@@ -303,6 +312,10 @@ class _Table:
             raise SeipError(f"{self.where}: give either position = [x, y] or a row with from, to and spacing")
         ends = np.array([start, stop])
         length = float(np.hypot(*(ends[1] - ends[0])))
+        if length / spacing > LONGEST_ROW:
+            raise SeipError(
+                f"{self.where}: this row has {length / spacing:.3g} places; make it {LONGEST_ROW:,} at most"
+            )
         gaps = int(length / spacing + 1e-9)
         along = np.arange(gaps + 1) * (spacing / length if length > 0 else 0.0)
         row: Float = ends[0] + along[:, None] * (ends[1] - ends[0])
@@ -331,11 +344,14 @@ class _Table:
         if not polygon.is_valid or polygon.area == 0.0:
             reason = explain_validity(polygon) if not polygon.is_valid else "no area"
             raise self._wrong(key, f"the outline of an area that does not cross itself ({reason})")
+        if polygon.length > LARGEST:
+            raise self._wrong(key, f"an outline of at most {LARGEST:g} m, not {polygon.length:.3g} m")
         return polygon
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    # Whole numbers of any length are valid TOML; no coordinate on Earth reaches this.
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e9
 
 
 def _is_point(value: object) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +21,17 @@ from ..opendrive import (
     placed_objects,
     placed_signals,
 )
+from ..progress import Progress
+from ..scene_geometry import DEFAULT_WEIGHT
 from . import road_surface, street_furniture
-from .description import DEFAULT_WEIGHT, Poles, SiteDescription, WeightedRegion
+from .description import Poles, SiteDescription, WeightedRegion
 from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
 from .parts import Part, Role
 from .terrain import Terrain
 
+STAGES = 6
+"""Pieces of work that a model is made in once the map's lanes are known."""
+ROADS_PER_STEP = 20
 MARGIN = 40.0
 """How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
 CANDIDATE_MARGIN = 15.0
@@ -37,13 +42,14 @@ VERGE_BELOW = 0.03
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
 VERGE_SPACING = 12.0
-VEIL_SPACING = 10.0
+VEIL_SPACING = 4.0
+"""As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
 VEILS = {
-    Role.REGION: (0.05, "region veil"),
-    Role.WEIGHTED_REGIONS: (0.08, "weighted veil"),
-    Role.FORBIDDEN_AREAS: (0.11, "forbidden veil"),
-    Role.MANDATORY_AREAS: (0.14, "mandatory veil"),
-    Role.CANDIDATE_AREAS: (0.05, "candidate veil"),
+    Role.REGION: (0.03, "region veil"),
+    Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
+    Role.FORBIDDEN_AREAS: (0.05, "forbidden veil"),
+    Role.MANDATORY_AREAS: (0.06, "mandatory veil"),
+    Role.CANDIDATE_AREAS: (0.03, "candidate veil"),
 }
 """Height above the ground (metres) and material of areas that are not there to be seen."""
 
@@ -100,7 +106,7 @@ class _Street:
     terrain: Terrain
 
 
-def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
+def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
     """Model a place of a map.
 
     Parameters
@@ -109,24 +115,41 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
     description : SiteDescription
         Which place, and what stands there besides what the map has.
 
+    Yields
+    ------
+    Progress
+        Roads of the map laid out, then stages of the model, of all.
+
+    Returns
+    -------
+    SiteModel
+
     Raises
     ------
     SeipError
         No such junction, no road at the place, or an empty region of interest.
     """
-    surfaces = lane_surfaces(road_map)
+    surfaces = yield from _all_lanes(road_map)
+    stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
+    yield next(stages)
     centre = _centre(road_map, surfaces, description)
     region = _region(road_map, surfaces, description, centre)
     origin = _origin(surfaces, centre)
+    yield next(stages)
     street = _street(surfaces, origin, _shifted(region, -origin))
+    yield next(stages)
     around = _shifted(street.extent, origin)
     objects = object_parts(placed_objects(road_map, area=around), origin, street.carriageway)
     signals = signal_parts(placed_signals(road_map, area=around), origin, street.carriageway, street.terrain)
     furniture = [*objects, *signals, *_described_parts(description, street)]
+    yield next(stages)
     pavement, notes = _pavement_parts(street)
+    yield next(stages)
+    carriageway = _surface_parts(street)
+    yield next(stages)
     weighted = _weighted_areas(road_map, surfaces, description, centre)
     parts = [
-        *_surface_parts(street),
+        *carriageway,
         *pavement,
         _verge_part(street, furniture),
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
@@ -135,6 +158,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
         *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
         *_area_parts(description, street),
     ]
+    yield next(stages)
     return SiteModel(
         name=description.name or road_map.name,
         origin=origin,
@@ -144,6 +168,16 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> SiteModel:
         region=street.region,
         notes=notes,
     )
+
+
+def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface, ...]]:
+    """Return the lanes of all roads."""
+    surfaces: list[LaneSurface] = []
+    for number, road in enumerate(road_map.roads):
+        if number % ROADS_PER_STEP == 0:
+            yield Progress(number, len(road_map.roads), "roads")
+        surfaces += lane_surfaces(road)
+    return tuple(surfaces)
 
 
 def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription) -> Float:
@@ -172,7 +206,7 @@ def _region(
     shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
     near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
     if near:
-        region = road_surface.without_crumbs(road_surface.outline(near).intersection(_shifted(within, -shift)))
+        region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(_shifted(within, -shift)))
         if not region.is_empty:
             return _shifted(region, shift)
     where = (
@@ -207,7 +241,7 @@ def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
-    carriageway = road_surface.outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
+    carriageway = road_surface.lane_outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
     shapely.prepare(carriageway)
     return _Street(origin, lanes, region, extent, carriageway, Terrain(triangles))
 
@@ -258,7 +292,7 @@ def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
     ground = street.extent if built_up.is_empty else street.extent.union(built_up.buffer(GARDEN)).convex_hull
-    covered = road_surface.outline(street.lanes).intersection(street.extent)
+    covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     beside = road_surface.without_crumbs(ground.difference(covered.buffer(-road_surface.SEAM, join_style="mitre")))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
@@ -360,8 +394,9 @@ def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
         yield pole_part(f"Street light {number}", shape, foot, heading)
+    keeps_left = any(lane.keeps_left for lane in street.lanes)
     for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
-        shape = street_furniture.signal_pole(row.height, row.arm)
+        shape = street_furniture.signal_pole(row.height, row.arm, faces_left=not keeps_left)
         yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading)
 
 

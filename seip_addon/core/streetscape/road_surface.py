@@ -12,6 +12,7 @@ from shapely.geometry.polygon import orient
 
 from ..arrays import Float
 from ..opendrive import LaneSurface
+from ..plan_geometry import closed, outline
 from .terrain import Terrain, cut
 
 GROUPS = {
@@ -78,14 +79,9 @@ def in_groups(surfaces: Iterable[LaneSurface], groups: Sequence[str]) -> tuple[L
     return tuple(surface for surface in surfaces if group(surface) in groups)
 
 
-def outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
     """Return the area in plan that lanes cover, with seams and crumbs closed."""
     return without_crumbs(closed(_plan(surfaces), SEAM).simplify(0.01))
-
-
-def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
-    """Return an area in plan with gaps up to twice ``gap`` metres filled."""
-    return area.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
 
 
 def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
@@ -111,7 +107,7 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
     pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
     for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
         own = [lane for lane in lanes if lane.junction_id == junction]
-        area = outline(own)
+        area = lane_outline(own)
         if name != "driving":
             driving = in_groups(surfaces, ["driving"])
             area = without_crumbs(area.difference(_plan([lane for lane in driving if lane.junction_id == junction])))
@@ -125,7 +121,7 @@ def kerb_faces(pavement: Float) -> Float:
     """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3)."""
     if len(pavement) == 0:
         return pavement
-    plan = without_crumbs(closed(plan_of(pavement), SEAM).simplify(0.01))
+    plan = without_crumbs(closed(outline(pavement, GRID), SEAM).simplify(0.01))
     terrain = Terrain(pavement)
     parts = map(orient, shapely.get_parts(plan))
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
@@ -141,7 +137,7 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
         return np.empty((0, 3, 3))
-    walked = plan_of(pavement)
+    walked = outline(pavement, GRID)
     street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
     notches = closed(street, CORNER_NOTCH).difference(street)
     corners = [
@@ -173,12 +169,12 @@ def markings(surfaces: Sequence[LaneSurface]) -> Float:
 
 
 def stop_lines(surfaces: Sequence[LaneSurface]) -> Float:
-    """Return (n, 4, 3) quads where driving lanes enter a junction; traffic keeps to the right."""
+    """Return (n, 4, 3) quads where driving lanes enter a junction."""
     inside = _junctions(surfaces).buffer(0.3)
     shapely.prepare(inside)
     quads = [np.empty((0, 4, 3))]
     for lane in in_groups(surfaces, ["driving"]):
-        forward = lane.lane_id < 0
+        forward = (lane.lane_id < 0) != lane.keeps_left
         left, right = (lane.left, lane.right) if forward else (lane.right[::-1], lane.left[::-1])
         end = shapely.Point((left[-1, :2] + right[-1, :2]) / 2)
         if lane.junction_id is None and inside.contains(end) and not _is_taper(lane):
@@ -217,11 +213,6 @@ def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
         dataclasses.replace(lane, left=lane.left + up, right=lane.right + up) if group(lane) == "sidewalk" else lane
         for lane in surfaces
     )
-
-
-def plan_of(triangles: Float) -> BaseGeometry:
-    """Return the area in plan of triangles (n, 3, 3), none of them upright."""
-    return shapely.union_all(shapely.polygons(triangles[:, :, :2]), grid_size=GRID)
 
 
 def _plan(surfaces: Iterable[LaneSurface]) -> BaseGeometry:

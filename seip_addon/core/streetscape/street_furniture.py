@@ -115,10 +115,10 @@ def windows(outline: Float, base: float, height: float) -> Solid:
 
 def street_light(height: float, arm: float) -> Solid:
     """Return a street light: a tapering post, an arm and a flat luminaire."""
-    post = _tube([[0, 0, 0], [0, 0, height]], [0.09, 0.05], "steel")
+    post = tube(np.array([0, 0, 0]), np.array([0, 0, height]), (0.09, 0.05), "steel")
     if arm <= 0:
         return join(post, _box([0, 0, height + 0.1], [0.45, 0.45, 0.2], "luminaire"))
-    reach = _tube([[0, 0, height - 0.05], [arm, 0, height + 0.1]], [0.04, 0.03], "steel", sides=4)
+    reach = tube(np.array([0, 0, height - 0.05]), np.array([arm, 0, height + 0.1]), (0.04, 0.03), "steel", sides=4)
     return join(post, reach, _box([arm + 0.2, 0, height + 0.08], [0.7, 0.28, 0.12], "luminaire"))
 
 
@@ -133,19 +133,42 @@ def signal_pole(height: float, arm: float, *, faces_left: bool = True) -> Solid:
         Whether the lamps face +y, the left of the arm: the near side of the
         junction where traffic keeps to the right. Else they face -y.
     """
-    shaft = _tube([[0, 0, 0], [0, 0, height]], [0.11, 0.08], "steel")
+    shaft = tube(np.array([0, 0, 0]), np.array([0, 0, height]), (0.11, 0.08), "steel")
     low = _signal_head([0, 0.26, min(2.6, height - 0.5)])
     if arm <= 0:
         pole = join(shaft, low)
     else:
-        reach = _tube([[0, 0, height - 0.25], [arm, 0, height - 0.1]], [0.07, 0.04], "steel", sides=4)
+        reach = tube(np.array([0, 0, height - 0.25]), np.array([arm, 0, height - 0.1]), (0.07, 0.04), "steel", sides=4)
         pole = join(shaft, low, reach, _signal_head([max(arm - 0.3, 0.3), 0.2, height - 0.45]))
     return pole if faces_left else _mirrored(pole)
 
 
 def post(height: float, radius: float) -> Solid:
     """Return a plain post."""
-    return _tube([[0, 0, 0], [0, 0, height]], [radius, radius], "steel")
+    return tube(np.array([0, 0, 0]), np.array([0, 0, height]), (radius, radius), "steel")
+
+
+def tube(start: Float, stop: Float, radii: tuple[float, float], material: str, *, sides: int = POST_SIDES) -> Solid:
+    """Return a straight tapering tube between two points (3,), closed at the far end.
+
+    Parameters
+    ----------
+    start, stop : (3,) float64, metres
+    radii : pair of float, metres
+        At the two ends.
+    material : str
+    sides : int
+    """
+    axis = (stop - start) / np.linalg.norm(stop - start)
+    aside = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    across = np.cross(aside, axis) / np.linalg.norm(np.cross(aside, axis))
+    second = np.cross(axis, across)
+    angle = np.arange(sides) * (2 * np.pi / sides)
+    circle = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * second
+    vertices = np.concatenate([start + radii[0] * circle, stop + radii[1] * circle])
+    around = [(i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides)]
+    faces = (*around, tuple(range(sides, 2 * sides)))
+    return Solid(vertices, faces, (material,) * len(faces))
 
 
 def tree(height: float, crown_diameter: float, variant: int) -> Solid:
@@ -159,7 +182,9 @@ def tree(height: float, crown_diameter: float, variant: int) -> Solid:
     """
     crown_height = min(0.68 * height, 1.35 * crown_diameter)
     middle = height - crown_height / 2
-    trunk = _tube([[0, 0, 0], [0, 0, middle]], [0.025 * height, 0.012 * height], "bark", sides=TRUNK_SIDES)
+    trunk = tube(
+        np.array([0, 0, 0]), np.array([0, 0, middle]), (0.025 * height, 0.012 * height), "bark", sides=TRUNK_SIDES
+    )
     random = np.random.default_rng(variant)
     directions, faces = _icosphere()
     bumps = 1.0 - 0.22 * random.random(len(directions))
@@ -192,21 +217,6 @@ def _panes(start: Float, stop: Float, floor: float, *, shop: bool) -> Float:
     corners = np.stack([low, high, high, low], axis=1)
     heights = np.broadcast_to(floor + np.array([sill, sill, head, head]), (bays, 4))
     return np.concatenate([corners, heights[..., None]], axis=2)
-
-
-def _tube(path: list[list[float]], radii: list[float], material: str, *, sides: int = POST_SIDES) -> Solid:
-    """Return a straight tapering tube between two points, closed at the far end."""
-    start, stop = np.asarray(path, dtype=np.float64)
-    axis = (stop - start) / np.linalg.norm(stop - start)
-    helper = np.array([0.0, 1.0, 0.0])
-    across = np.cross(helper, axis) / np.linalg.norm(np.cross(helper, axis))
-    second = np.cross(axis, across)
-    angle = np.arange(sides) * (2 * np.pi / sides)
-    circle = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * second
-    vertices = np.concatenate([start + radii[0] * circle, stop + radii[1] * circle])
-    around = [(i, (i + 1) % sides, sides + (i + 1) % sides, sides + i) for i in range(sides)]
-    faces = (*around, tuple(range(sides, 2 * sides)))
-    return Solid(vertices, faces, (material,) * len(faces))
 
 
 def _box(middle: list[float], size: list[float], material: str) -> Solid:

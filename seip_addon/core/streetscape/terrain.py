@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..plan_geometry import plane_height, signed_area
 
 LEAST_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""
@@ -25,7 +26,7 @@ class Terrain:
     """
 
     def __init__(self, triangles: Float) -> None:
-        self._triangles = triangles[_plan_area(triangles) > LEAST_AREA]
+        self._triangles = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
         self._plan = shapely.polygons(self._triangles[:, :, :2])
         self._tree = shapely.STRtree(self._plan)
 
@@ -93,10 +94,9 @@ def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
     """Return (n, 3, 2) counter-clockwise triangles that fill areas in plan, with no corners of their own."""
     pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    edges = corners[:, 1:] - corners[:, :1]
-    turn = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    corners[turn < 0] = corners[turn < 0, ::-1]
-    kept: Float = corners[np.abs(turn) > 2 * LEAST_AREA]
+    area = signed_area(corners)
+    corners[area < 0] = corners[area < 0, ::-1]
+    kept: Float = corners[np.abs(area) > LEAST_AREA]
     return kept
 
 
@@ -116,20 +116,6 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
             height = plane_height(np.broadcast_to(triangle, (len(flat), 3, 3)), flat)
             pieces.append(_raised(flat, height))
     return np.concatenate(pieces)
-
-
-def plane_height(triangles: Float, xy: Float) -> Float:
-    """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    offset = xy - triangles[:, 0, :2]
-    height: Float = triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
-    return height
-
-
-def _plan_area(triangles: Float) -> Float:
-    edges = triangles[:, 1:, :2] - triangles[:, :1, :2]
-    area: Float = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]) / 2
-    return area
 
 
 def _raised(corners: Float, height: Float) -> Float:

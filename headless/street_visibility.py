@@ -1,10 +1,12 @@
-"""Synthetic street visibility: junctions, wedges behind buildings, ranges. For measurements and tests."""
+"""Synthetic street visibility, without a scene: junctions, wedges behind buildings, ranges."""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from seip_addon.core.arrays import Boolean, Float
+import numpy as np
+from numpy.typing import NDArray
+
 from seip_addon.core.placement import PlacementProblem
 
 SIGHT = 110.0
@@ -46,14 +48,14 @@ def street_problem(
     )
 
 
-def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> Float:
+def _on_roads(rng: np.random.Generator, number: int, extent: float, pitch: float, half: float) -> NDArray[Any]:
     along = rng.uniform(0, extent, number)
     across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + rng.uniform(-half, half, number)
     flip = rng.random(number) < 0.5
     return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
 
 
-def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> Float:
+def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float, offset: float) -> NDArray[Any]:
     along = rng.uniform(0, extent, number)
     side = rng.choice([-1.0, 1.0], number) * offset
     across = rng.integers(0, round(extent / pitch), number) * pitch + pitch / 2 + side
@@ -61,7 +63,7 @@ def _on_kerbs(rng: np.random.Generator, number: int, extent: float, pitch: float
     return np.column_stack([np.where(flip, along, across), np.where(flip, across, along)])
 
 
-def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> Float:
+def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float) -> NDArray[Any]:
     boxes = []
     for i in range(blocks + 1):
         for j in range(blocks + 1):
@@ -71,7 +73,7 @@ def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float
     return np.array(boxes)
 
 
-def _hidden(posts: Float, points: Float, boxes: Float, discs: Float) -> Boolean:
+def _hidden(posts: NDArray[Any], points: NDArray[Any], boxes: NDArray[Any], discs: NDArray[Any]) -> NDArray[Any]:
     """Return whether a building or a tree stands between post and point; beyond `SIGHT` everything is hidden."""
     hidden = np.ones((len(posts), len(points)), bool)
     for index, post in enumerate(posts):
@@ -82,7 +84,7 @@ def _hidden(posts: Float, points: Float, boxes: Float, discs: Float) -> Boolean:
     return hidden
 
 
-def _behind_boxes(step: Float, boxes: Float) -> Boolean:
+def _behind_boxes(step: NDArray[Any], boxes: NDArray[Any]) -> NDArray[Any]:
     hidden = np.zeros(len(step), bool)
     for box in boxes[(np.minimum(np.abs(boxes[:, :2]), np.abs(boxes[:, 2:])) < SIGHT).all(axis=1)]:
         first, second = box[:2] / step, box[2:] / step
@@ -92,7 +94,7 @@ def _behind_boxes(step: Float, boxes: Float) -> Boolean:
     return hidden
 
 
-def _behind_discs(step: Float, discs: Float) -> Boolean:
+def _behind_discs(step: NDArray[Any], discs: NDArray[Any]) -> NDArray[Any]:
     hidden = np.zeros(len(step), bool)
     length = (step**2).sum(axis=1)
     distance = np.hypot(discs[:, 0], discs[:, 1])

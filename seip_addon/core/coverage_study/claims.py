@@ -1,0 +1,238 @@
+"""What a site says to the claims of the study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from .cells import NUMBERS, WEIGHTS, Case, CoverageStudy, Span
+
+NEGLIGIBLE = 0.01
+"""Share of the region below which a gain or loss of coverage counts as none."""
+
+HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "undecided"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the study and what this site says to it.
+
+    Parameters
+    ----------
+    number : int
+        Number in the study's list of claims.
+    text : str
+    verdict : str
+        ``holds``, ``does not hold``, or ``undecided`` where bounds leave it open.
+    evidence : str
+        The figures behind the verdict.
+    """
+
+    number: int
+    text: str
+    verdict: str
+    evidence: str
+
+
+def judge(study: CoverageStudy) -> tuple[Claim, ...]:
+    """Hold claims 1 to 4 and 10 of the study against the solved cells.
+
+    Claims that compare types, heights or weights are left out where there is
+    nothing to compare.
+    """
+    claims = [_four_of_the_best(study), _greedy(study)]
+    if len(study.sensors) > 1:
+        claims.append(_more_is_better(study))
+        if len(study.heights) > 1:
+            claims.append(_heights(study))
+        if any(cell.weight != 1 for cell in study.cells):
+            claims.append(_weighting(study))
+    return tuple(sorted(claims, key=lambda claim: claim.number))
+
+
+def _more_is_better(study: CoverageStudy) -> Claim:
+    best, (few, most) = study.sensors[-1], NUMBERS[-2:]
+    shares = {(sensor, n): study.possible(sensor, n) for sensor in study.sensors for n in NUMBERS}
+    verdicts = [
+        _rises(shares[sensor, b], shares[sensor, a]) for sensor in study.sensors[:-1] for a, b in pairwise(NUMBERS)
+    ]
+    verdicts += [_rises(shares[b, n], shares[a, n]) for a, b in pairwise(study.sensors) for n in NUMBERS]
+    gain = _gain(shares[best, most], shares[best, few])
+    verdicts.append(UNDECIDED if gain is None else _verdict(holds=gain[1] < NEGLIGIBLE, fails=gain[0] >= NEGLIGIBLE))
+    rows = [f"{sensor} " + ", ".join(_found(shares[sensor, n]) for n in NUMBERS) for sensor in study.sensors]
+    gained = "" if gain is None else f"; {best} gains {_range(gain)} from N = {few} to {most}"
+    return Claim(
+        1,
+        f"coverage rises with N and with a better type; for {best} the gain is negligible",
+        _all(verdicts),
+        f"N = {', '.join(map(str, NUMBERS))}: {'; '.join(rows)}{gained}",
+    )
+
+
+def _four_of_the_best(study: CoverageStudy) -> Claim:
+    best, most = study.sensors[-1], NUMBERS[-1]
+    text = f"four {best} sensors see 100 %, and fewer would do"
+    case, share = study.find(best, most), study.possible(best, most)
+    if case is None or share is None:
+        return Claim(2, text, UNDECIDED, f"there is no placement of {most} {best} sensors")
+    used = len(case.placement.chosen)
+    spare = used < most or any(_is_full(study.possible(best, n)) for n in NUMBERS[:-1])
+    # All sensors in use means that none is to spare only if ties were broken; a note says so where they were not.
+    settled = case.placement.status == "optimal" and not case.placement.notes
+    return Claim(
+        2,
+        text,
+        _all([_verdict(holds=_is_full(share), fails=share[1] < 1), _verdict(holds=spare, fails=settled)]),
+        f"{_found(share)} with {used} of {most} sensors used",
+    )
+
+
+def _heights(study: CoverageStudy) -> Claim:
+    lowest, *higher = study.heights
+    verdicts, rows = [], []
+    for sensor in study.sensors:
+        named = []
+        for n in NUMBERS:
+            shares = {h: study.possible(sensor, n, h) for h in study.heights}
+            named.append(_best_heights(shares))
+            if sensor == study.sensors[0]:
+                verdicts += [_exceeds(shares[lowest], shares[h]) for h in higher]
+            else:
+                verdicts.append(_exceeds(_best([shares[h] for h in higher]), shares[lowest]))
+        rows.append(f"{sensor} {', '.join(named)}")
+    return Claim(
+        3,
+        f"{study.sensors[0]} does best at {lowest:g} m; the other types prefer higher, at every N",
+        _all(verdicts),
+        f"best height at N = {', '.join(map(str, NUMBERS))}: {'; '.join(rows)}",
+    )
+
+
+def _weighting(study: CoverageStudy) -> Claim:
+    verdicts, rows = [], []
+    for sensor in study.sensors:
+        plain = study.find(sensor, NUMBERS[-1])
+        weighted = [study.find(sensor, NUMBERS[-1], weight=w) for w in WEIGHTS]
+        cases = [case for case in weighted if case is not None]
+        if plain is None or not cases:
+            verdicts.append(UNDECIDED)
+            rows.append(f"{sensor}: no placement")
+            continue
+        changes = [_change(plain, case) for case in cases]
+        gain, loss = max((c for c in changes if c[1] > -NEGLIGIBLE), default=max(changes))
+        central, whole = _views(plain)
+        rows.append(f"{sensor}: central {central:.1%} {gain:+.2%}, whole {whole:.1%} {loss:+.2%}")
+        proven = [_is_proven(plain) and case is not None and _is_proven(case) for case in weighted]
+        verdicts.append(_weighting_verdict(changes, proven, is_best=sensor == study.sensors[-1]))
+    return Claim(
+        4,
+        "weighting raises central coverage of all but the best type without hurting the whole; the best gains nothing",
+        _all(verdicts),
+        f"N = {NUMBERS[-1]}, best weight that costs the whole under {NEGLIGIBLE:.0%}: {'; '.join(rows)}; where several "
+        "placements are best, the figures are those of the one returned",
+    )
+
+
+def _weighting_verdict(changes: Sequence[tuple[float, float]], proven: Sequence[bool], *, is_best: bool) -> str:
+    """Judge one type by its gains and losses, which mean something once all its placements are proven."""
+    if not all(proven):
+        return UNDECIDED
+    if is_best:
+        return HOLDS if all(gain < NEGLIGIBLE for gain, _ in changes) else FAILS
+    return HOLDS if any(gain >= NEGLIGIBLE and loss > -NEGLIGIBLE for gain, loss in changes) else FAILS
+
+
+def _change(plain: Case, weighted: Case) -> tuple[float, float]:
+    """Return what weighting adds to the coverage of the centre and of the whole."""
+    (central, whole), (central_after, whole_after) = _views(plain), _views(weighted)
+    return central_after - central, whole_after - whole
+
+
+def _views(case: Case) -> tuple[float, float]:
+    return case.deployment.central or 0.0, case.deployment.coverage
+
+
+def _is_proven(case: Case) -> bool:
+    return case.placement.status == "optimal"
+
+
+def _greedy(study: CoverageStudy) -> Claim:
+    promise = 1 - 1 / math.e
+    reached = [(case.greedy.objective, *case.span) for case in study.cases]
+    verdicts = [_verdict(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
+    worst = min(value / high for value, _, high in reached)
+    short = sum(value < low * (1 - 1e-9) for value, low, _ in reached)
+    return Claim(
+        10,
+        "greedy reaches 1 − 1/e of the optimum",
+        _all(verdicts),
+        f"at worst {worst:.1%} of the bound; below the integer program in {short} of {len(reached)} cells",
+    )
+
+
+def _rises(more: Span | None, less: Span | None) -> str:
+    """Whether coverage rises by more than a negligible share; where less than that is left to see, it need not."""
+    if more is None or less is None:
+        return UNDECIDED
+    full = 1 - NEGLIGIBLE
+    return _verdict(
+        holds=more[0] - less[1] > NEGLIGIBLE or less[0] >= full,
+        fails=more[1] - less[0] <= NEGLIGIBLE and less[1] < full,
+    )
+
+
+def _exceeds(more: Span | None, less: Span | None) -> str:
+    if more is None or less is None:
+        return UNDECIDED
+    return _verdict(holds=more[0] > less[1], fails=more[1] <= less[0])
+
+
+def _is_full(span: Span | None) -> bool:
+    return span is not None and span[0] >= 1
+
+
+def _gain(more: Span | None, less: Span | None) -> Span | None:
+    """Return the least and largest possible gain; another sensor never takes coverage away."""
+    if more is None or less is None:
+        return None
+    return max(0.0, more[0] - less[1]), more[1] - less[0]
+
+
+def _best(spans: Iterable[Span | None]) -> Span | None:
+    """Return the least and largest possible best of several, or None where one of them is missing."""
+    known = list(spans)
+    found = [span for span in known if span is not None]
+    if len(found) < len(known):
+        return None
+    return max(low for low, _ in found), max(high for _, high in found)
+
+
+def _best_heights(shares: Mapping[float, Span | None]) -> str:
+    """Name the height at which most was seen, or those between which there is a tie."""
+    found = {height: span[0] for height, span in shares.items() if span is not None}
+    if not found:
+        return "no placement"
+    best = [f"{height:g}" for height, low in found.items() if low == max(found.values())]
+    return f"{best[0]} m" if len(best) == 1 else f"{'/'.join(best)} m (a tie)"
+
+
+def _found(span: Span | None) -> str:
+    return "no placement" if span is None else f"{span[0]:.1%}"
+
+
+def _range(span: Span) -> str:
+    low, high = (f"{value:.2%}" for value in span)
+    return low if low == high else f"{low} to {high}"
+
+
+def _verdict(*, holds: bool, fails: bool) -> str:
+    """Return the verdict on what is known to hold, known to fail, or neither."""
+    if holds:
+        return HOLDS
+    return FAILS if fails else UNDECIDED
+
+
+def _all(verdicts: Sequence[str]) -> str:
+    return next((verdict for verdict in (FAILS, UNDECIDED) if verdict in verdicts), HOLDS)

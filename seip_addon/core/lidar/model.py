@@ -1,0 +1,120 @@
+"""What a LiDAR model is: its beams, its price, and how its returns are disturbed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Float
+from ..errors import SeipError
+
+
+@dataclass(frozen=True, eq=False)
+class LidarModel:
+    """A spinning LiDAR.
+
+    Parameters
+    ----------
+    key : str
+        Name in the catalogue.
+    name, manufacturer : str
+        For people.
+    source : str
+        Document that the figures are from.
+    elevations : (c,) float64, radians
+        Elevation of each channel above the sensor's horizontal plane, in the
+        order in which they are published.
+    min_range, max_range : float, metres
+        A return nearer or farther than these is none.
+    points_per_second : float
+        Single returns, all channels together.
+    rotation_rate : float, hertz
+        Revolutions per second at which the sensor is used.
+    price_range : tuple of two floats, US dollars
+        Lowest and highest price.
+    price_source : str
+        Where the price is from.
+    azimuth_offsets : (c,) float64, radians
+        What each channel's azimuth is ahead of the head's, counter-clockwise.
+        Zeros when not given.
+    range_noise_std : float, metres
+        Standard deviation of the range noise (Gaussian).
+    attenuation : float, 1/m
+        a in the intensity law I = ρ · cos θ · exp(−a · r).
+    dropoff_general : float
+        Share of all returns that is lost whatever their intensity.
+    dropoff_intensity_limit, dropoff_zero_intensity : float
+        A return of at least the limit is kept; below it the probability to be
+        lost grows linearly to ``dropoff_zero_intensity`` at intensity 0.
+        (The drop-off model of CARLA's ray-cast LiDAR.)
+    """
+
+    key: str
+    name: str
+    manufacturer: str
+    source: str
+    elevations: Float
+    min_range: float
+    max_range: float
+    points_per_second: float
+    rotation_rate: float
+    price_range: tuple[float, float]
+    price_source: str = ""
+    azimuth_offsets: Float = field(default_factory=lambda: np.zeros(0))
+    range_noise_std: float = 0.03
+    attenuation: float = 0.004
+    dropoff_general: float = 0.0
+    dropoff_intensity_limit: float = 0.8
+    dropoff_zero_intensity: float = 0.4
+
+    def __post_init__(self) -> None:
+        if self.azimuth_offsets.size == 0:
+            object.__setattr__(self, "azimuth_offsets", np.zeros(len(self.elevations)))
+        _require_valid(self)
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return len(self.elevations)
+
+    @property
+    def azimuth_count(self) -> int:
+        """Azimuth steps in a revolution, from points per second, rotation and channels."""
+        return max(1, round(self.points_per_second / self.rotation_rate / self.channels))
+
+    @property
+    def price(self) -> float:
+        """Middle of the price range in US dollars."""
+        return sum(self.price_range) / 2
+
+
+MOST_RAYS = 50_000_000
+"""Rays of a revolution beyond which a figure must be a slip: fifty times the study's finest type."""
+
+
+def _require_valid(model: LidarModel) -> None:
+    right_angle = math.pi / 2
+    low, high = model.price_range
+    checks = {
+        "it needs at least one channel": model.channels > 0,
+        "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
+        "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
+        "azimuth offsets must be finite": bool(np.isfinite(model.azimuth_offsets).all()),
+        "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
+        "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
+        "the rotation rate must lie between 0.01 and 1000 Hz": 0.01 <= model.rotation_rate <= 1000,
+        f"a revolution must have at most {MOST_RAYS:,} rays": (
+            model.points_per_second <= MOST_RAYS * model.rotation_rate and model.channels <= MOST_RAYS
+        ),
+        "its price range must be positive, finite and not decreasing": 0 < low <= high < math.inf,
+        "the range noise must be 0 m or more and finite": 0 <= model.range_noise_std < math.inf,
+        "attenuation must be 0 or more and finite": 0 <= model.attenuation < math.inf,
+        "the general drop-off must lie between 0 and 1": 0 <= model.dropoff_general <= 1,
+        "the drop-off at zero intensity must lie between 0 and 1": 0 <= model.dropoff_zero_intensity <= 1,
+        "the drop-off's intensity limit must lie above 0 and up to 1": 0 < model.dropoff_intensity_limit <= 1,
+    }
+    for sentence, holds in checks.items():
+        if not holds:
+            raise SeipError(f"LiDAR '{model.key}': {sentence}")

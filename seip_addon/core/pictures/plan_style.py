@@ -1,0 +1,16 @@
+"""Colours and marks that a plan and its legend share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.colors import LinearSegmentedColormap
+
+from .palette import INK, PAPER
+
+Style = dict[str, Any]
+
+HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
+WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
+SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
+POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}

@@ -1,0 +1,80 @@
+"""Opening and saving .blend files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import SeipError
+from ..core.storage import whole_file
+from .interrupts import held_interrupts
+
+CLIP_START, CLIP_END = 0.5, 5000.0
+"""Metres before the eye between which a 3D view shows things: a site, without flicker of what lies close together."""
+
+
+def new_file() -> bpy.types.Scene:
+    """Make a new file, in place of the open one, and return its only scene, which is empty."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    return bpy.context.scene
+
+
+def open_blend(path: Path) -> None:
+    """Open a .blend, without running scripts that it may carry.
+
+    Raises
+    ------
+    SeipError
+        There is no such file or it is not a .blend.
+    """
+    if not path.is_file():
+        raise SeipError(f"there is no file {path}; build one with headless/build_scene.py or check the name")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise SeipError(f"{path} is not a .blend that Blender {bpy.app.version_string} can open") from error
+
+
+def check_name(path: Path) -> None:
+    """Raise SeipError where a name does not end in .blend."""
+    if path.suffix != ".blend":
+        raise SeipError(f"{path} is no name for a Blender file; let it end in .blend")
+
+
+def save_blend(path: Path) -> None:
+    """Write the open scene to a .blend, compressed; its 3D views look through the camera, in the materials' colours.
+
+    Raises
+    ------
+    SeipError
+        The name does not end in .blend, or the file cannot be written.
+    """
+    check_name(path)
+    _set_up_views()
+    with whole_file(path) as temporary:
+        temporary.unlink()  # Blender would keep a backup of a file that is there
+        with held_interrupts():
+            bpy.ops.wm.save_as_mainfile(
+                filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False
+            )
+        if not _is_whole(temporary):
+            raise SeipError(f"cannot write {path} to its end; make room there or choose another folder")
+
+
+def _is_whole(path: Path) -> bool:
+    """Return whether a .blend can be read: a full disk cuts one short without a word from Blender."""
+    try:
+        with bpy.data.libraries.load(str(path.resolve())) as (there, _):
+            return len(there.scenes) > 0
+    except OSError:
+        return False
+
+
+def _set_up_views() -> None:
+    views = (area.spaces.active for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    for view in views:
+        view.clip_start, view.clip_end = CLIP_START, CLIP_END
+        view.shading.color_type = "MATERIAL"
+        if bpy.context.scene.camera is not None:
+            view.region_3d.view_perspective = "CAMERA"

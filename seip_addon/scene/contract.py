@@ -1,0 +1,82 @@
+"""The scene contract's names: collections and custom properties, as docs/architecture.md explains them."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+
+REGION = "SEIP Region"
+ROADS = "SEIP Roads"
+GROUND = "SEIP Ground"
+OCCLUDERS = "SEIP Occluders"
+POLES = "SEIP Poles"
+CANDIDATE_AREAS = "SEIP Candidate Areas"
+WEIGHTED_REGIONS = "SEIP Weighted Regions"
+FORBIDDEN_AREAS = "SEIP Forbidden Areas"
+MANDATORY_AREAS = "SEIP Mandatory Areas"
+SENSORS = "SEIP Sensors"
+COVERAGE = "SEIP Coverage"
+
+AREAS = (REGION, CANDIDATE_AREAS, WEIGHTED_REGIONS, FORBIDDEN_AREAS, MANDATORY_AREAS)
+"""Collections whose objects mean an area in plan."""
+INPUTS = (*AREAS, ROADS, GROUND, OCCLUDERS, POLES)
+"""The collections that are read; `SENSORS` and `COVERAGE` are written."""
+
+WEIGHT = "seip_weight"
+FORBIDDEN = "seip_forbidden"
+MANDATORY = "seip_mandatory"
+TITLE = "seip_title"
+ORIGIN = "seip_origin"
+MAP = "seip_map"
+GEO_REFERENCE = "seip_geo_reference"
+HEADER_OFFSET = "seip_header_offset"
+
+NUMBER = re.compile(r"\.\d{3,}$")
+
+
+def kind(collection: bpy.types.Collection) -> str:
+    """Return the name that counts: without the number that Blender adds where another scene has the name already."""
+    return NUMBER.sub("", collection.name)
+
+
+def find(scene: bpy.types.Scene, name: str) -> bpy.types.Collection | None:
+    """Return the scene's own collection of that name, anywhere below its root, or None."""
+    below = scene.collection.children_recursive
+    own = (collection for collection in below if collection.library is None and kind(collection) == name)
+    return next(own, None)
+
+
+def find_or_make(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
+    """Return the scene's own collection of that name, made under the root where it is missing."""
+    collection = find(scene, name)
+    if collection is None:
+        collection = bpy.data.collections.new(name)
+        scene.collection.children.link(collection)
+    return collection
+
+
+def members(scene: bpy.types.Scene) -> dict[str, set[bpy.types.Object]]:
+    """Return the objects of each collection that is read.
+
+    Collections count below the scene's root, linked ones included, and within
+    the collections that objects of the scene instance.
+    """
+    found: dict[str, set[bpy.types.Object]] = {name: set() for name in INPUTS}
+    for collection in _reached(scene):
+        if kind(collection) in found:
+            found[kind(collection)].update(collection.all_objects)
+    return found
+
+
+def _reached(scene: bpy.types.Scene) -> set[bpy.types.Collection]:
+    """Return the collections below the scene's root and, at any depth, within instanced ones."""
+    reached = {scene.collection}
+    waiting = [scene.collection]
+    while waiting:
+        collection = waiting.pop()
+        instanced = {thing.instance_collection for thing in collection.objects if thing.instance_type == "COLLECTION"}
+        following = {*collection.children, *instanced} - reached - {None}
+        reached |= following
+        waiting += following
+    return reached

@@ -1,0 +1,64 @@
+"""The study command, from a scene to its charts, tables and plans."""
+
+import csv
+from pathlib import Path
+
+from headless import study
+
+import pytest
+from matplotlib.image import imread
+
+from seip_addon.core.coverage_study import NUMBERS, WEIGHTS
+from seip_addon.core.errors import SeipError
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+TYPES, HEIGHTS = ("type1", "type2"), (3.5, 8.0)
+COARSE = ["--sensor", *TYPES, "--heights", *map(str, HEIGHTS), "--grid", "8", "--spacing", "25"]
+
+
+def run(folder, *options):
+    study.main([str(SCENE), "-o", str(folder), *COARSE, *options])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    run(folder)
+    return folder
+
+
+def test_the_folder_holds_charts_tables_and_plans(folder):
+    plans = {f"plan_{sensor}_{kind}.png" for sensor in TYPES for kind in ("vanilla", "weighted")}
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"visibility.npz", "coverage.csv", "claims.md", "heights.png", "weights.png", *plans}
+    for name in ("heights.png", "weights.png", *plans):
+        assert imread(folder / name).shape[1] > 1000
+
+
+def test_the_table_has_a_row_for_each_cell(folder):
+    rows = list(csv.DictReader((folder / "coverage.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == len(TYPES) * len(NUMBERS) * (len(HEIGHTS) + 1 + len(WEIGHTS))
+    for row in rows:
+        assert 0 < float(row["coverage"]) <= 1
+        assert float(row["objective"]) <= float(row["bound"])
+        if row["height_m"] != "free":
+            assert {float(height) for height in row["heights_used_m"].split()} == {float(row["height_m"])}
+
+
+def test_the_verdicts_stand_in_the_claims(folder):
+    lines = (folder / "claims.md").read_text(encoding="utf-8").splitlines()
+    assert [line.split("|")[1].strip() for line in lines[4:]] == ["1", "2", "3", "4", "10"]
+    assert all(line.count("**") == 2 for line in lines[4:])
+
+
+def test_the_same_study_gives_the_same_bytes(folder, tmp_path):
+    (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
+    run(tmp_path)
+    for path in folder.iterdir():
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+
+
+def test_a_mistake_has_its_sentence(tmp_path):
+    with pytest.raises(SeipError, match="type1"):
+        run(tmp_path, "--sensor", "typ1")
+    assert list(tmp_path.iterdir()) == []
