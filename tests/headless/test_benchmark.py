@@ -1,6 +1,7 @@
 """The benchmark writes its page, charts and figures; what it compares is what it says."""
 
 import json
+import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -10,9 +11,11 @@ from headless.measures.alone import alone
 from headless.measures.approximations import bounding_box, decimated, every_other_channel, thinner
 from headless.measures.expense import Expense, peak_memory
 from headless.measures.growth import repeated
-from headless.measures.placement import compare
+from headless.measures.placement import Run, compare
 from headless.measures.programme import Scope
+from headless.measures.report import bars
 from headless.measures.rivals import RIVALS, can_run
+from headless.measures.visibility import Cost
 from headless.street_visibility import street_problem
 
 import bpy
@@ -76,6 +79,30 @@ def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():
         assert run.objective <= best.objective + 1e-6 <= run.bound + 2e-6
     assert runs["PuLP + CBC"].objective == runs["PuLP + HiGHS"].objective == best.objective
     assert runs["lazy greedy"].objective == runs["greedy"].objective <= runs["local search"].objective
+
+
+def run_of(instance, way, seconds, objective, bound):
+    return Run(instance, way, Expense(seconds, seconds), 100.0, objective, bound, min(bound, 1000.0), "")
+
+
+def test_bars_are_met_by_what_meets_them_alone():
+    costs = {
+        "full bvh": Cost(Expense(100.0), 1, 1),
+        "lazy bvh": Cost(Expense(5.0), 1, 1),
+        "full embree": Cost(Expense(9.0), 1, 1),
+        "lazy embree": Cost(Expense(1.0), 1, 1),
+    }
+    runs = [
+        run_of("few", "PuLP + CBC", 30.0, 900.0, 900.0),
+        run_of("few", "ours", 1.0, 900.0, 900.0),
+        run_of("many", "ours", 59.0, 991.0, 1000.0),
+        run_of("largest", "ours", 119.0, 984.0, 1000.0),
+    ]
+    held = bars(costs, runs, ("few", "many", "largest"))
+    assert [bar.met for bar in held] == [True, True, False, True, True, False]
+    assert held[2].measured == "9×"
+    runs[0] = run_of("few", "PuLP + CBC", 30.0, 901.0, math.inf)  # better than what was said to be proven
+    assert not bars(costs, runs, ("few", "many", "largest"))[3].met
 
 
 def test_fewer_rays_are_those_that_were_asked_for():
