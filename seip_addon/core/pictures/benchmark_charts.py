@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from ..arrays import Float
 from ..storage import whole_file
 from ..trade_off import Way, front, growth_exponent
 from .callouts import place_callouts
@@ -110,6 +111,15 @@ def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
     )
 
 
+def _along_front(panel: Axes, ways: Sequence[Way]) -> Float:
+    """Return points along the drawn front in pixels, (n, 2) float64."""
+    corners = panel.transData.transform([(way.error, way.seconds) for way in front(ways)])
+    bends = np.column_stack([corners[:-1, 0], corners[1:, 1]])
+    path = np.insert(corners, np.arange(1, len(corners)), bends, axis=0)
+    along: Float = np.linspace(path[:-1], path[1:], 50).reshape(-1, 2)
+    return along
+
+
 def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
     own = [way for way in ways if way.default]
     panel.plot(
@@ -126,7 +136,7 @@ def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
 
 
 def _name(panel: Axes, ways: Sequence[Way]) -> None:
-    """Write each way's name beside it, no name on another or on a mark."""
+    """Write each way's name beside it, no name on another or on a mark, and off the front where there is room."""
     style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
     box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
     texts = [panel.text(0, 0, way.name, bbox=box, **style) for way in ways]
@@ -135,7 +145,7 @@ def _name(panel: Axes, ways: Sequence[Way]) -> None:
     points = np.array([(way.error, way.seconds) for way in ways])
     anchors, radius = panel.transData.transform(points), 4.5 * panel.figure.dpi / 72
     frame = panel.get_window_extent()
-    centres = place_callouts(anchors, sizes, frame.extents, radius, anchors)
+    centres = place_callouts(anchors, sizes, frame.extents, radius, _along_front(panel, ways))
     for text, point, centre in zip(texts, points, panel.transData.inverted().transform(centres), strict=True):
         text.set_position(centre)
         panel.plot(*zip(point, centre, strict=True), color="#c3c9ce", linewidth=0.7, zorder=1)
