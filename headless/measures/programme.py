@@ -75,7 +75,7 @@ def measure(
     for way, cost in costs.items():
         session.say(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
     session.say("whole grids, exact and simplified, and a placement by each")
-    harm = harms(site, models, settings, simpler, time_limit / 2)
+    harm = harms(site, models, settings, simpler, time_limit)
     rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
     runs, names = placements(site, models, settings, time_limit, scope)

@@ -138,7 +138,7 @@ def _about_visibility(findings: Findings, pictures: str) -> list[str]:
         [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
     )
     harm = _table(
-        ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept"),
+        ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept", ""),
         [_harm_row(name, harm, exact) for name, harm in findings.harms.items()],
     )
     times = "; ".join(f"with {engine} it takes {n:.1f} times that" for engine, n in findings.limits.items())
@@ -163,7 +163,8 @@ def _about_placement(findings: Findings, pictures: str) -> list[str]:
 def _about_growth(findings: Findings, pictures: str) -> list[str]:
     text = (
         "Each size ran in a process of its own. A corridor was looked at from some of its places, which stand for all. "
-        "An exponent b says that twice the size costs 2^b times as much, by least squares over all sizes."
+        "An exponent b says that twice the size costs 2^b times as much, by least squares over all sizes; "
+        "work that is done once whatever the size makes it smaller."
     )
     head = ("work", "what grows", "sizes", "s", "exponent", "MB", "exponent of memory")
     picture = f"![growth of time and memory]({pictures}/growth.png)"
@@ -205,6 +206,7 @@ def _harm_row(name: str, harm: Harm, exact: Harm) -> tuple[str, ...]:
         f"{harm.coverage:.2%}",
         f"{exact.coverage - harm.coverage:.2%}",
         f"{harm.kept} of {exact.kept}",
+        "" if harm.proven else "placement not proven the best",
     )
 
 

@@ -25,6 +25,9 @@ from seip_addon.core.visibility.scanning import Place, seen_by_all_rays
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
+PROVEN = 1e-6
+"""Gap below which nothing is better."""
+
 COUNT = 4
 """Sensors of the placement by which the harm of an error is judged."""
 
@@ -65,12 +68,15 @@ class Harm:
         Coverage that it has in truth.
     kept : int
         How many of its poses the exact grid's placement has as well.
+    proven : bool
+        Whether the placement is proven the best by its grid; else the solver had too little time.
     """
 
     wrong: float
     claimed: float
     coverage: float
     kept: int
+    proven: bool
 
 
 class Observers:
@@ -171,7 +177,7 @@ def harms(
     exact = finish(compute_visibility(site, models, settings)).visible
     best = placed(site, models, exact, time_limit)
     own = best.objective / len(site.targets)
-    found = {"exact": Harm(0.0, own, own, len(best.chosen))}
+    found = {"exact": Harm(0.0, own, own, len(best.chosen), best.gap < PROVEN)}
     for one in simpler:
         visible = finish(compute_visibility(one.site, one.models, settings)).visible
         placement = placed(one.site, models, visible, time_limit)
@@ -180,6 +186,7 @@ def harms(
             claimed=placement.objective / len(one.site.targets),
             coverage=float(exact[placement.chosen].any(axis=0).mean()),
             kept=len(np.intersect1d(placement.chosen, best.chosen)),
+            proven=placement.gap < PROVEN,
         )
     return found
 
