@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from seip_addon.core.deployment import Deployment, deploy
 from seip_addon.core.lidar import LidarModel, load_catalogue
-from seip_addon.core.results.deployment import Deployment, deploy
 from seip_addon.core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 from seip_addon.core.site import Candidates, Site, Targets
 

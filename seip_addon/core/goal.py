@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .deployment import Deployment, deploy
 from .errors import SeipError
 from .lidar import LidarModel
 from .placement import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
 from .progress import Progress
-from .results.deployment import Deployment, deploy
 from .site import Candidates, Site
 
 DEFAULT_COUNT = 4

@@ -14,10 +14,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ..core.deployment import Deployment
 from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
-from ..core.results.deployment import Deployment
 from ..core.site import Site
 from . import contract
 from .daylight import add_daylight

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Float, Integer
+from ..core.deployment import Deployment, Sensor
 from ..core.pictures.palette import SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
-from ..core.results.deployment import Deployment, Sensor
 from ..core.site import Site, Targets
 from ..core.streetscape.model import VEILS
 from ..core.streetscape.street_furniture import Solid, join, prism, tube

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.results.deployment import deploy
+from seip_addon.core.deployment import deploy
 from seip_addon.scene import contract
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.write import LIFT, clear_result, write_result

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..deployment import Deployment, deploy
 from ..errors import SeipError
 from ..goal import Goal, placement_problem
 from ..lidar import LidarModel
 from ..placement import Placement, solve, solve_greedy
 from ..progress import Progress, within
-from ..results.deployment import Deployment, deploy
 from ..site import Site
 
 NUMBERS = (1, 2, 4)

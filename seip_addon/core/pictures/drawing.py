@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..results.deployment import Deployment
+    from ..deployment import Deployment
     from ..site import Site
 
 

@@ -18,7 +18,7 @@ from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 if TYPE_CHECKING:
     import os
 
-    from ..results.deployment import Deployment
+    from ..deployment import Deployment
     from ..site import Site
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Normalize
 
-    from ..results.deployment import Deployment
+    from ..deployment import Deployment
     from ..scene_geometry import SceneGeometry
     from ..site import Site
 

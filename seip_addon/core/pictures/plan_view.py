@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from shapely.geometry.base import BaseGeometry
 
-    from ..results.deployment import Deployment
+    from ..deployment import Deployment
     from ..scene_geometry import Mesh, SceneGeometry
     from ..site import Site
 

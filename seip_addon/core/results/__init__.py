@@ -1,1 +1,1 @@
-"""What was chosen and what it sees: the deployment, its record, table and CARLA spawns."""
+"""What a run leaves on disk of its result: record, tables, CARLA spawns."""

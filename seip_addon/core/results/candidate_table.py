@@ -9,10 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ..deployment import Deployment, weighted_share
 from ..lidar import LidarModel
 from ..site import Site
 from ..storage import whole_file
-from .deployment import Deployment, weighted_share
 from .headings import degrees
 
 COLUMNS = (

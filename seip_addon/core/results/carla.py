@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..deployment import Deployment, Sensor
 from ..lidar import LidarModel
 from ..storage import save_json
-from .deployment import Deployment, Sensor
 from .headings import clockwise_degrees
 
 BLUEPRINT = "sensor.lidar.ray_cast"

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Float
+from ..deployment import Sensor
 from ..errors import SeipError
 from ..goal import Plan
 from ..placement import Placement
 from ..site import Site
 from ..storage import save_json
-from .deployment import Sensor
 from .headings import degrees
 
 Record = dict[str, Any]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Boolean, Float, Integer
-from ..lidar import LidarModel
-from ..site import Site
+from .arrays import Boolean, Float, Integer
+from .lidar import LidarModel
+from .site import Site
 
 
 @dataclass(frozen=True, eq=False)
