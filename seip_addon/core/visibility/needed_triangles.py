@@ -84,7 +84,8 @@ def needed_triangles(triangles: Float, poses: Float, targets: Float, delta: floa
     bottom = min(poses[:, 2].min(), targets[:, 2].min() - radius) - tolerance
     top = max(poses[:, 2].max(), targets[:, 2].max() + radius) + tolerance
     around_targets = shapely.MultiPoint(targets[:, :2]).convex_hull.buffer(radius)
-    plan = shapely.MultiPoint(poses[:, :2]).buffer(tolerance).union(around_targets).convex_hull
+    around_poses = shapely.MultiPoint(poses[:, :2]).convex_hull.buffer(tolerance * _ROUNDNESS)
+    plan = around_poses.union(around_targets).convex_hull
     shapely.prepare(plan)
     in_plan = shapely.box(*low[:, :2].T, *high[:, :2].T)
 
