@@ -25,16 +25,18 @@ _FLOAT32_ROUNDINGS = 64
 
 @dataclass(frozen=True, eq=False)
 class Discs:
-    """What balls of radius δ about targets cut out of the planes of the triangles that they meet.
+    """Circles about what balls of radius δ about targets cut out of the triangles that they meet.
 
     Parameters
     ----------
     target : (k,) int64
         Ascending.
     centre : (k, 3) float64, metres
+        On the triangle's plane.
     normal : (k, 3) float64
         Unit normals.
     radius : (k,) float64, metres
+        In plan.
     low, high : (k,) float64, metres
         Heights between which the triangle and the disc both lie.
     """
@@ -113,14 +115,14 @@ def caster_tolerance(triangles: Float) -> float:
     return max(_LEAST_TOLERANCE, _FLOAT32_ROUNDINGS * float(np.finfo(np.float32).eps) * extent)
 
 
-def _cut(corners: Float, centre: Float, target: Integer, radius: float) -> Discs:
+def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Discs:
     """Cut triangles with balls, pair by pair. Pairs that just miss each other near a corner may be among the discs."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0, length, 1.0)[:, None]
     above = ((centre - corners[:, 0]) * normal).sum(axis=1)
-    disc = np.sqrt(np.maximum(radius**2 - above**2, 0.0))
-    meets = (length > 0) & (np.abs(above) < radius)
+    disc = np.sqrt(np.maximum(ball**2 - above**2, 0.0))
+    meets = (length > 0) & (np.abs(above) < ball)
     for side in range(3):
         edge = corners[:, (side + 1) % 3] - corners[:, side]
         outward = np.cross(edge, normal)
@@ -130,4 +132,9 @@ def _cut(corners: Float, centre: Float, target: Integer, radius: float) -> Discs
     low = np.maximum(middle[:, 2] - half, corners[:, :, 2].min(axis=1))
     high = np.minimum(middle[:, 2] + half, corners[:, :, 2].max(axis=1))
     meets &= low <= high
-    return Discs(target[meets], middle[meets], normal[meets], disc[meets], low[meets], high[meets])
+    # In plan a small or steep triangle lies in a circle about its centroid that is narrower than the disc.
+    centroid = corners.mean(axis=1)
+    reach = np.linalg.norm((corners - centroid[:, None])[:, :, :2], axis=2).max(axis=1)
+    middle = np.where((reach < disc)[:, None], centroid, middle)
+    radius = np.minimum(reach, disc)
+    return Discs(target[meets], middle[meets], normal[meets], radius[meets], low[meets], high[meets])
