@@ -13,6 +13,9 @@ from .bounds import select
 from .instance import Instance
 from .problem import TIE
 
+STARTS = 8
+"""Candidates to begin a greedy choice with, before exchanges."""
+
 
 def greedy(
     instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf
@@ -57,11 +60,20 @@ def greedy_choices(instance: Instance, start: Integer) -> list[tuple[Integer, fl
 
 
 def greedy_and_exchange(instance: Instance, start: Integer) -> Generator[Progress, None, Integer]:
-    """Return the best of the greedy choices after exchanges, ascending."""
+    """Return the best of several greedy choices after exchanges, ascending.
+
+    Exchanges end in a local optimum; beside the greedy choices themselves those
+    are improved that begin with another of the candidates that see the most.
+    """
     best = start
     for chosen, _ in greedy_choices(instance, start):
         improved = yield from exchange(instance, chosen)
         best = max(best, improved, key=instance.covered)
+    first = np.where(addable(instance, start), instance.gains(instance.uncovered(start)), 0.0)
+    for candidate in np.argsort(-first, kind="stable")[1:STARTS]:
+        if first[candidate] > 0 and instance.covered(best) < instance.total:
+            improved = yield from exchange(instance, np.append(start, candidate))
+            best = max(best, improved, key=instance.covered)
     return best
 
 
