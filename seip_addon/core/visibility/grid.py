@@ -9,13 +9,9 @@ The grid is exactly the full scan's, but only rays that can change it are cast
 
 from __future__ import annotations
 
-import json
 import os
-import zipfile
-import zlib
 from collections.abc import Generator, Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,16 +22,14 @@ from ..errors import SeipError
 from ..lidar import LidarModel, find_models
 from ..progress import Progress
 from ..site import Site
-from ..storage import digest, whole_file
+from ..storage import ArrayFile, digest
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import Place, seen_by_all_rays
 from .work_force import ObserverTask, cluster, threads_of
 
-SCHEMA = "seip.visibility"
-SCHEMA_VERSION = 1
-
+FILE = ArrayFile("seip.visibility", 1, "visibility grid", "delete it and compute it again")
 
 WIDEST_DELTA = 100.0
 """Metres: a wider one is a slip of the keyboard."""
@@ -108,16 +102,9 @@ class VisibilityGrid:
         return float(np.average(seen, weights=weight))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the grid as npz: the array ``packed`` and the text ``header`` (JSON with a schema version)."""
-        header = {
-            "schema": SCHEMA,
-            "version": SCHEMA_VERSION,
-            "key": self.key,
-            "shape": list(self.shape),
-            "parameters": self.parameters,
-        }
-        with whole_file(path) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, packed=self.packed, header=np.array(json.dumps(header)))
+        """Write the grid as npz: the array ``packed`` and the text ``header`` (JSON)."""
+        header = {"key": self.key, "shape": list(self.shape), "parameters": self.parameters}
+        FILE.save(path, header, {"packed": self.packed})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> VisibilityGrid:
@@ -128,30 +115,12 @@ class VisibilityGrid:
         SeipError
             The file is not there, damaged, or something else.
         """
-        try:
-            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-                header = json.loads(str(arrays["header"]))
-                packed = arrays["packed"]
-            known = header["schema"] == SCHEMA and header["version"] == SCHEMA_VERSION
+        with FILE.reading(path) as (header, arrays):
+            packed = arrays["packed"]
             shape = (int(header["shape"][0]), int(header["shape"][1]))
-            grid = cls(packed, shape, str(header["key"]), dict(header["parameters"]))
-        except FileNotFoundError as error:
-            raise SeipError(f"there is no visibility grid {path}; compute it first") from error
-        except (
-            OSError,
-            EOFError,
-            ValueError,
-            KeyError,
-            IndexError,
-            TypeError,
-            RecursionError,
-            zipfile.BadZipFile,
-            zlib.error,
-        ) as error:
-            raise SeipError(f"{path} is not a visibility grid or is damaged; delete it and compute it again") from error
-        if not known or packed.dtype != np.uint8 or packed.shape != (shape[0], (shape[1] + 7) // 8):
-            raise SeipError(f"{path} is not a visibility grid of this version; delete it and compute it again")
-        return grid
+            if packed.dtype != np.uint8 or packed.shape != (shape[0], (shape[1] + 7) // 8):
+                raise ValueError(f"bits of the shape {packed.shape} for a grid of {shape}")
+            return cls(packed, shape, str(header["key"]), dict(header["parameters"]))
 
 
 def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: str) -> str:
@@ -170,7 +139,7 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     ]
     which = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
     return digest(
-        *(SCHEMA, SCHEMA_VERSION, engine, float(settings.delta), float(settings.min_intensity)),
+        *(FILE.schema, FILE.version, engine, float(settings.delta), float(settings.min_intensity)),
         *(site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, which),
         *patterns,
     )

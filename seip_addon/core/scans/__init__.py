@@ -1,0 +1,5 @@
+"""Scans of traffic: the points that all sensors measure at one instant, and the boxes of that instant."""
+
+from .frame import Frame, Labels
+
+__all__ = ["Frame", "Labels"]

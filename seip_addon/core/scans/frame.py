@@ -1,0 +1,109 @@
+"""One frame: the merged cloud of all sensors, and the road users of that instant."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Boolean, Float, Integer, Text
+from ..storage import ArrayFile
+
+FILE = ArrayFile("seip.frame", 1, "frame of scans", "simulate it again")
+_POINTS = ("points", "sensor", "delay", "intensity", "instance")
+
+STATIC = -1
+"""The instance of a point that is on no road user."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """The road users of one instant, all of them, seen or not; k boxes.
+
+    Parameters
+    ----------
+    user : (k,) int64
+        Index into the trajectories' road users; what the points' ``instance`` refers to.
+    category : (k,) str
+    centre : (k, 3) float64, metres
+        Middle of the box, local site axes.
+    size : (k, 3) float64, metres
+        Length, width, height.
+    yaw, pitch : (k,) float64, radians
+        Yaw counter-clockwise from +x, in [-π, π); pitch nose up positive.
+    speed : (k,) float64, metres per second
+    points : (k, s) int64
+        Returns from it, by sensor.
+    visibility : (k,) float64, 0 to 1
+        Of the rays of all sensors that would meet it with nothing else there, the share that does.
+    inside : (k,) bool
+        Whether the middle of the box is in the region of interest in plan.
+    """
+
+    user: Integer
+    category: Text
+    centre: Float
+    size: Float
+    yaw: Float
+    pitch: Float
+    speed: Float
+    points: Integer
+    visibility: Float
+    inside: Boolean
+
+    def __len__(self) -> int:
+        """Return the number of boxes."""
+        return len(self.user)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What all sensors measure in one revolution, sensor after sensor; n points.
+
+    Parameters
+    ----------
+    time : float, seconds
+        Of the simulation, at which the revolution begins.
+    points : (n, 3) float32, metres
+        Local site axes.
+    sensor : (n,) int16
+        Number of the sensor, in the order of the manifest.
+    delay : (n,) float32, seconds
+        Of each point after ``time``; zero unless the shutter rolls.
+    intensity : (n,) float32, 0 to 1
+    instance : (n,) int32
+        Road user that returned it, `STATIC` for none.
+    labels : Labels
+    """
+
+    time: float
+    points: NDArray[np.float32]
+    sensor: NDArray[np.int16]
+    delay: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    instance: NDArray[np.int32]
+    labels: Labels
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.points)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the frame as npz: arrays by their names, those of the labels as ``labels.NAME``."""
+        labels = {f"labels.{part.name}": getattr(self.labels, part.name) for part in fields(Labels)}
+        FILE.save(path, {"time": self.time}, {name: getattr(self, name) for name in _POINTS} | labels)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Frame:
+        """Read a frame.
+
+        Raises
+        ------
+        SeipError
+            The file is not there, damaged, or something else.
+        """
+        with FILE.reading(path) as (header, arrays):
+            labels = Labels(**{part.name: arrays[f"labels.{part.name}"] for part in fields(Labels)})
+            return cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})

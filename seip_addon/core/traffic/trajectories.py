@@ -1,0 +1,173 @@
+"""Where each road user is at any time."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from ..arrays import Float, Integer
+from ..storage import ArrayFile
+
+FILE = ArrayFile("seip.trajectories", 1, "file of trajectories", "import or simulate them again")
+_ARRAYS = ("origin", "first", "time", "position", "yaw", "pitch", "speed")
+
+CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")
+"""What a road user can be; labels and bodies go by these."""
+
+
+@dataclass(frozen=True)
+class RoadUser:
+    """One road user and its size.
+
+    Parameters
+    ----------
+    name : str
+        Its id in the simulation.
+    category : str
+        One of `CATEGORIES`.
+    length, width, height : float, metres
+    paint : float, 0 to 1
+        Reflectivity of its painted parts, or of its clothes.
+    """
+
+    name: str
+    category: str
+    length: float
+    width: float
+    height: float
+    paint: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Who is where at one instant; k road users.
+
+    Parameters
+    ----------
+    time : float, seconds
+    user : (k,) int64
+        Index into the trajectories' road users, ascending.
+    position : (k, 3) float64, metres
+        Middle of each road user's underside, on the road, local site axes.
+    yaw : (k,) float64, radians
+        Of its heading, counter-clockwise from +x.
+    pitch : (k,) float64, radians
+        Of the road under it, nose up positive.
+    speed : (k,) float64, metres per second
+    """
+
+    time: float
+    user: Integer
+    position: Float
+    yaw: Float
+    pitch: Float
+    speed: Float
+
+    def __len__(self) -> int:
+        """Return the number of road users."""
+        return len(self.user)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Samples of all road users' motion, one road user after the other; n samples.
+
+    Parameters
+    ----------
+    users : tuple of RoadUser
+    origin : (3,) float64, metres
+        Map coordinates of the local origin: map = local + origin.
+    first : (u + 1,) int64
+        Samples of road user i are ``first[i]`` up to ``first[i + 1]``, one or more.
+    time : (n,) float64, seconds
+        Strictly increasing for each road user.
+    position : (n, 3) float64, metres
+        Middle of the underside, on the road, local site axes.
+    yaw : (n,) float64, radians
+        Counter-clockwise from +x and unwrapped: neighbouring samples never differ by more than π.
+    pitch : (n,) float64, radians
+        Nose up positive.
+    speed : (n,) float64, metres per second
+    source : str
+        What they were made from, for people: the file or the simulation and its seed.
+    """
+
+    users: tuple[RoadUser, ...]
+    origin: Float
+    first: Integer
+    time: Float
+    position: Float
+    yaw: Float
+    pitch: Float
+    speed: Float
+    source: str = ""
+
+    def __len__(self) -> int:
+        """Return the number of road users."""
+        return len(self.users)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time of any sample, seconds."""
+        return float(self.time.min()), float(self.time.max())
+
+    def at(self, time: float) -> Snapshot:
+        """Return who is on the road at an instant, between two samples on the straight line from one to the other.
+
+        Parameters
+        ----------
+        time : float, seconds
+
+        Returns
+        -------
+        Snapshot
+            Of the road users whose first sample is not later and whose last is not earlier.
+        """
+        begin, end = self.time[self.first[:-1]], self.time[self.first[1:] - 1]
+        user = np.flatnonzero((begin <= time) & (time <= end))
+        before = np.array([self._last_not_after(int(number), time) for number in user], dtype=np.int64)
+        after = np.minimum(before + 1, self.first[user + 1] - 1)
+        gap = self.time[after] - self.time[before]
+        share = np.where(gap > 0, (time - self.time[before]) / np.where(gap > 0, gap, 1.0), 0.0)
+
+        def between(values: Float) -> Float:
+            part = share if values.ndim == 1 else share[:, None]
+            moved: Float = values[before] + part * (values[after] - values[before])
+            return moved
+
+        return Snapshot(
+            time=time,
+            user=user,
+            position=between(self.position),
+            yaw=between(self.yaw),
+            pitch=between(self.pitch),
+            speed=between(self.speed),
+        )
+
+    def _last_not_after(self, user: int, time: float) -> int:
+        begin, end = int(self.first[user]), int(self.first[user + 1])
+        return begin + int(np.searchsorted(self.time[begin:end], time, side="right")) - 1
+
+    def moved_to(self, origin: Float) -> Trajectories:
+        """Return the same motion in the local axes of another origin."""
+        return replace(self, origin=origin, position=self.position + (self.origin - origin))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the trajectories as npz: the arrays by their names, and the text ``header`` (JSON)."""
+        header = {"source": self.source, "users": [asdict(user) for user in self.users]}
+        FILE.save(path, header, {name: getattr(self, name) for name in _ARRAYS})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trajectories:
+        """Read trajectories.
+
+        Raises
+        ------
+        SeipError
+            The file is not there, damaged, or something else.
+        """
+        with FILE.reading(path) as (header, arrays):
+            users = tuple(RoadUser(**user) for user in header["users"])
+            return cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
