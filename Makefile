@@ -47,6 +47,7 @@ study: environment
 	$(PY) -m headless.study scenes/junction.blend -o out/study
 
 benchmark: environment
+	$(PY) -m pip install --quiet --group benchmark
 	$(PY) -m headless.benchmark scenes/junction.blend -o docs
 
 extension: environment
