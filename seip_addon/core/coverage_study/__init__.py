@@ -4,7 +4,7 @@ The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
 Evaluation of Infrastructure-based Collective Perception", section V.
 """
 
-from .cells import NUMBERS, WEIGHT_SHOWN, WEIGHTS, Case, CoverageStudy, EmptyCell, coverage_study
+from .cells import NUMBERS, WEIGHT_SHOWN, WEIGHTS, Case, Cell, CoverageStudy, EmptyCell, coverage_study, solve_cell
 from .claims import Claim, judge
 
 __all__ = [
@@ -12,9 +12,11 @@ __all__ = [
     "WEIGHTS",
     "WEIGHT_SHOWN",
     "Case",
+    "Cell",
     "Claim",
     "CoverageStudy",
     "EmptyCell",
     "coverage_study",
     "judge",
+    "solve_cell",
 ]

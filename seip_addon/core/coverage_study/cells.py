@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,15 @@ WEIGHT_SHOWN = WEIGHTS[1]
 
 Span = tuple[float, float]
 """Least and largest possible value of something that the solver may not have settled."""
+
+
+class Cell(NamedTuple):
+    """What one cell of the study allows; see `Case`."""
+
+    sensor: str
+    height: float | None
+    count: int
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,28 +177,45 @@ def coverage_study(
     """
     sensors = tuple(dict.fromkeys(site.candidates.sensor.tolist()))
     heights = tuple(sorted(set(site.candidates.height.tolist())))
-    plan = [(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in NUMBERS]
+    plan = [Cell(s, h, n) for s in sensors for h in (*heights, None) for n in NUMBERS]
     if site.targets.central.any():
-        plan += [(s, None, n, w) for s in sensors for n in NUMBERS for w in WEIGHTS]
+        plan += [Cell(s, None, n, w) for s in sensors for n in NUMBERS for w in WEIGHTS]
     cells: list[Case | EmptyCell] = []
-    for done, (sensor, height, count, weight) in enumerate(plan):
-        at = "any height" if height is None else f"{height:g} m"
-        progress = Progress(done, len(plan), f"{sensor}, {at}, N = {count}, central weight {weight:g}")
+    for done, cell in enumerate(plan):
+        at = "any height" if cell.height is None else f"{cell.height:g} m"
+        progress = Progress(done, len(plan), f"{cell.sensor}, {at}, N = {cell.count}, central weight {cell.weight:g}")
         yield progress
-        allowed = site.candidates.sensor == sensor
-        if height is not None:
-            allowed &= site.candidates.height == height
-        goal = Goal(count=count, central_weight=None if weight == 1.0 else weight)
         try:
-            problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
-            placement = yield from within(progress, solve(problem, solver=solver, time_limit=time_limit))
-            greedy = solve_greedy(problem)
+            steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit)
+            cells.append((yield from within(progress, steps)))
         except SeipError as error:
-            cells.append(EmptyCell(sensor, height, count, weight, str(error)))
-            continue
-        deployment = deploy(site, models, visible, placement.chosen)
-        cells.append(Case(sensor, height, count, weight, placement, greedy, deployment))
+            cells.append(EmptyCell(*cell, str(error)))
     yield Progress(len(plan), len(plan), "all cells solved")
     if all(isinstance(cell, EmptyCell) for cell in cells):
         raise SeipError(next(cell.note for cell in cells if isinstance(cell, EmptyCell)))
     return CoverageStudy(sensors, heights, tuple(cells), len(site.targets))
+
+
+def solve_cell(
+    site: Site,
+    models: Mapping[str, LidarModel],
+    visible: NDArray[np.bool_],
+    cell: Cell,
+    *,
+    solver: str,
+    time_limit: float,
+) -> Generator[Progress, None, Case]:
+    """Solve one cell; the arguments are those of `coverage_study`.
+
+    Raises
+    ------
+    SeipError
+        It has no placement.
+    """
+    allowed = site.candidates.sensor == cell.sensor
+    if cell.height is not None:
+        allowed &= site.candidates.height == cell.height
+    goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
+    problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
+    placement = yield from solve(problem, solver=solver, time_limit=time_limit)
+    return Case(*cell, placement, solve_greedy(problem), deploy(site, models, visible, placement.chosen))
