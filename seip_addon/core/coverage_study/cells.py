@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,18 +26,9 @@ Span = tuple[float, float]
 """Least and largest possible value of something that the solver may not have settled."""
 
 
-class Cell(NamedTuple):
-    """What one cell of the study allows; see `Case`."""
-
-    sensor: str
-    height: float | None
-    count: int
-    weight: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """One solved cell of the study.
+@dataclass(frozen=True)
+class Cell:
+    """What one cell of the study allows.
 
     Parameters
     ----------
@@ -50,16 +40,26 @@ class Case:
         N, the largest number of sensors.
     weight : float
         Weight of central targets; 1 is the vanilla problem.
-    placement, greedy : Placement
-        The integer program's and the greedy algorithm's answer.
-    deployment : Deployment
-        What the integer program's sensors see.
     """
 
     sensor: str
     height: float | None
     count: int
     weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Case(Cell):
+    """A solved cell.
+
+    Parameters
+    ----------
+    placement, greedy : Placement
+        The integer program's and the greedy algorithm's answer.
+    deployment : Deployment
+        What the integer program's sensors see.
+    """
+
     placement: Placement
     greedy: Placement
     deployment: Deployment
@@ -71,21 +71,15 @@ class Case:
 
 
 @dataclass(frozen=True)
-class EmptyCell:
-    """A cell of the study that has no placement.
+class EmptyCell(Cell):
+    """A cell that has no placement.
 
     Parameters
     ----------
-    sensor, height, count, weight
-        As in `Case`.
     note : str
         Why: the sentence that a user would read who asked for this placement alone.
     """
 
-    sensor: str
-    height: float | None
-    count: int
-    weight: float
     note: str
 
 
@@ -177,7 +171,7 @@ def coverage_study(
     """
     sensors = tuple(dict.fromkeys(site.candidates.sensor.tolist()))
     heights = tuple(sorted(set(site.candidates.height.tolist())))
-    plan = [Cell(s, h, n) for s in sensors for h in (*heights, None) for n in NUMBERS]
+    plan = [Cell(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in NUMBERS]
     if site.targets.central.any():
         plan += [Cell(s, None, n, w) for s in sensors for n in NUMBERS for w in WEIGHTS]
     cells: list[Case | EmptyCell] = []
@@ -189,7 +183,7 @@ def coverage_study(
             steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit)
             cells.append((yield from within(progress, steps)))
         except SeipError as error:
-            cells.append(EmptyCell(*cell, str(error)))
+            cells.append(EmptyCell(**vars(cell), note=str(error)))
     yield Progress(len(plan), len(plan), "all cells solved")
     if all(isinstance(cell, EmptyCell) for cell in cells):
         raise SeipError(next(cell.note for cell in cells if isinstance(cell, EmptyCell)))
@@ -218,4 +212,5 @@ def solve_cell(
     goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
     placement = yield from solve(problem, solver=solver, time_limit=time_limit)
-    return Case(*cell, placement, solve_greedy(problem), deploy(site, models, visible, placement.chosen))
+    deployment = deploy(site, models, visible, placement.chosen)
+    return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)
