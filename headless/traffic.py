@@ -34,7 +34,8 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scene_geometry import SceneGeometry, joined
 from seip_addon.core.traffic import CATEGORIES, Trajectories
 from seip_addon.core.traffic.demand import Demand
-from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories
+from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories, some
+from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
 from seip_addon.core.traffic.sumo_files import read_net_offset
@@ -73,7 +74,10 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
         window = Window(options.warm_up, end, _bounds(geometry, MARGIN))
         simulated = _read(files.floating_car_data, [files.routes], files.network, window, geometry, source)
-    return replace(simulated, time=np.round(simulated.time - options.warm_up, 3))
+    apart, collided = _run(without_overlaps(simulated))
+    if collided:
+        session.say(f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}")
+    return replace(apart, time=np.round(apart.time - options.warm_up, 3))
 
 
 def _read(  # all that a file of traffic needs beside it

@@ -143,7 +143,7 @@ class _Entry(NamedTuple):
 def _type_lines() -> Iterator[str]:
     for models in MODELS.values():
         for name, model in models.items():
-            stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5"'
+            stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
             yield _type_line(name, model.v_class, model, stop)
             if model.v_class in ("passenger", "delivery"):
                 yield _type_line(f"parked_{name}", PARKED_CLASS, model, "")

@@ -161,7 +161,7 @@ def simulate(
             *("--seed", scenario.seed, "--end", scenario.duration, "--step-length", STEP, "--precision", 3),
             *("--device.fcd.period", SAMPLING, "--person-device.fcd.period", SAMPLING),
             *("--lanechange.duration", _LANE_CHANGE, "--time-to-teleport", -1),
-            *("--collision.check-junctions", "true", "--ignore-route-errors", "true"),
+            *("--collision.action", "warn", "--collision.check-junctions", "true", "--ignore-route-errors", "true"),
             *("--no-step-log", "true", "--no-warnings", "true", "--xml-validation", "never"),
         ],
         "simulating traffic",
