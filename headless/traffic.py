@@ -35,7 +35,7 @@ from seip_addon.core.scene_geometry import SceneGeometry, joined
 from seip_addon.core.traffic import CATEGORIES, Trajectories
 from seip_addon.core.traffic.demand import Demand
 from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories, some
-from seip_addon.core.traffic.overlaps import without_overlaps
+from seip_addon.core.traffic.overlaps import find_overlaps, without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
 from seip_addon.core.traffic.sumo_files import read_net_offset
@@ -46,6 +46,9 @@ Result = TypeVar("Result")
 
 MARGIN = 20.0
 """Metres beyond the road of the scene within which traffic is read."""
+
+LOOKS = 1.0
+"""Seconds between two looks for road users in one place, where a file is read."""
 
 
 def main(argv: list[str]) -> None:
@@ -60,7 +63,16 @@ def main(argv: list[str]) -> None:
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
     window = Window(options.begin, options.end, _bounds(geometry, MARGIN))
-    return _read(options.fcd, options.routes, options.net, window, geometry, options.fcd.name)
+    trajectories = _read(options.fcd, options.routes, options.net, window, geometry, options.fcd.name)
+    overlaps = _run(find_overlaps(trajectories, LOOKS))
+    if len(overlaps):
+        worst = int(overlaps.area.argmax())
+        one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
+        session.say(
+            f"warning: {len(overlaps)} pairs of road users stand in one another; {one} and {other} "
+            f"share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
+        )
+    return trajectories
 
 
 def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
@@ -76,7 +88,9 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         simulated = _read(files.floating_car_data, [files.routes], files.network, window, geometry, source)
     apart, collided = _run(without_overlaps(simulated))
     if collided:
-        session.say(f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}")
+        session.say(
+            f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}"
+        )
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))
 
 

@@ -76,7 +76,7 @@ MODELS = {
 }
 """Sizes of what drives and walks in European cities, riders included; after makers' data sheets, rounded."""
 
-MIX = {"car": 0.70, "van": 0.10, "truck": 0.06, "bus": 0.04, "motorcycle": 0.05, "bicycle": 0.05}
+MIX = {"car": 0.62, "van": 0.13, "truck": 0.08, "bus": 0.05, "motorcycle": 0.06, "bicycle": 0.06}
 """Shares of the vehicles that come in on each arm."""
 
 
@@ -146,7 +146,7 @@ def _type_lines() -> Iterator[str]:
             stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
             yield _type_line(name, model.v_class, model, stop)
             if model.v_class in ("passenger", "delivery"):
-                yield _type_line(f"parked_{name}", PARKED_CLASS, model, "")
+                yield _type_line(f"parked_{name}", PARKED_CLASS, model, ' minGap="0.5"')
 
 
 def _type_line(name: str, v_class: str, model: Model, more: str) -> str:

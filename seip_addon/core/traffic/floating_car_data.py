@@ -129,7 +129,17 @@ def read_trajectories(
         Not on the road yet: pitch is zero, and heights are those of the file, NaN where it does not say.
     warnings : tuple of str
         Which road users have no size.
+
+    Raises
+    ------
+    SeipError
+        There is no road user.
     """
+    if not data.names:
+        raise SeipError(
+            f"FCD of another map, or of another time: none of the {data.elsewhere} road users in {source} comes near "
+            "the scene's road; simulate on the scene's own map, and name its .net.xml where that has a netOffset"
+        )
     sizes = [
         types.get(name, PERSON if walks else CAR) for name, walks in zip(data.types, data.person.tolist(), strict=True)
     ]
@@ -137,7 +147,7 @@ def read_trajectories(
         RoadUser(name, size.category, size.length, size.width, size.height, _paint(name))
         for name, size in zip(data.names, sizes, strict=True)
     )
-    ahead = np.where(data.person, 0.0, [size.length / 2.0 for size in sizes]) if users else np.zeros(0)
+    ahead = np.where(data.person, 0.0, [size.length / 2.0 for size in sizes])
     ahead = np.repeat(ahead, np.diff(data.first))
     heading = np.stack([np.cos(data.yaw), np.sin(data.yaw), np.zeros_like(data.yaw)], axis=1)
     trajectories = Trajectories(

@@ -15,8 +15,11 @@ from ..scene_geometry import SceneGeometry, joined
 from .floating_car_data import some, unwrapped
 from .trajectories import RoadUser, Trajectories
 
-TOLERANCE = 0.5
-"""Metres in plan that the middle of a road user may be beside the road and still counts as on it."""
+TOLERANCE = 1.0
+"""Metres in plan that the middle of a road user may be beside the road and still counts as on it.
+
+As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
+"""
 
 WHEELBASE = 0.6
 """Of the length of a vehicle: its pitch is that of the road between two axles this far apart."""

@@ -29,23 +29,19 @@ STEP = 0.1
 SAMPLING = 0.2
 """Seconds between two samples of the trajectories."""
 
-_LANE_CHANGE = 3.0  # seconds; without it SUMO's vehicles jump from lane to lane
+_LANE_CHANGE = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
 _REACH = 60.0  # metres: a crosswalk further from any traffic light belongs to none
 _BESIDE = 6.0  # metres that pavements reach beyond the ends of a crosswalk
 
-_LANE_TYPES = f"""<types>
-<type id="driving" priority="1" speed="13.89" disallow="pedestrian"/>
-<type id="sidewalk" priority="1" speed="1.39" allow="pedestrian"/>
-<type id="parking" priority="1" speed="5.00" allow="{PARKED_CLASS}"/>
-<type id="biking" priority="1" speed="8.00" allow="bicycle"/>
-<type id="shoulder" priority="0" speed="1.39" disallow="all"/>
-<type id="restricted" priority="0" speed="1.39" disallow="all"/>
-<type id="median" priority="0" speed="1.39" disallow="all"/>
-<type id="stop" priority="0" speed="1.39" disallow="all"/>
-<type id="none" priority="0" speed="1.39" disallow="all"/>
-<type id="border" priority="0" speed="1.39" disallow="all"/>
-</types>
-"""
+_ALLOWED = {
+    "driving": 'disallow="pedestrian"',
+    "sidewalk": 'allow="pedestrian"',
+    "biking": 'allow="bicycle"',
+    "parking": f'allow="{PARKED_CLASS}"',
+}
+"""Who may use which type of lane; nobody the others."""
+
+_CLOSED = ("shoulder", "restricted", "median", "stop", "none", "border")
 
 
 @dataclass(frozen=True)
@@ -178,28 +174,25 @@ def _network(
 ) -> Generator[Progress, None, None]:
     """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
     road_map = read_map(map_path)
-    types = network.with_name("lanes.typ.xml")
-    _write(types, _LANE_TYPES)
+    types, plain, nodes = (network.with_name(name) for name in ("lanes.typ.xml", "plain.net.xml", "shapes.nod.xml"))
+    allowed = _ALLOWED | dict.fromkeys(_CLOSED, 'disallow="all"')
+    _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
     common: list[object] = [
         *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),
         *("--junctions.internal-link-detail", 20, "--no-warnings", "true", "--tls.default-type", "static"),
         *("--tls.green.time", signals.green, "--tls.yellow.time", signals.amber, "--tls.allred.time", signals.all_red),
-        *("--crossings.guess", "true", "--crossings.guess.speed-threshold", 0, "--output-file", network),
+        *("--crossings.guess", "true", "--crossings.guess.speed-threshold", 0),
     ]
-    clip = [] if bounds is None else ["--keep-edges.in-boundary", ",".join(f"{edge:.3f}" for edge in bounds)]
-    source = ["--opendrive-files", map_path, "--opendrive.import-all-lanes", "true", "--type-files", types]
-    yield from _run(programs, programs.netconvert, [*source, *common, "--tls.guess", "true", *clip], "reading the map")
-    shapes = _junction_shapes(read_network(network), road_map)
-    if not shapes:
-        return
-    nodes = network.with_name("junctions.nod.xml")
+    lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
+    source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
+    yield from _run(programs, programs.netconvert, [*source, *common], "reading the map")
+    shapes = _junction_shapes(read_network(plain), road_map)
     corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
-    lines = [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()]
-    _write(nodes, "\n".join(["<nodes>", *lines, "</nodes>"]))
-    plain = network.with_name("plain.net.xml")
-    network.replace(plain)
-    source = ["--sumo-net-file", plain, "--node-files", nodes]
-    yield from _run(programs, programs.netconvert, [*source, *common, "--tls.rebuild", "true"], "laying crosswalks")
+    _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
+    clip = [] if bounds is None else ["--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds)]
+    source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
+    changes = [*source, *common, *clip, "--keep-edges.postload", "true"]
+    yield from _run(programs, programs.netconvert, changes, "laying crosswalks")
 
 
 def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:
@@ -236,9 +229,9 @@ def _crosswalks(road_map: RoadMap) -> list[Float]:
     return outlines
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, root: str, elements: Sequence[str]) -> None:
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text("\n".join([f"<{root}>", *elements, f"</{root}>", ""]), encoding="utf-8")
 
 
 def _run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -> Generator[Progress, None, None]:
