@@ -48,7 +48,7 @@ scenes: environment
 traffic: environment
 	$(PY) -m pip install --quiet --only-binary :all: --group traffic
 	for seed in 1 2 3 4 5 6; do \
-	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 500 --pedestrians 120 \
+	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 550 --pedestrians 120 \
 	    --duration 75 --seed $$seed -o scenes/junction_traffic/run-$$seed.npz || exit; done
 	for seed in 1 2; do \
 	  $(PY) -m headless.traffic scenes/corridor.blend --simulate scenes/corridor.xodr --flow 450 --pedestrians 100 \

@@ -76,7 +76,7 @@ MODELS = {
 }
 """Sizes of what drives and walks in European cities, riders included; after makers' data sheets, rounded."""
 
-MIX = {"car": 0.62, "van": 0.13, "truck": 0.08, "bus": 0.05, "motorcycle": 0.06, "bicycle": 0.06}
+MIX = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
 """Shares of the vehicles that come in on each arm."""
 
 
@@ -123,9 +123,15 @@ def write_routes(
         raise SeipError(
             "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
         )
-    entries = [*_parked(network, np.random.default_rng([seed, 0]))]
+    random = np.random.default_rng([seed, 0])
+    bays = _bays(network, random)
+    entries = list(_parked(bays, random))
+    free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
-        entries += _vehicles(network, arm, demand, np.random.default_rng([seed, 1, number]), duration)
+        random = np.random.default_rng([seed, 1, number])
+        for depart in _departures(demand.flow, random, duration):
+            route = _route(network, arm, demand.turns, random)
+            entries.append(_vehicle(f"{arm.id}.{len(entries)}", depart, route, free, random))
     entries += _walkers(network, demand.pedestrians * len(arms), np.random.default_rng([seed, 2]), duration)
     entries.sort(key=lambda entry: entry.depart)
     lines = ["<routes>", *_type_lines(), *(entry.text for entry in entries), "</routes>"]
@@ -172,22 +178,17 @@ def _departures(rate: float, random: np.random.Generator, duration: float) -> It
         yield round(time, 1)
 
 
-def _vehicles(
-    network: StreetNetwork, arm: Edge, demand: Demand, random: np.random.Generator, duration: float
-) -> Iterator[_Entry]:
+def _vehicle(number: str, depart: float, route: list[Edge], free: set[str], random: np.random.Generator) -> _Entry:
     categories, shares = list(MIX), np.array(list(MIX.values()))
-    for number, depart in enumerate(_departures(demand.flow, random, duration)):
-        category = str(random.choice(categories, p=shares / shares.sum()))
-        route = _route(network, arm, demand.turns, random)
-        stop = ""
-        if category in ("van", "truck") and random.random() < _DELIVERING:
-            stop = _delivery(route, random)
-        edges = " ".join(edge.id for edge in route)
-        yield _Entry(
-            depart,
-            f'<vehicle id="{category}-{arm.id}.{number}" type="{_pick(MODELS[category], random)}" depart="{depart}" '
-            f'departLane="best" departSpeed="max"><route edges="{edges}"/>{stop}</vehicle>',
-        )
+    category = str(random.choice(categories, p=shares / shares.sum()))
+    delivers = category in {"van", "truck"} and random.random() < _DELIVERING
+    stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
+    edges = " ".join(edge.id for edge in route)
+    return _Entry(
+        depart,
+        f'<vehicle id="{category}-{number}" type="{_pick(MODELS[category], random)}" depart="{depart}" '
+        f'departLane="best" departSpeed="max"><route edges="{edges}"/>{stop}</vehicle>',
+    )
 
 
 def _route(
@@ -205,9 +206,9 @@ def _route(
     return route
 
 
-def _delivery(route: list[Edge], random: np.random.Generator) -> str:
-    """Return a stop in the outer lane of a street of the route that has another lane to pass by."""
-    streets = [edge for edge in route if len(edge.of(DRIVING)) > 1 and edge.lanes[0].length > 2.0 * _FIRST_BAY]
+def _delivery(streets: list[Edge], random: np.random.Generator) -> str:
+    """Return a stop in the outer lane of one of the streets that have another lane to pass by; empty without any."""
+    streets = [edge for edge in streets if len(edge.of(DRIVING)) > 1 and edge.lanes[0].length > 2.0 * _FIRST_BAY]
     if not streets:
         return ""
     edge = streets[int(random.integers(len(streets)))]
@@ -216,8 +217,8 @@ def _delivery(route: list[Edge], random: np.random.Generator) -> str:
     return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP):.0f}"/>'
 
 
-def _parked(network: StreetNetwork, random: np.random.Generator) -> Iterator[_Entry]:
-    """Yield cars that stand all the time: in parking lanes, or where there are none in rows at the kerb.
+def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[Edge, Lane, float]]:
+    """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
 
     A row stands in the outer of several lanes of every second street on which vehicles leave the network.
     """
@@ -228,8 +229,10 @@ def _parked(network: StreetNetwork, random: np.random.Generator) -> Iterator[_En
         for place in np.arange(_BAY + 2.0, lane.length - 2.0, _BAY)
         if random.random() < _OCCUPIED
     ]
-    if not bays:
-        bays = list(_rows(network, random))
+    return bays or list(_rows(network, random))
+
+
+def _parked(bays: list[tuple[Edge, Lane, float]], random: np.random.Generator) -> Iterator[_Entry]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
     for number, (edge, lane, place) in enumerate(bays):
         text = (
