@@ -3,6 +3,7 @@
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make study       redo the coverage study on the shipped junction
+# make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
 # make clean       remove what was built; make distclean removes the environment and the wheels as well
@@ -16,7 +17,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes study benchmark extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes traffic study benchmark extension clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -42,6 +43,16 @@ lint: environment
 scenes: environment
 	$(PY) -m headless.build_scene scenes/junction.toml -o scenes/junction.blend
 	$(PY) -m headless.build_scene scenes/corridor.toml -o scenes/corridor.blend
+
+# Runs of one scene differ by their seed alone.
+traffic: environment
+	$(PY) -m pip install --quiet --only-binary :all: --group traffic
+	for seed in 1 2 3 4 5 6; do \
+	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 550 --pedestrians 120 \
+	    --duration 75 --seed $$seed -o scenes/junction_traffic/run-$$seed.npz || exit; done
+	for seed in 1 2; do \
+	  $(PY) -m headless.traffic scenes/corridor.blend --simulate scenes/corridor.xodr --flow 450 --pedestrians 100 \
+	    --duration 75 --seed $$seed -o scenes/corridor_traffic/run-$$seed.npz || exit; done
 
 study: environment
 	$(PY) -m headless.study scenes/junction.blend -o out/study

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from .arrays import Boolean, Float
+from .arrays import Boolean, Float, Integer
 
 LEAST_AREA = 1e-9
 """Square metres in plan below which a triangle stands on edge and covers nothing."""
@@ -54,15 +54,34 @@ def surface_height(plan: Float, triangles: Float) -> Float:
     (n,) float64, metres
         NaN where no triangle lies over or under the point.
     """
+    point, heights = heights_over(plan, triangles)
+    height = np.full(len(plan), -np.inf)
+    np.maximum.at(height, point, heights)
+    height[np.isneginf(height)] = np.nan
+    return height
+
+
+def heights_over(plan: Float, triangles: Float) -> tuple[Integer, Float]:
+    """Heights of all surfaces over or under each plan point.
+
+    Parameters
+    ----------
+    plan : (n, 2) float64, metres
+    triangles : (m, 3, 3) float64, metres
+
+    Returns
+    -------
+    point : (k,) int64
+        Index of a plan point; one may come several times, or not at all.
+    height : (k,) float64, metres
+        Of a surface there.
+    """
     lying = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
     low, high = lying[:, :, :2].min(axis=1), lying[:, :, :2].max(axis=1)
     tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
     point, near = tree.query(shapely.points(plan), predicate="intersects")
     above = _covers(lying[near], plan[point])
-    height = np.full(len(plan), -np.inf)
-    np.maximum.at(height, point[above], plane_height(lying[near[above]], plan[point[above]]))
-    height[np.isneginf(height)] = np.nan
-    return height
+    return point[above], plane_height(lying[near[above]], plan[point[above]])
 
 
 def _covers(triangles: Float, plan: Float) -> Boolean:

@@ -1,0 +1,169 @@
+"""Put traffic on the road of a scene: from SUMO's floating car data, or simulated by SUMO on the scene's map.
+
+In Blender, on the scene that is open::
+
+    blender -b --python-exit-code 1 site.blend -P headless/traffic.py -- --fcd run.fcd.xml --routes run.rou.xml -o t.npz
+
+or as plain Python on the bpy module::
+
+    python -m headless.traffic site.blend --simulate site.xodr --flow 600 --seed 1 --duration 120 -o traffic.npz
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session, survey
+
+import bpy
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.scene_geometry import SceneGeometry, joined
+from seip_addon.core.traffic import CATEGORIES, Trajectories
+from seip_addon.core.traffic.demand import Demand
+from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories, some
+from seip_addon.core.traffic.overlaps import find_overlaps, without_overlaps
+from seip_addon.core.traffic.road_fit import fit_to_road
+from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
+from seip_addon.core.traffic.sumo_files import read_net_offset
+from seip_addon.core.traffic.vehicle_types import read_vehicle_types
+from seip_addon.scene.read import read_scene
+
+Result = TypeVar("Result")
+
+MARGIN = 20.0
+"""Metres beyond the road of the scene within which traffic is read."""
+
+LOOKS = 1.0
+"""Seconds between two looks for road users in one place, where a file is read."""
+
+
+def main(argv: list[str]) -> None:
+    """Read or simulate traffic, fit it to the road and write it."""
+    options = _parser().parse_args(argv)
+    session.open_scene(options.scene)
+    geometry = read_scene(bpy.context.scene).geometry
+    trajectories = _simulated(options, geometry) if options.fcd is None else _imported(options, geometry)
+    trajectories.save(options.output)
+    session.say(f"{options.output}: {_in_words(trajectories)}")
+
+
+def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
+    window = Window(options.begin, options.end, _bounds(geometry, MARGIN))
+    trajectories = _read(options.fcd, options.routes, options.net, window, geometry, options.fcd.name)
+    overlaps = _run(find_overlaps(trajectories, LOOKS))
+    if len(overlaps):
+        worst = int(overlaps.area.argmax())
+        one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
+        session.say(
+            f"warning: {len(overlaps)} pairs of road users stand in one another; {one} and {other} "
+            f"share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
+        )
+    return trajectories
+
+
+def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
+    if not 0.0 <= options.warm_up < math.inf or not 0.0 < options.duration < math.inf:
+        raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
+    demand = Demand(options.flow, tuple(options.turns), options.pedestrians)
+    end = options.warm_up + options.duration
+    scenario = Scenario(demand, SignalPlan(options.green), options.seed, end)
+    with tempfile.TemporaryDirectory() as folder:
+        files = _run(simulate(options.simulate, Path(folder), scenario, _bounds(geometry, 0.0)))
+        source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
+        window = Window(options.warm_up, end, _bounds(geometry, MARGIN))
+        simulated = _read(files.floating_car_data, [files.routes], files.network, window, geometry, source)
+    apart, collided = _run(without_overlaps(simulated))
+    if collided:
+        session.say(
+            f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}"
+        )
+    return replace(apart, time=np.round(apart.time - options.warm_up, 3))
+
+
+def _read(  # all that a file of traffic needs beside it
+    path: Path, routes: list[Path], net: Path | None, window: Window, geometry: SceneGeometry, source: str
+) -> Trajectories:
+    offset = None if net is None else read_net_offset(net)
+    data = _run(read_floating_car_data(path, offset, window))
+    trajectories, warnings = read_trajectories(data, _run(read_vehicle_types(routes)), geometry.origin, source)
+    fit = fit_to_road(trajectories, geometry)
+    for sentence in (*warnings, *fit.warnings):
+        session.say(f"warning: {sentence}")
+    return fit.trajectories
+
+
+def _bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:
+    """Return the rectangle of the scene's road in map coordinates."""
+    road = joined(geometry.roads)[:, :, :2].reshape(-1, 2) + geometry.origin[:2]
+    (left, low), (right, high) = road.min(axis=0) - margin, road.max(axis=0) + margin
+    return float(left), float(low), float(right), float(high)
+
+
+def _run(steps: Generator[Progress, None, Result]) -> Result:
+    with session.progress_bar() as report:
+        return finish(steps, report)
+
+
+def _in_words(trajectories: Trajectories) -> str:
+    begin, end = trajectories.span
+    counts = Counter(user.category for user in trajectories.users)
+    kinds = ", ".join(f"{counts[category]} {category}" for category in CATEGORIES if counts[category])
+    present = len(trajectories.at((begin + end) / 2.0))
+    return (
+        f"{len(trajectories)} road users ({kinds}) from {begin:g} to {end:g} s, {len(trajectories.time):,} samples, "
+        f"{present} at once halfway"
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="traffic", description="Put traffic on the road of a scene.", formatter_class=survey.HelpWithDefaults
+    )
+    parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="NPZ", help="file for the trajectories")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, or packed .gz"
+    )
+    source.add_argument(
+        "--simulate", type=Path, metavar="XODR", help="the scene's map, for SUMO to simulate traffic on"
+    )
+    reading = parser.add_argument_group("with --fcd")
+    reading.add_argument(
+        "--routes", nargs="+", type=Path, default=[], metavar="XML", help="files with the vehicle types"
+    )
+    reading.add_argument("--net", type=Path, metavar="XML", help="the .net.xml, which knows the offset from the map")
+    reading.add_argument("--begin", type=float, default=-math.inf, metavar="S", help="leave out what was before")
+    reading.add_argument("--end", type=float, default=math.inf, metavar="S", help="leave out what comes after")
+    demand, signals = Demand(), SignalPlan()
+    making = parser.add_argument_group("with --simulate")
+    making.add_argument("--flow", type=float, default=demand.flow, metavar="N", help="vehicles per hour and arm")
+    making.add_argument(
+        "--turns", type=float, nargs=3, default=demand.turns, metavar=("LEFT", "STRAIGHT", "RIGHT"), help="their shares"
+    )
+    making.add_argument(
+        "--pedestrians", type=float, default=demand.pedestrians, metavar="N", help="persons per hour and arm"
+    )
+    making.add_argument("--green", type=int, default=signals.green, metavar="S", help="of each phase of the signals")
+    making.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random")
+    making.add_argument("--duration", type=float, default=120.0, metavar="S", help="of the trajectories")
+    making.add_argument("--warm-up", type=float, default=120.0, metavar="S", help="of the simulation before that")
+    return parser
+
+
+if __name__ == "__main__":
+    session.run(main)

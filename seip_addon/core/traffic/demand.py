@@ -1,0 +1,277 @@
+"""Who drives and walks where and when, as a route file for SUMO."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import SeipError
+from ..storage import whole_file
+from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, Edge, Lane, StreetNetwork
+
+_LONGEST_ROUTE = 40  # edges; in a network without ends a vehicle leaves after so many
+_LONGEST_WALK = 150.0  # metres in plan from one pavement to another
+_SHORTEST_PAVEMENT = 20.0  # metres; on a shorter one nobody sets out
+_DELIVERING = 0.35  # of the vans and trucks; they stop once on their way
+_STOP = (20.0, 60.0)  # seconds
+_BAY = 6.5  # metres of kerb for a parked car
+_OCCUPIED = 0.6  # of the bays in parking lanes
+_ROW = 3  # cars at the kerb of a street without parking lane
+_FIRST_BAY = 35.0  # metres from where the street begins
+_FOR_EVER = 1e6  # seconds
+
+
+class Model(NamedTuple):
+    """A model of road user: its vClass, guiShape, size in metres, share within its category, and top speed in m/s."""
+
+    v_class: str
+    shape: str
+    length: float
+    width: float
+    height: float
+    share: float
+    speed: float = 30.0
+
+
+MODELS = {
+    "car": {
+        "city_car": Model("passenger", "passenger/hatchback", 3.57, 1.63, 1.49, 0.12),
+        "supermini": Model("passenger", "passenger/hatchback", 4.06, 1.75, 1.45, 0.22),
+        "compact": Model("passenger", "passenger/hatchback", 4.28, 1.79, 1.48, 0.22),
+        "estate": Model("passenger", "passenger/wagon", 4.69, 1.83, 1.52, 0.12),
+        "saloon": Model("passenger", "passenger/sedan", 4.87, 1.86, 1.45, 0.12),
+        "crossover": Model("passenger", "passenger", 4.48, 1.84, 1.64, 0.14),
+        "large_suv": Model("passenger", "passenger", 4.93, 1.98, 1.77, 0.06),
+    },
+    "van": {
+        "small_van": Model("delivery", "delivery", 4.50, 1.86, 1.84, 0.35),
+        "delivery_van": Model("delivery", "delivery", 5.93, 2.02, 2.62, 0.45),
+        "long_van": Model("delivery", "delivery", 6.94, 2.04, 2.79, 0.20),
+    },
+    "truck": {
+        "box_truck": Model("truck", "truck", 7.60, 2.45, 3.35, 0.6, 22.0),
+        "large_truck": Model("truck", "truck", 9.60, 2.55, 3.75, 0.4, 22.0),
+    },
+    "bus": {
+        "midibus": Model("bus", "bus", 9.50, 2.45, 3.00, 0.3, 18.0),
+        "city_bus": Model("bus", "bus", 12.00, 2.55, 3.10, 0.7, 18.0),
+    },
+    "motorcycle": {
+        "scooter": Model("motorcycle", "moped", 1.92, 0.74, 1.68, 0.5, 16.0),
+        "motorcycle": Model("motorcycle", "motorcycle", 2.17, 0.83, 1.62, 0.5),
+    },
+    "bicycle": {
+        "city_bicycle": Model("bicycle", "bicycle", 1.82, 0.62, 1.78, 0.7, 5.5),
+        "cargo_bicycle": Model("bicycle", "bicycle", 2.50, 0.70, 1.75, 0.3, 4.8),
+    },
+    "pedestrian": {
+        "adult": Model("pedestrian", "pedestrian", 0.45, 0.55, 1.70, 0.6, 1.4),
+        "tall_adult": Model("pedestrian", "pedestrian", 0.48, 0.60, 1.84, 0.25, 1.5),
+        "child": Model("pedestrian", "pedestrian", 0.35, 0.42, 1.28, 0.15, 1.2),
+    },
+}
+"""Sizes of what drives and walks in European cities, riders included; after makers' data sheets, rounded."""
+
+MIX = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
+"""Shares of the vehicles that come in on each arm."""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """How much traffic there is.
+
+    Parameters
+    ----------
+    flow : float, vehicles per hour
+        That come in on each arm.
+    turns : (3,) float
+        Shares that turn left, go straight on and turn right, where a junction offers that.
+    pedestrians : float, persons per hour
+        That set out for each arm of the network.
+    """
+
+    flow: float = 600.0
+    turns: tuple[float, float, float] = (0.2, 0.6, 0.2)
+    pedestrians: float = 200.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no traffic can be."""
+        if not 0.0 < self.flow <= 3000.0:
+            raise SeipError(f"--flow must be above 0 and at most 3000 vehicles per hour and arm, not {self.flow:g}")
+        if not 0.0 <= self.pedestrians <= 3000.0:
+            raise SeipError(f"--pedestrians must be 0 to 3000 per hour and arm, not {self.pedestrians:g}")
+        if min(self.turns) < 0.0 or not 0.0 < sum(self.turns) < np.inf:
+            raise SeipError(f"--turns must be three shares of which one is above 0, not {self.turns}")
+
+
+def write_routes(
+    path: str | os.PathLike[str], network: StreetNetwork, demand: Demand, seed: int, duration: float
+) -> None:
+    """Write who is on the road from 0 to ``duration`` seconds; the same for the same seed.
+
+    Raises
+    ------
+    SeipError
+        The network has no arm on which vehicles could come in.
+    """
+    arms = network.arms
+    if not arms:
+        raise SeipError(
+            "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
+        )
+    random = np.random.default_rng([seed, 0])
+    bays = _bays(network, random)
+    entries = list(_parked(bays, random))
+    free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
+    for number, arm in enumerate(arms, start=1):
+        random = np.random.default_rng([seed, 1, number])
+        for depart in _departures(demand.flow, random, duration):
+            route = _route(network, arm, demand.turns, random)
+            entries.append(_vehicle(f"{arm.id}.{len(entries)}", depart, route, free, random))
+    entries += _walkers(network, demand.pedestrians * len(arms), np.random.default_rng([seed, 2]), duration)
+    entries.sort(key=lambda entry: entry.depart)
+    lines = ["<routes>", *_type_lines(), *(entry.text for entry in entries), "</routes>"]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+class _Entry(NamedTuple):
+    """An element of the route file and when it departs, seconds."""
+
+    depart: float
+    text: str
+
+
+def _type_lines() -> Iterator[str]:
+    for models in MODELS.values():
+        for name, model in models.items():
+            stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
+            yield _type_line(name, model.v_class, model, stop)
+            if model.v_class in ("passenger", "delivery"):
+                yield _type_line(f"parked_{name}", PARKED_CLASS, model, ' minGap="0.5"')
+
+
+def _type_line(name: str, v_class: str, model: Model, more: str) -> str:
+    length, width, height = model.length, model.width, model.height
+    return (
+        f'<vType id="{name}" vClass="{v_class}" guiShape="{model.shape}" length="{length}" width="{width}" '
+        f'height="{height}" maxSpeed="{model.speed}"{more}/>'
+    )
+
+
+def _pick(models: dict[str, Model], random: np.random.Generator) -> str:
+    shares = np.array([model.share for model in models.values()])
+    return str(random.choice(list(models), p=shares / shares.sum()))
+
+
+def _departures(rate: float, random: np.random.Generator, duration: float) -> Iterator[float]:
+    """Yield the times of a Poisson process, ``rate`` per hour."""
+    time = 0.0
+    while rate > 0.0:
+        time += float(random.exponential(3600.0 / rate))
+        if time >= duration:
+            return
+        yield round(time, 1)
+
+
+def _vehicle(number: str, depart: float, route: list[Edge], free: set[str], random: np.random.Generator) -> _Entry:
+    categories, shares = list(MIX), np.array(list(MIX.values()))
+    category = str(random.choice(categories, p=shares / shares.sum()))
+    delivers = category in {"van", "truck"} and random.random() < _DELIVERING
+    stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
+    edges = " ".join(edge.id for edge in route)
+    return _Entry(
+        depart,
+        f'<vehicle id="{category}-{number}" type="{_pick(MODELS[category], random)}" depart="{depart}" '
+        f'departLane="best" departSpeed="max"><route edges="{edges}"/>{stop}</vehicle>',
+    )
+
+
+def _route(
+    network: StreetNetwork, arm: Edge, turns: tuple[float, float, float], random: np.random.Generator
+) -> list[Edge]:
+    """Return a way through the network that turns at random, by the shares of what each junction offers."""
+    share = dict(zip("lsr", turns, strict=True))
+    route = [arm]
+    while network.leads_on(route[-1]) and len(route) < _LONGEST_ROUTE:
+        ways = network.onward[route[-1].id]
+        weights = np.array([share[way] for _, way in ways])
+        if not weights.any():
+            weights = np.ones(len(ways))
+        route.append(network.edges[ways[int(random.choice(len(ways), p=weights / weights.sum()))][0]])
+    return route
+
+
+def _delivery(streets: list[Edge], random: np.random.Generator) -> str:
+    """Return a stop in the outer lane of one of the streets that have another lane to pass by; empty without any."""
+    streets = [edge for edge in streets if len(edge.of(DRIVING)) > 1 and edge.lanes[0].length > 2.0 * _FIRST_BAY]
+    if not streets:
+        return ""
+    edge = streets[int(random.integers(len(streets)))]
+    lane = edge.of(DRIVING)[0]
+    place = float(random.uniform(_FIRST_BAY, lane.length - _FIRST_BAY))
+    return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP):.0f}"/>'
+
+
+def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[Edge, Lane, float]]:
+    """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
+
+    A row stands in the outer of several lanes of every second street on which vehicles leave the network.
+    """
+    bays = [
+        (edge, lane, float(place))
+        for edge in network.edges.values()
+        for lane in edge.of(PARKING)
+        for place in np.arange(_BAY + 2.0, lane.length - 2.0, _BAY)
+        if random.random() < _OCCUPIED
+    ]
+    return bays or list(_rows(network, random))
+
+
+def _parked(bays: list[tuple[Edge, Lane, float]], random: np.random.Generator) -> Iterator[_Entry]:
+    models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
+    for number, (edge, lane, place) in enumerate(bays):
+        text = (
+            f'<vehicle id="parked-{number}" type="parked_{_pick(models, random)}" depart="0" departLane="{lane.index}" '
+            f'departPos="{place:.1f}" departSpeed="0"><route edges="{edge.id}"/>'
+            f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_FOR_EVER:.0f}"/></vehicle>'
+        )
+        yield _Entry(0.0, text)
+
+
+def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple[Edge, Lane, float]]:
+    exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
+    for index in sorted(random.permutation(len(exits))[: (len(exits) + 1) // 2].tolist()):
+        lane = exits[index].of(DRIVING)[0]
+        first = _FIRST_BAY + float(random.uniform(0.0, _BAY))
+        for place in first + _BAY * np.arange(_ROW):
+            if place < lane.length - _BAY:
+                yield exits[index], lane, float(place)
+
+
+def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, duration: float) -> Iterator[_Entry]:
+    pavements = [
+        (edge, lane) for edge in network.edges.values() for lane in edge.of(WALKING) if lane.length > _SHORTEST_PAVEMENT
+    ]
+    if len(pavements) < 2:
+        return
+    length = np.array([lane.length for _, lane in pavements])
+    middle = np.array([lane.line.mean(axis=0) for _, lane in pavements])
+    for number, depart in enumerate(_departures(rate, random, duration)):
+        start = int(random.choice(len(pavements), p=length / length.sum()))
+        within = np.hypot(*(middle - middle[start]).T) < _LONGEST_WALK
+        within[start] = False
+        if not within.any():
+            continue
+        goal = int(random.choice(np.flatnonzero(within)))
+        (origin, first), (target, last) = pavements[start], pavements[goal]
+        begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
+        yield _Entry(
+            depart,
+            f'<person id="pedestrian-{number}" type="{_pick(MODELS["pedestrian"], random)}" depart="{depart}" '
+            f'departPos="{begin:.1f}"><walk from="{origin.id}" to="{target.id}" arrivalPos="{end:.1f}"/></person>',
+        )

@@ -1,0 +1,201 @@
+"""Road users on the road surface of a scene: heights, slopes, and who is where there is no road."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from ..plan_geometry import LEAST_AREA, heights_over, plane_height, signed_area
+from ..scene_geometry import SceneGeometry, joined
+from .floating_car_data import some, unwrapped
+from .trajectories import RoadUser, Trajectories
+
+TOLERANCE = 1.0
+"""Metres in plan that the middle of a road user may be beside the road and still counts as on it.
+
+As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
+"""
+
+WHEELBASE = 0.6
+"""Of the length of a vehicle: its pitch is that of the road between two axles this far apart."""
+
+LONGEST_GAP = 2.5
+"""Sampling intervals; between samples further apart than this a road user was somewhere else."""
+
+_DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
+"""Of what is kept: a millimetre and a ten-thousandth of a radian, as fine as simulations write."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoadFit:
+    """Trajectories on the road of a scene, and what a user should know of them (one sentence each)."""
+
+    trajectories: Trajectories
+    warnings: tuple[str, ...]
+
+
+def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
+    """Put road users on the road of a scene, and leave out where they are off it.
+
+    Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
+    is nearest to the height in the trajectories counts, and the highest where they say none. A road user who leaves
+    the road or the scene and comes back is another road user then: NAME/2.
+
+    Parameters
+    ----------
+    trajectories : Trajectories
+        Their heights may be NaN.
+    geometry : SceneGeometry
+
+    Returns
+    -------
+    RoadFit
+        In the local axes of the scene, to the millimetre, with pitches.
+
+    Raises
+    ------
+    SeipError
+        Nobody comes near the region of interest, or most who do are off the road there: it is another map's traffic.
+    """
+    local = trajectories.moved_to(geometry.origin)
+    roads = _Surface(joined(geometry.roads))
+    both = _Surface(joined((*geometry.roads, *geometry.ground)))
+    user = np.repeat(np.arange(len(local)), np.diff(local.first))
+    walks = np.array([each.category == "pedestrian" for each in local.users], dtype=np.bool_)[user]
+
+    def height(plan: Float, hint: Float) -> Float:
+        found = np.empty(len(plan))
+        found[~walks] = roads.height(plan[~walks], hint[~walks])
+        found[walks] = both.height(plan[walks], hint[walks])
+        return found
+
+    plan = local.position[:, :2]
+    z = height(plan, local.position[:, 2])
+    on_road = np.isfinite(z)
+    hull = geometry.region.convex_hull
+    near = shapely.contains_xy(hull, plan[:, 0], plan[:, 1])
+    warnings = _off_the_road(local, user, near, on_road)
+    length = np.array([each.length for each in local.users])[user]
+    pitch = np.where(walks, 0.0, _pitch(height, plan, z, local.yaw, length))
+    fitted = replace(local, position=np.column_stack([plan, z]), pitch=pitch)
+    return RoadFit(_rounded(_only(fitted, user, on_road)), warnings)
+
+
+class _Surface:
+    """Triangles (n, 3, 3) that road users can stand on."""
+
+    def __init__(self, triangles: Float) -> None:
+        self._triangles = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
+        self._tree = shapely.STRtree(shapely.polygons(self._triangles[:, :, :2]))
+
+    def height(self, plan: Float, hint: Float) -> Float:
+        """Return the height (n,) of the surface at points (n, 2), nearest to a hint (n,); NaN off the road."""
+        point, heights = heights_over(plan, self._triangles)
+        height = _one_each(len(plan), point, heights, hint)
+        beside = np.flatnonzero(np.isnan(height))
+        places = shapely.points(plan[beside])
+        number, triangle = self._tree.query_nearest(places, max_distance=TOLERANCE)
+        nearest = shapely.get_coordinates(
+            shapely.get_point(shapely.shortest_line(self._tree.geometries[triangle], places[number]), 0)
+        )
+        heights = plane_height(self._triangles[triangle], nearest)
+        height[beside] = _one_each(len(beside), number, heights, hint[beside])
+        return height
+
+
+def _one_each(count: int, point: Integer, heights: Float, hint: Float) -> Float:
+    """Of the heights found at points return for each the one nearest to its hint, or the highest where that is NaN."""
+    wanted = np.where(np.isnan(hint[point]), np.inf, hint[point])
+    badness = np.where(np.isinf(wanted), -heights, np.abs(heights - wanted))
+    order = np.lexsort((badness, point))
+    first = np.unique(point[order], return_index=True)[1]
+    height = np.full(count, np.nan)
+    height[point[order][first]] = heights[order][first]
+    return height
+
+
+def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: Float, length: Float) -> Float:
+    """Return the slope of the road between the axles, radians; where one of them is off the road, up to the middle."""
+    half = WHEELBASE / 2.0 * length
+    ahead = half[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+    front, rear = height(plan + ahead, z), height(plan - ahead, z)
+    rise = np.where(np.isnan(front), z, front) - np.where(np.isnan(rear), z, rear)
+    run = half * (np.isfinite(front).astype(float) + np.isfinite(rear))
+    pitch: Float = np.where(run > 0.0, np.arctan2(rise, np.where(run > 0.0, run, 1.0)), 0.0)
+    return pitch
+
+
+def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Boolean) -> tuple[str, ...]:
+    """Count and name who is off the road near the region; refuse traffic that mostly is."""
+    count = len(local)
+    seen = np.bincount(user[near], minlength=count)
+    off = np.bincount(user[near & ~on_road], minlength=count)
+    visitors = int(np.count_nonzero(seen))
+    if not visitors:
+        raise SeipError(
+            f"FCD of another map: none of its {count} road users comes into the region of interest; "
+            "simulate on the scene's own map, and name its .net.xml where that has a netOffset"
+        )
+    astray = [local.users[number].name for number in np.flatnonzero(off)]
+    mostly = int(np.count_nonzero(off > seen / 2.0))
+    if mostly > visitors / 2.0:
+        raise SeipError(
+            f"FCD of another map: {mostly} of {visitors} road users in the region of interest are off the road, "
+            f"by more than {TOLERANCE:g} m ({some(astray)}); simulate on the scene's own map, and name its .net.xml "
+            "where that has a netOffset"
+        )
+    if not astray:
+        return ()
+    sentence = (
+        f"{len(astray)} of {visitors} road users leave the road by more than {TOLERANCE:g} m and are left out there: "
+        f"{some(astray)}"
+    )
+    return (sentence,)
+
+
+def _only(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajectories:
+    """Keep some samples; what a gap separates becomes two road users, and a single sample none."""
+    kept = np.flatnonzero(keep)
+    user, time = user[kept], trajectories.time[kept]
+    new = np.ones(len(kept), dtype=np.bool_)
+    new[1:] = (np.diff(user) != 0) | (np.diff(kept) > 1) | (np.diff(time) > _longest_gap(trajectories))
+    begin = np.flatnonzero(new)
+    end = np.append(begin[1:], len(kept))
+    stays = end - begin > 1
+    begin, end = begin[stays], end[stays]
+    if not len(begin):
+        raise SeipError("no road user is on the road of the scene for two samples; simulate more of its traffic")
+    chosen = kept[np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])]
+    first = np.concatenate([[0], np.cumsum(end - begin)])
+    owner = user[begin]
+    visit = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    return replace(
+        trajectories,
+        users=tuple(_again(trajectories.users[a], b) for a, b in zip(owner.tolist(), visit.tolist(), strict=True)),
+        first=first.astype(np.int64),
+        time=trajectories.time[chosen],
+        position=trajectories.position[chosen],
+        yaw=unwrapped(trajectories.yaw[chosen], first),
+        pitch=trajectories.pitch[chosen],
+        speed=trajectories.speed[chosen],
+    )
+
+
+def _longest_gap(trajectories: Trajectories) -> float:
+    """Return how many seconds may lie between two samples of one stay."""
+    steps = np.delete(np.diff(trajectories.time), trajectories.first[1:-1] - 1)
+    return LONGEST_GAP * float(np.median(steps)) if len(steps) else 0.0
+
+
+def _again(user: RoadUser, visit: int) -> RoadUser:
+    return user if visit == 0 else replace(user, name=f"{user.name}/{visit + 1}")
+
+
+def _rounded(trajectories: Trajectories) -> Trajectories:
+    arrays = {name: np.round(getattr(trajectories, name), digits) + 0.0 for name, digits in _DIGITS.items()}
+    return replace(trajectories, **arrays)

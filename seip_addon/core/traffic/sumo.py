@@ -1,0 +1,267 @@
+"""Traffic from SUMO (Simulation of Urban MObility, Eclipse) on an OpenDRIVE map; SUMO itself is an optional extra."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import shapely
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..opendrive import read_map
+from ..opendrive.road_map import RoadMap
+from ..progress import Progress, in_thread
+from ..storage import whole_file
+from .demand import Demand, write_routes
+from .street_network import PARKED_CLASS, StreetNetwork, read_network
+
+STEP = 0.1
+"""Seconds between two steps of the simulation."""
+
+SAMPLING = 0.2
+"""Seconds between two samples of the trajectories."""
+
+_LANE_CHANGE = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
+_REACH = 60.0  # metres: a crosswalk further from any traffic light belongs to none
+_BESIDE = 6.0  # metres that pavements reach beyond the ends of a crosswalk
+
+_ALLOWED = {
+    "driving": 'disallow="pedestrian"',
+    "sidewalk": 'allow="pedestrian"',
+    "biking": 'allow="bicycle"',
+    "parking": f'allow="{PARKED_CLASS}"',
+}
+"""Who may use which type of lane; nobody the others."""
+
+_CLOSED = ("shoulder", "restricted", "median", "stop", "none", "border")
+
+
+@dataclass(frozen=True)
+class Sumo:
+    """Where SUMO's programs are: of the installation in ``home``."""
+
+    sumo: Path
+    netconvert: Path
+    home: Path | None
+
+
+@dataclass(frozen=True)
+class SignalPlan:
+    """The fixed plan of every traffic light: opposite arms have green together; seconds of each state."""
+
+    green: int = 25
+    amber: int = 3
+    all_red: int = 2
+
+    def __post_init__(self) -> None:
+        """Refuse a plan that never turns."""
+        if min(self.green, self.amber) < 1 or self.all_red < 0:
+            raise SeipError("a signal plan needs green and amber of at least 1 s, and no negative times")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What to simulate.
+
+    Parameters
+    ----------
+    demand : Demand
+    signals : SignalPlan
+    seed : int
+        Of everything that is random, here and in SUMO.
+    duration : float, seconds
+    """
+
+    demand: Demand
+    signals: SignalPlan
+    seed: int
+    duration: float
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if not 0 <= self.seed < 2**31:
+            raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
+        if not 0.0 < self.duration <= 86400.0:
+            raise SeipError(f"a simulation must last above 0 s and at most a day, not {self.duration:g} s")
+
+
+@dataclass(frozen=True)
+class SimulationFiles:
+    """What a simulation leaves: floating car data, the route file with the vehicle types, and the network."""
+
+    floating_car_data: Path
+    routes: Path
+    network: Path
+
+
+def find_sumo() -> Sumo:
+    """Find SUMO's programs: on the PATH, or in the package ``eclipse-sumo`` of this Python.
+
+    Raises
+    ------
+    SeipError
+        They are not installed.
+    """
+    package = importlib.util.find_spec("sumo")
+    home = Path(package.origin).parent if package is not None and package.origin is not None else None
+    path = os.environ.get("PATH", "")
+    where = path if home is None else os.pathsep.join([path, str(home / "bin")])
+    sumo, netconvert = shutil.which("sumo", path=where), shutil.which("netconvert", path=where)
+    if sumo is None or netconvert is None:
+        raise SeipError("SUMO is not installed: `pip install --group traffic`, or put sumo and netconvert on the PATH")
+    return Sumo(Path(sumo), Path(netconvert), home)
+
+
+def simulate(
+    map_path: Path, folder: Path, scenario: Scenario, bounds: tuple[float, float, float, float] | None = None
+) -> Generator[Progress, None, SimulationFiles]:
+    """Simulate traffic on an OpenDRIVE map from 0 to the scenario's duration.
+
+    Parameters
+    ----------
+    map_path : path
+        The ``.xodr``.
+    folder : path
+        For SUMO's files.
+    scenario : Scenario
+    bounds : (4,) float, metres, optional
+        Only roads that reach into this rectangle of the map are kept: left, low, right, high.
+
+    Returns
+    -------
+    SimulationFiles
+        Byte for byte the same for the same arguments, but for the dates in SUMO's comments.
+
+    Raises
+    ------
+    SeipError
+        SUMO is missing or refuses its input, or the map has no road that leads in.
+    """
+    programs = find_sumo()
+    files = SimulationFiles(folder / "traffic.fcd.xml", folder / "traffic.rou.xml", folder / "traffic.net.xml")
+    yield from _network(programs, map_path, files.network, scenario.signals, bounds)
+    write_routes(files.routes, read_network(files.network), scenario.demand, scenario.seed, scenario.duration)
+    yield from _run(
+        programs,
+        programs.sumo,
+        [
+            *("--net-file", files.network, "--route-files", files.routes, "--fcd-output", files.floating_car_data),
+            *("--seed", scenario.seed, "--end", scenario.duration, "--step-length", STEP, "--precision", 3),
+            *("--device.fcd.period", SAMPLING, "--person-device.fcd.period", SAMPLING),
+            *("--lanechange.duration", _LANE_CHANGE, "--time-to-teleport", -1),
+            *("--collision.action", "warn", "--collision.check-junctions", "true", "--ignore-route-errors", "true"),
+            *("--no-step-log", "true", "--no-warnings", "true", "--xml-validation", "never"),
+        ],
+        "simulating traffic",
+    )
+    return files
+
+
+def _network(
+    programs: Sumo,
+    map_path: Path,
+    network: Path,
+    signals: SignalPlan,
+    bounds: tuple[float, float, float, float] | None,
+) -> Generator[Progress, None, None]:
+    """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
+    road_map = read_map(map_path)
+    types, plain, nodes = (network.with_name(name) for name in ("lanes.typ.xml", "plain.net.xml", "shapes.nod.xml"))
+    allowed = _ALLOWED | dict.fromkeys(_CLOSED, 'disallow="all"')
+    _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
+    common: list[object] = [
+        *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),
+        *("--junctions.internal-link-detail", 20, "--no-warnings", "true", "--tls.default-type", "static"),
+        *("--tls.green.time", signals.green, "--tls.yellow.time", signals.amber, "--tls.allred.time", signals.all_red),
+        *("--crossings.guess", "true", "--crossings.guess.speed-threshold", 0),
+    ]
+    lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
+    source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
+    yield from _run(programs, programs.netconvert, [*source, *common], "reading the map")
+    shapes = _junction_shapes(read_network(plain), road_map)
+    corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
+    _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
+    clip = [] if bounds is None else ["--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds)]
+    source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
+    changes = [*source, *common, *clip, "--keep-edges.postload", "true"]
+    yield from _run(programs, programs.netconvert, changes, "laying crosswalks")
+
+
+def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:
+    """Return for signalised junctions an outline (k, 2) round their crosswalks.
+
+    SUMO lays crossings along the inside of a junction and stops vehicles where it begins: so both are where they are
+    painted.
+    """
+    if not network.signalised:
+        return {}
+    nodes = list(network.signalised)
+    places = np.array(list(network.signalised.values()))
+    corners: dict[str, list[Float]] = {}
+    for crosswalk in _crosswalks(road_map):
+        distance = np.hypot(*(places - crosswalk.mean(axis=0)).T)
+        if distance.min() < _REACH:
+            corners.setdefault(nodes[int(distance.argmin())], []).append(crosswalk)
+    hulls = {node: shapely.MultiPoint(np.concatenate(parts)).convex_hull for node, parts in corners.items()}
+    return {node: shapely.get_coordinates(hull)[:-1] for node, hull in hulls.items()}
+
+
+def _crosswalks(road_map: RoadMap) -> list[Float]:
+    """Return the corners (4, 2) of the crosswalks of a map, in plan, with the pavements at their ends."""
+    outlines = []
+    for road in road_map.roads:
+        for item in road.objects:
+            if item.kind == "crosswalk" and item.length > 0.0 and item.width > 0.0:
+                s, t = np.array([item.s]), np.array([item.t])
+                heading = float(road.frame(s).heading[0]) + item.heading
+                ahead = np.array([np.cos(heading), np.sin(heading)]) * item.length / 2.0
+                aside = np.array([-np.sin(heading), np.cos(heading)]) * (item.width / 2.0 + _BESIDE)
+                signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+                outlines.append(road.place(s, t)[0, :2] + signs @ np.stack([ahead, aside]))
+    return outlines
+
+
+def _write(path: Path, root: str, elements: Sequence[str]) -> None:
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join([f"<{root}>", *elements, f"</{root}>", ""]), encoding="utf-8")
+
+
+def _run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -> Generator[Progress, None, None]:
+    """Run one of SUMO's programs to its end."""
+    environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
+
+    def work(stop: Event) -> tuple[int, str]:
+        command = [str(part) for part in (program, *arguments)]
+        with subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            while True:
+                try:
+                    _, complaint = process.communicate(timeout=0.2)
+                except subprocess.TimeoutExpired:
+                    if stop.is_set():
+                        process.kill()
+                else:
+                    return process.returncode, complaint
+
+    status, complaint = yield from in_thread(work, what)
+    if status != 0:
+        raise SeipError(f"{program.name} failed: {_last_error(complaint)}; check the map, or simulate in SUMO itself")
+
+
+def _last_error(complaint: str) -> str:
+    lines = [line.removeprefix("Error:").strip() for line in complaint.splitlines() if line.startswith("Error:")]
+    return lines[0].rstrip(".") if lines else "it says no reason"

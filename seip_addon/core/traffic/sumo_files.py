@@ -1,0 +1,112 @@
+"""SUMO's XML files, read as they stream by: they may be larger than memory, and nothing in them is trusted."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import zlib
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO, cast
+from xml.parsers import expat  # document types, through which XML does harm, are refused below
+
+import numpy as np
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..progress import Progress
+
+Attributes = dict[str, str]
+
+_CHUNK = 1 << 20
+_GZIP = b"\x1f\x8b"
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, Callable[[], Progress]]]:
+    """Open a file, unpacked where it is packed with gzip.
+
+    Yields
+    ------
+    stream : binary file
+    progress : callable
+        How much of the file has been read.
+
+    Raises
+    ------
+    SeipError
+        The file is not there, cannot be read, or is damaged; also from within the block.
+    """
+    name = Path(path).name
+    try:
+        with Path(path).open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            packed = file.read(2) == _GZIP
+            file.seek(0)
+            stream = cast(BinaryIO, gzip.GzipFile(fileobj=file) if packed else file)
+            yield stream, lambda: Progress(min(file.tell(), size), size, f"reading {name}")
+    except FileNotFoundError as error:
+        raise SeipError(f"no such file: {path}; check its path") from error
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        raise SeipError(f"{name} is a damaged gzip file ({error}); write it again") from error
+    except OSError as error:
+        raise SeipError(f"cannot read {path}: {error.strerror or error}; check that it is a readable file") from error
+
+
+def read_tags(
+    path: str | os.PathLike[str], take: Callable[[str, Attributes], object]
+) -> Generator[Progress, None, None]:
+    """Call ``take`` with the name and the attributes of each element, in the order of the file.
+
+    Yields
+    ------
+    Progress
+        After each mebibyte.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, is not well-formed XML, or declares a document type: SUMO needs none, and through one
+        a file can reach for other files or blow up in memory.
+    """
+    name = Path(path).name
+
+    def refuse(*_: object) -> None:
+        raise SeipError(f"{name} declares a document type or entities, which SUMO never writes; remove them")
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = take
+    with opened(path) as (stream, progress):
+        try:
+            while chunk := stream.read(_CHUNK):
+                parser.Parse(chunk, False)  # noqa: FBT003  # takes no name
+                yield progress()
+            parser.Parse(b"", True)  # noqa: FBT003  # takes no name
+        except expat.ExpatError as error:
+            raise SeipError(f"{name} is broken or unfinished XML ({error}); let SUMO finish writing it") from error
+
+
+def read_net_offset(path: str | os.PathLike[str]) -> Float:
+    """Return the offset (2,) in metres of a SUMO network: its coordinates are the map's plus this.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, or is no SUMO network.
+    """
+    found: list[str] = []
+
+    def take(tag: str, attributes: Attributes) -> None:
+        if tag == "location":
+            found.append(attributes.get("netOffset", ""))
+
+    for _ in read_tags(path, take):
+        if found:
+            break
+    try:
+        x, y = (float(number) for number in found[0].split(","))
+    except (IndexError, ValueError) as error:
+        raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml") from error
+    return np.array([x, y])
