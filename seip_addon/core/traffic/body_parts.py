@@ -122,7 +122,7 @@ def side_faces(corners: Float) -> tuple[Float, Float]:
     return np.column_stack([x, -half, z]), np.column_stack([x, half, z])[mirrored]
 
 
-def wheel(axle: float, outer: float, inner: float, radius: float, sides: int = 9) -> Part:
+def wheel(axle: float, outer: float, inner: float, radius: float, sides: int = 8) -> Part:
     """Return a tyre that stands on the ground, a flat of it downwards.
 
     Parameters
@@ -143,7 +143,7 @@ def rim(axle: float, outer: float, inwards: float, radius: float, sides: int = 5
     return cone(ring, np.array([axle, outer + inwards * PANE_DEPTH, radius]), "rim")
 
 
-def hoop(axle: float, radius: float, width: float, sides: int = 9) -> Part:
+def hoop(axle: float, radius: float, width: float, sides: int = 8) -> Part:
     """Return a thin tyre that one can see through: a ring of triangular section, as of a spoked wheel."""
     middle = _disc(axle, 0.0, radius, radius, sides)
     left, right = (_disc(axle, y, radius - width, radius, sides) for y in (width / 2, -width / 2))
