@@ -145,16 +145,17 @@ def read_traffic(scene: bpy.types.Scene) -> Generator[Progress, None, Trajectori
                 if there:
                     _extend(runs, frame, np.array(root.matrix_world, dtype=np.float64))
     yield Progress(count, count, "frames")
-    users, runs = [], []
+    users: list[RoadUser] = []
+    motions: list[tuple[Float, ...]] = []
     for root, category, own in zip(roots, categories, tracks, strict=True):
         users += [_described(root, category, boxes[root], number) for number in range(1, len(own) + 1)]
-        runs += [_motion(run, boxes[root], _frame_rate(scene)) for run in own]
-    if not runs:
+        motions += [_motion(run, boxes[root], _frame_rate(scene)) for run in own]
+    if not motions:
         raise SeipError(
             f"no object in {contract.TRAFFIC!r} is shown at any frame from {scene.frame_start} to {scene.frame_end}: "
             "show them, or set the scene's frame range"
         )
-    return _joined(users, runs, origin_of(scene), f"animation of scene {scene.name!r}")
+    return _joined(users, motions, origin_of(scene), f"animation of scene {scene.name!r}")
 
 
 def _frame_rate(scene: bpy.types.Scene) -> float:
@@ -315,7 +316,7 @@ def _motion(run: _Run, box: Float, rate: float) -> tuple[Float, ...]:
     return time, position, yaw, pitch, speed
 
 
-def _joined(users: list[RoadUser], runs: list[tuple[Float, ...]], origin: Float, source: str) -> Trajectories:
-    time, position, yaw, pitch, speed = (np.concatenate(parts) for parts in zip(*runs, strict=True))
-    first = np.cumsum([0, *(len(run[0]) for run in runs)])
+def _joined(users: list[RoadUser], motions: list[tuple[Float, ...]], origin: Float, source: str) -> Trajectories:
+    time, position, yaw, pitch, speed = (np.concatenate(parts) for parts in zip(*motions, strict=True))
+    first = np.cumsum([0, *(len(motion[0]) for motion in motions)])
     return Trajectories(tuple(users), origin, first, time, position, yaw, pitch, speed, source)

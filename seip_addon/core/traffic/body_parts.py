@@ -75,8 +75,8 @@ def cone(ring: Float, tip: Float, material: str) -> Part:
 def box(low: tuple[float, float, float], high: tuple[float, float, float], material: str) -> Part:
     """Return the upright box between two corners."""
     (x0, y0, z0), (x1, y1, z1) = low, high
-    ring = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]])
-    return skin(ring, ring + [0.0, 0.0, z1 - z0], material)
+    floor, ceiling = (np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]) for z in (z0, z1))
+    return skin(floor, ceiling, material)
 
 
 def pane(face: Float, across: tuple[float, float], up: tuple[float, float], material: str) -> Part:
@@ -104,9 +104,7 @@ def face_across(low: Float, high: Float, *, front: bool) -> Float:
     """Return the face (4, 3) of a hull from one corner of its outline up to the next, seen from the front or rear."""
     sign = -1.0 if front else 1.0  # seen from the front the right-hand side of the vehicle is on the left
     (x0, z0, half0), (x1, z1, half1) = low, high
-    return np.array(
-        [[x0, sign * half0, z0], [x0, -sign * half0, z0], [x1, -sign * half1, z1], [x1, sign * half1, z1]]
-    )
+    return np.array([[x0, sign * half0, z0], [x0, -sign * half0, z0], [x1, -sign * half1, z1], [x1, sign * half1, z1]])
 
 
 def side_faces(corners: Float) -> tuple[Float, Float]:

@@ -6,13 +6,31 @@ road user's size afterwards.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Float
-from .body_parts import Part, ball, box, hoop, hull, limb, pane, face_across, rim, wheel
+from .body_parts import Part, ball, box, face_across, hoop, hull, limb, pane, rim, wheel
 
 HEAD = np.array([0.10, 0.08, 0.13])
 """Half a head's depth, width and height (metres)."""
+CROWN = np.array([-0.03, 0.0, 0.025])
+"""From the middle of a head to that of its hair or helmet (metres)."""
+TOE = np.array([0.18, 0.0, -0.04])
+"""From an ankle (metres)."""
+
+
+@dataclass(frozen=True)
+class _Posture:
+    """Joints (3,) of someone who sits, metres: those of the left side, and knees and feet of left and right."""
+
+    hip: Float
+    knees: tuple[Float, Float]
+    feet: tuple[Float, Float]
+    shoulder: Float
+    hand: Float
+    head: Float
 
 
 def pedestrian() -> list[Part]:
@@ -48,13 +66,15 @@ def bicycle() -> list[Part]:
         *(limb(start, stop, (radius_, radius_), "frame", sides=3) for start, stop, radius_ in bars),
         limb(_at(1.15, -0.30, 1.08), _at(1.15, 0.30, 1.08), (0.02, 0.02), "frame", sides=3),
         *_rider(
-            hip=_at(0.55, 0.10, 1.00),
-            knees=(_at(0.92, 0.12, 0.86), _at(0.90, 0.12, 0.62)),
-            feet=(_at(0.80, 0.13, 0.46), _at(0.76, 0.13, 0.12)),
-            shoulder=_at(0.72, 0.18, 1.48),
-            hand=_at(1.12, 0.27, 1.10),
-            head=_at(0.80, 0.0, 1.67),
-            cover="hair",
+            _Posture(
+                hip=_at(0.55, 0.10, 1.00),
+                knees=(_at(0.92, 0.12, 0.86), _at(0.90, 0.12, 0.62)),
+                feet=(_at(0.80, 0.13, 0.46), _at(0.76, 0.13, 0.12)),
+                shoulder=_at(0.72, 0.18, 1.48),
+                hand=_at(1.12, 0.27, 1.10),
+                head=_at(0.80, 0.0, 1.67),
+            ),
+            "hair",
         ),
     ]
 
@@ -77,28 +97,22 @@ def motorcycle() -> list[Part]:
         *(limb(_at(1.48, y, 1.0), _at(front, y, radius), (0.035, 0.03), "frame", sides=3) for y in (-0.09, 0.09)),
         limb(_at(1.40, -0.40, 1.06), _at(1.40, 0.40, 1.06), (0.025, 0.025), "trim", sides=3),
         *_rider(
-            hip=_at(0.78, 0.12, 0.92),
-            knees=(_at(1.16, 0.24, 0.74), _at(1.16, 0.24, 0.74)),
-            feet=(_at(0.86, 0.24, 0.34), _at(0.86, 0.24, 0.34)),
-            shoulder=_at(1.00, 0.20, 1.34),
-            hand=_at(1.40, 0.36, 1.08),
-            head=_at(1.14, 0.0, 1.50),
-            cover="trim",
+            _Posture(
+                hip=_at(0.78, 0.12, 0.92),
+                knees=(_at(1.16, 0.24, 0.74), _at(1.16, 0.24, 0.74)),
+                feet=(_at(0.86, 0.24, 0.34), _at(0.86, 0.24, 0.34)),
+                shoulder=_at(1.00, 0.20, 1.34),
+                hand=_at(1.40, 0.36, 1.08),
+                head=_at(1.14, 0.0, 1.50),
+            ),
+            "trim",
         ),
     ]
 
 
-def _rider(
-    *,
-    hip: Float,
-    knees: tuple[Float, Float],
-    feet: tuple[Float, Float],
-    shoulder: Float,
-    hand: Float,
-    head: Float,
-    cover: str,
-) -> list[Part]:
-    """Return who sits on a two-wheeler; joints are those of the left side, knees and feet of left and right."""
+def _rider(sitting: _Posture, cover: str) -> list[Part]:
+    """Return who sits on a two-wheeler, the head in a helmet or hair."""
+    hip, shoulder = sitting.hip, sitting.shoulder
     lean = shoulder - hip
     torso = np.array(
         [
@@ -109,21 +123,21 @@ def _rider(
             (shoulder[0] - 0.11, shoulder[2] + 0.05, 0.19),
         ]
     )
-    parts = [hull(torso, "cloth"), *_head(head, cover)]
-    for knee, foot, side in zip(knees, feet, (1.0, -1.0), strict=True):
+    parts = [hull(torso, "cloth"), *_head(sitting.head, cover)]
+    for knee, foot, side in zip(sitting.knees, sitting.feet, (1.0, -1.0), strict=True):
         mirror = np.array([1.0, side, 1.0])
         parts += [
             limb(hip * mirror, knee * mirror, (0.10, 0.075), "trousers"),
             limb(knee * mirror, foot * mirror, (0.075, 0.05), "trousers"),
-            limb((foot - [0.07, 0.0, 0.02]) * mirror, (foot + [0.18, 0.0, -0.04]) * mirror, (0.06, 0.045), "trim"),
-            limb(shoulder * mirror, hand * mirror, (0.065, 0.04), "cloth"),
+            limb((foot - [0.07, 0.0, 0.02]) * mirror, (foot + TOE) * mirror, (0.06, 0.045), "trim"),
+            limb(shoulder * mirror, sitting.hand * mirror, (0.065, 0.04), "cloth"),
         ]
     return parts
 
 
 def _head(middle: Float, cover: str) -> list[Part]:
     """Return a face and what covers it behind and above: hair or a helmet."""
-    return [ball(middle, HEAD, "skin"), ball(middle + [-0.03, 0.0, 0.025], HEAD * [1.0, 1.12, 1.0], cover)]
+    return [ball(middle, HEAD, "skin"), ball(middle + CROWN, HEAD * [1.0, 1.12, 1.0], cover)]
 
 
 def _at(x: float, y: float, z: float) -> Float:

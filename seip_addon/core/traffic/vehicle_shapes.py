@@ -47,7 +47,6 @@ _SUV = _CarForm(0.205, 0.805, 0.150, 0.60, (0.745, 0.575), (0.080, 0.022))
 def car(length: float, width: float, height: float) -> list[Part]:
     """Return a hatchback, a saloon or an SUV, whichever has such a size."""
     form = _SUV if height >= TALL_CAR else _SALOON if length >= LONG_CAR else _HATCHBACK
-    size = np.array([length, height])
     radius = min(0.215 * height, 0.078 * length)
     axles = (form.rear_axle * length, form.front_axle * length)
     belt, floor = form.belt, form.floor
@@ -55,41 +54,35 @@ def car(length: float, width: float, height: float) -> list[Part]:
     roof_rear, rear_base = form.rear_window
     lower = _leaning(
         [
-            (0.0, 0.36) * size,
-            (0.02, 1.35 * floor) * size,
+            *_scaled([(0.0, 0.36), (0.02, 1.35 * floor)], length, height),
             *_arches(axles, radius, floor * height),
-            (0.978, 1.25 * floor) * size,
-            (1.0, 0.34) * size,
-            (0.985, 0.47) * size,
-            (0.935, 0.54) * size,
-            (base + 0.02, belt - 0.005) * size,
-            (0.012, belt) * size,
+            *_scaled([(0.978, 1.25 * floor), (1.0, 0.34), (0.985, 0.47), (0.935, 0.54)], length, height),
+            *_scaled([(base + 0.02, belt - 0.005), (0.012, belt)], length, height),
         ],
-        widths=np.array([0.98, 0.92]) * width,
-        height=belt * height,
+        np.array([0.98, 0.92]) * width,
+        belt * height,
     )
     tail, _, *_, front_low, bumper, nose, _, _, edge = lower
     for corner in (tail, front_low, bumper, nose, edge):
         corner[2] *= TUCKED
+    crown = (roof_front + roof_rear) / 2
     cabin = _leaning(
-        [
-            (rear_base, belt - 0.02) * size,
-            (base, belt - 0.02) * size,
-            (roof_front, 0.965) * size,
-            ((roof_front + roof_rear) / 2, 1.0) * size,
-            (roof_rear, 0.965) * size,
-        ],
-        widths=np.array([1.25, 0.68]) * width,
-        height=height,
+        _scaled(
+            [(rear_base, belt - 0.02), (base, belt - 0.02), (roof_front, 0.965), (crown, 1.0), (roof_rear, 0.965)],
+            length,
+            height,
+        ),
+        np.array([1.25, 0.68]) * width,
+        height,
     )
-    rear_low, front_low_glass, front_high, _, rear_high = cabin
+    rear_low, cowl, front_high, _, rear_high = cabin
     front, rear = face_across(bumper, nose, front=True), face_across(tail, edge, front=False)
     return [
         hull(lower, "paint"),
         hull(cabin, "paint"),
-        pane(face_across(front_low_glass, front_high, front=True), (0.05, 0.95), (0.10, 0.94), "glass"),
+        pane(face_across(cowl, front_high, front=True), (0.05, 0.95), (0.10, 0.94), "glass"),
         pane(face_across(rear_low, rear_high, front=False), (0.08, 0.92), (0.14, 0.90), "glass"),
-        *_windows((rear_low, front_low_glass, front_high, rear_high), [(0.11, 0.47), (0.53, 0.89)], (0.17, 0.88)),
+        *_windows(np.array([rear_low, cowl, front_high, rear_high]), [(0.11, 0.47), (0.53, 0.89)], (0.17, 0.88)),
         *_lamps(front, (0.35, 0.95), rear, (0.45, 0.92), wide=0.22),
         pane(face_across(front_low, bumper, front=True), (0.2, 0.8), (0.25, 0.9), "trim"),
         *_pair(axles[0], width, radius),
@@ -100,39 +93,40 @@ def car(length: float, width: float, height: float) -> list[Part]:
 def van(length: float, width: float, height: float) -> list[Part]:
     """Return a panel van: a short bonnet, a steep windscreen, and a box behind the seats."""
     radius = min(0.36, 0.17 * height, 0.067 * length)
+    widths = np.array([0.99, 0.84]) * width
     bonnet, screen = min(0.17 * length, 1.0), min(0.10 * length, 0.75)
     axles = (min(0.2 * length, 1.15), length - min(0.2 * length, 0.95))
     cowl_x, roof_x = length - bonnet, length - bonnet - screen
     outline = _leaning(
         [
-            np.array((0.0, 0.22 * height)),
-            np.array((0.01 * length, 0.12 * height)),
+            (0.0, 0.22 * height),
+            (0.01 * length, 0.12 * height),
             *_arches(axles, radius, 0.10 * height),
-            np.array((0.985 * length, 0.11 * height)),
-            np.array((length, 0.22 * height)),
-            np.array((length - 0.10 * bonnet, 0.40 * height)),
-            np.array((cowl_x, 0.51 * height)),
-            np.array((roof_x, 0.94 * height)),
-            np.array((0.6 * length, height)),
-            np.array((0.01 * length, 0.97 * height)),
+            (0.985 * length, 0.11 * height),
+            (length, 0.22 * height),
+            (length - 0.10 * bonnet, 0.40 * height),
+            (cowl_x, 0.51 * height),
+            (roof_x, 0.94 * height),
+            (0.6 * length, height),
+            (0.01 * length, 0.97 * height),
         ],
-        widths=np.array([0.99, 0.84]) * width,
-        height=height,
+        widths,
+        height,
     )
     tail, _, *_, front_low, bumper, nose, cowl, roof, _, rear_high = outline
     for corner in (front_low, bumper, nose):
         corner[2] *= TUCKED
     door = max(0.5 * length, cowl_x - 1.5)
     doors = _leaning(
-        [np.array(corner) for corner in ((door, cowl[1]), (cowl_x, cowl[1]), (roof_x, roof[1]), (door, roof[1]))],
-        widths=np.array([0.99, 0.84]) * width,
-        height=height,
+        [(door, cowl[1]), (cowl_x, cowl[1]), (roof_x, roof[1]), (door, roof[1])],
+        widths,
+        height,
     )
     front, rear = face_across(bumper, nose, front=True), face_across(tail, rear_high, front=False)
     return [
         hull(outline, "paint"),
         pane(face_across(cowl, roof, front=True), (0.05, 0.95), (0.06, 0.9), "glass"),
-        *_windows(tuple(doors), [(0.15, 0.93)], (0.04, 0.82)),
+        *_windows(doors, [(0.15, 0.93)], (0.04, 0.82)),
         *(pane(rear, across, (0.45, 0.85), "glass") for across in ((0.10, 0.46), (0.54, 0.90))),
         *_lamps(front, (0.45, 0.95), rear, (0.1, 0.4), wide=0.2, rear_wide=0.1),
         pane(front, (0.32, 0.68), (0.3, 0.8), "trim"),
@@ -165,34 +159,30 @@ def truck(length: float, width: float, height: float) -> list[Part]:
 
 
 def bus(length: float, width: float, height: float) -> list[Part]:
-    """Return a low-floor city bus: large panes, doors on the right-hand side."""
+    """Return a low-floor city bus: large panes, doors on the right-hand side, air conditioning over the rear half."""
     radius = min(0.5, 0.155 * height, 0.05 * length)
     rear_axle, front_axle = min(0.28 * length, 3.4), length - min(0.23 * length, 2.7)
     twins = [rear_axle] if length < LONG_BUS else [rear_axle, rear_axle + 3.0 * radius]
-    size, widths = np.array([length, height]), np.array([0.99, 0.93]) * width
+    widths = np.array([0.99, 0.93]) * width
     outline = _leaning(
         [
-            (0.0, 0.2) * size,
-            (0.006, 0.12) * size,
+            *_scaled([(0.0, 0.2), (0.006, 0.12)], length, height),
             *_arches((*twins, front_axle), radius, 0.09 * height),
-            (0.992, 0.09) * size,
-            (1.0, 0.3) * size,
-            (0.982, 0.95) * size,
-            (0.95, 1.0) * size,
-            (0.02, 1.0) * size,
-            (0.006, 0.96) * size,
+            *_scaled([(0.992, 0.09), (1.0, 0.3), (0.972, 0.89), (0.94, 0.93)], length, height),
+            *_scaled([(0.02, 0.93), (0.006, 0.90)], length, height),
         ],
         widths,
         height,
     )
     tail, *_, bumper, front_high, _, _, rear_high = outline
-    band = _leaning([corner * size for corner in ((0.02, 0.4), (0.98, 0.4), (0.98, 0.86), (0.02, 0.86))], widths, height)
-    doors = _leaning([corner * size for corner in ((0.0, 0.1), (1.0, 0.1), (1.0, 0.86), (0.0, 0.86))], widths, height)
-    right, left = side_faces(band)
-    kerb_side, _ = side_faces(doors)
+    band = _scaled([(0.02, 0.4), (0.98, 0.4), (0.98, 0.81), (0.02, 0.81)], length, height)
+    doors = _scaled([(0.0, 0.1), (1.0, 0.1), (1.0, 0.81), (0.0, 0.81)], length, height)
+    right, left = side_faces(_leaning(band, widths, height))
+    kerb_side, _ = side_faces(_leaning(doors, widths, height))
     front, rear = face_across(bumper, front_high, front=True), face_across(tail, rear_high, front=False)
     return [
         hull(outline, "paint"),
+        box((0.12 * length, -0.35 * width, 0.91 * height), (0.42 * length, 0.35 * width, height), "paint"),
         pane(front, (0.04, 0.96), (0.18, 0.80), "glass"),
         pane(front, (0.2, 0.8), (0.85, 0.97), "trim"),  # the destination
         pane(rear, (0.1, 0.9), (0.45, 0.85), "glass"),
@@ -213,43 +203,43 @@ def _cab(length: float, cab: float, width: float, height: float, radius: float) 
     widths = np.array([0.98, 0.90]) * width
     outline = _leaning(
         [
-            np.array(corner)
-            for corner in (
-                (rear, top),
-                (axle + 0.6 * reach, top),
-                (axle + reach, floor),
-                (length - 0.02 * cab, floor),
-                (length, 0.24 * height),
-                (length - 0.015 * cab, 0.50 * height),
-                (length - 0.14 * cab, 0.93 * height),
-                (length - 0.45 * cab, height),
-                (rear, height),
-            )
+            (rear, top),
+            (axle + 0.6 * reach, top),
+            (axle + reach, floor),
+            (length - 0.02 * cab, floor),
+            (length, 0.24 * height),
+            (length - 0.015 * cab, 0.50 * height),
+            (length - 0.14 * cab, 0.93 * height),
+            (length - 0.45 * cab, height),
+            (rear, height),
         ],
         widths,
         height,
     )
     _, _, _, _, bumper, cowl, roof, _, _ = outline
     pillar = rear + 0.3 * cab
-    doors = _leaning(
-        [np.array(corner) for corner in ((pillar, cowl[1]), cowl[:2], roof[:2], (pillar, roof[1]))], widths, height
-    )
+    doors = _leaning([(pillar, cowl[1]), (cowl[0], cowl[1]), (roof[0], roof[1]), (pillar, roof[1])], widths, height)
     front = face_across(bumper, cowl, front=True)
     return [
         hull(outline, "paint"),
         pane(face_across(cowl, roof, front=True), (0.05, 0.95), (0.06, 0.92), "glass"),
-        *_windows(tuple(doors), [(0.1, 0.9)], (0.05, 0.88)),
+        *_windows(doors, [(0.1, 0.9)], (0.05, 0.88)),
         pane(front, (0.24, 0.76), (0.1, 0.95), "trim"),
         *_ends(front, (0.0, 0.3), 0.16, "headlamp"),
     ]
 
 
-def _leaning(corners: Sequence[Float], widths: Float, height: float) -> Float:
+def _scaled(shares: Sequence[tuple[float, float]], length: float, height: float) -> list[tuple[float, float]]:
+    """Return corners (x, z) in metres that are given in shares of a length and a height."""
+    return [(x * length, z * height) for x, z in shares]
+
+
+def _leaning(corners: Sequence[tuple[float, float]], widths: Float, height: float) -> Float:
     """Return an outline (k, 3) whose sides are flat: corners (x, z), and half the width that a height has.
 
     Parameters
     ----------
-    corners : sequence of (2,) float64, metres
+    corners : sequence of pair of float, metres
     widths : (2,) float64, metres
         On the ground and at ``height``.
     height : float, metres
@@ -259,16 +249,16 @@ def _leaning(corners: Sequence[Float], widths: Float, height: float) -> Float:
     return np.column_stack([outline, width / 2])
 
 
-def _arches(axles: Sequence[float], radius: float, floor: float) -> list[Float]:
+def _arches(axles: Sequence[float], radius: float, floor: float) -> list[tuple[float, float]]:
     """Return the corners (x, z) of the lower edge over the wheels, from rear to front."""
     top = 2.08 * radius
     shape = ((-1.2, floor), (-0.72, top), (0.72, top), (1.2, floor))
-    return [np.array([axle + share * radius, height]) for axle in axles for share, height in shape]
+    return [(axle + share * radius, height) for axle in axles for share, height in shape]
 
 
-def _windows(corners: Sequence[Float], across: Sequence[tuple[float, float]], up: tuple[float, float]) -> list[Part]:
+def _windows(corners: Float, across: Sequence[tuple[float, float]], up: tuple[float, float]) -> list[Part]:
     """Return panes on both sides: `side_faces`, and what parts of them, from rear to front, the panes cover."""
-    right, left = side_faces(np.array(corners))
+    right, left = side_faces(corners)
     return [
         *(pane(right, (begin, end), up, "glass") for begin, end in across),
         *(pane(left, (1 - end, 1 - begin), up, "glass") for begin, end in across),
