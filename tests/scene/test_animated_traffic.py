@@ -1,0 +1,309 @@
+import bpy
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.traffic import CATEGORIES, RoadUser, Trajectories
+from seip_addon.core.traffic.bodies import COLOURS, fitted_body
+from seip_addon.scene import contract, materials
+from seip_addon.scene.traffic import LAST_FRAME, animate, clear_traffic, read_traffic
+
+ORIGIN = np.array((500_000.0, 5_700_000.0, 50.0))
+SIZES = {
+    "car": (4.5, 1.8, 1.5),
+    "van": (5.9, 2.0, 2.6),
+    "truck": (9.5, 2.5, 3.6),
+    "bus": (12.0, 2.5, 3.2),
+    "motorcycle": (2.2, 0.9, 1.5),
+    "bicycle": (1.75, 0.65, 1.75),
+    "pedestrian": (0.6, 0.55, 1.78),
+}
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene[contract.ORIGIN] = ORIGIN.tolist()
+    return scene
+
+
+def traffic(seed=0, users=6, samples=30, step=0.2, start=0.0):
+    """Road users that wander and turn, some later than others, on roads that rise and fall."""
+    rng = np.random.default_rng(seed)
+    first = np.arange(users + 1) * samples
+    begin = start + rng.integers(0, 10, users) * step
+    count = users * samples
+    names = [CATEGORIES[number % len(CATEGORIES)] for number in range(users)]
+    return Trajectories(
+        users=tuple(RoadUser(f"u{number}", name, *SIZES[name], 0.3) for number, name in enumerate(names)),
+        origin=ORIGIN.copy(),
+        first=first,
+        time=np.round(begin[:, None] + np.arange(samples) * step, 6).ravel(),
+        position=np.cumsum(rng.normal(0, 7.0 * step, (count, 3)), axis=0),
+        yaw=np.cumsum(rng.uniform(-7.0, 7.0, count)) * step + 20.0,
+        pitch=rng.uniform(-0.2, 0.2, count),
+        speed=rng.uniform(0, 15, count),
+    )
+
+
+def shown(scene, thing):
+    """An object as the viewport shows it at the scene's frame, or None."""
+    instances = scene.view_layers[0].depsgraph.object_instances
+    return next((np.array(i.matrix_world) for i in instances if i.object.original == thing), None)
+
+
+def check_frames(scene, trajectories, things, frames, atol=2e-4):
+    rate = scene.render.fps / scene.render.fps_base
+    for frame in frames:
+        scene.frame_set(frame)
+        truth = trajectories.at(frame / rate)
+        there = dict(zip(truth.user.tolist(), range(len(truth)), strict=True))
+        for number, thing in enumerate(things):
+            matrix = shown(scene, thing)
+            assert (matrix is not None) == (number in there)
+            assert thing.hide_render == (number not in there)
+            if matrix is not None:
+                index = there[number]
+                yaw, pitch = truth.yaw[index], truth.pitch[index]
+                nose = (np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch))
+                assert np.allclose(matrix[:3, 3], truth.position[index], atol=atol)
+                assert np.allclose(matrix[:3, 0], nose, atol=atol)
+                assert np.allclose(matrix[:3, 1], (-np.sin(yaw), np.cos(yaw), 0.0), atol=atol)  # no roll
+
+
+@pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (25, 1.0), (30, 1.001), (10, 1.0)])
+def test_objects_are_where_the_trajectories_are_at_every_frame(scene, fps, base):
+    scene.render.fps, scene.render.fps_base = fps, base
+    trajectories = traffic()
+    things = animate(scene, trajectories)
+    assert (scene.render.fps, scene.render.fps_base) == (fps, pytest.approx(base))
+    last = trajectories.span[1] * fps / base
+    assert scene.frame_start <= trajectories.span[0] * fps / base
+    assert last - 1e-3 <= scene.frame_end < last + 1
+    forth = list(range(scene.frame_end + 3))
+    check_frames(scene, trajectories, things, [*forth, *np.random.default_rng(0).permutation(forth).tolist()])
+
+
+@given(st.integers(0, 1000), st.sampled_from([0.04, 0.1, 0.5]), st.floats(0.0, 900.0), st.integers(1, 4))
+def test_objects_are_where_random_trajectories_are(seed, step, start, samples):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene[contract.ORIGIN] = ORIGIN.tolist()
+    trajectories = traffic(seed, 3, samples, step, round(start, 2))
+    things = animate(scene, trajectories)
+    frames = range(max(scene.frame_start - 1, 0), scene.frame_end + 2)
+    check_frames(scene, trajectories, things, frames, atol=2e-3)  # a key's frame is single precision: 0.04 ms here
+
+
+def test_another_origin_is_moved_to_the_scenes(scene):
+    trajectories = traffic()
+    here = [np.array(thing.matrix_world) for thing in animate(scene, trajectories)]
+    moved = animate(scene, trajectories.moved_to(ORIGIN + np.array((100.0, -50.0, 3.0))))
+    assert np.allclose(here, [np.array(thing.matrix_world) for thing in moved], atol=1e-4)
+
+
+def test_objects_have_bodies_names_and_properties(scene):
+    trajectories = traffic(users=7)
+    things = animate(scene, trajectories)
+    assert [thing.name for thing in things] == [user.name for user in trajectories.users]
+    assert set(contract.find(scene, contract.TRAFFIC).objects) == set(things)
+    for thing, user in zip(things, trajectories.users, strict=True):
+        body = fitted_body(user)
+        assert len(thing.data.polygons) == len(body)
+        assert np.allclose(np.array(thing.dimensions), SIZES[user.category], atol=1e-5)
+        faces = [[tuple(thing.data.vertices[v].co) for v in face.vertices] for face in thing.data.polygons]
+        assert np.allclose(faces, body.triangles, atol=1e-5)
+        slots = [thing.data.materials[face.material_index].name for face in thing.data.polygons]
+        assert slots == [f"SEIP {name}" for name in body.material.tolist()]
+        assert thing["seip_category"] == user.category
+        assert thing["seip_paint"] == user.paint
+
+
+def test_every_material_of_every_body_has_a_colour():
+    for category, size in SIZES.items():
+        for paint, _ in COLOURS:
+            names = set(fitted_body(RoadUser("u", category, *size, paint)).material.tolist())
+            assert names <= materials.COLOURS.keys()
+
+
+def test_users_of_one_look_share_a_mesh(scene):
+    users = [RoadUser(str(n), "car", 4.5, 1.8, 1.5, paint) for n, paint in enumerate((0.3, 0.31, 0.9, 0.3))]
+    still = np.zeros(4)
+    trajectories = Trajectories(tuple(users), ORIGIN.copy(), np.arange(5), still, np.zeros((4, 3)), still, still, still)
+    one, near, white, again = animate(scene, trajectories)
+    assert one.data == near.data == again.data != white.data
+
+
+def contents():
+    kinds = ("objects", "meshes", "actions", "materials", "collections", "cameras", "lights", "worlds", "images")
+    return {kind: sorted(data.name for data in getattr(bpy.data, kind)) for kind in kinds}
+
+
+def test_a_second_call_replaces_the_first_and_clearing_leaves_nothing(scene):
+    before = contents()
+    animate(scene, traffic())
+    first = contents()
+    animate(scene, traffic())
+    assert contents() == first
+    animate(scene, traffic(users=2))
+    assert len(contract.find(scene, contract.TRAFFIC).objects) == 2
+    clear_traffic(scene)
+    assert contents() == before
+    clear_traffic(scene)
+
+
+def animated_cube(scene, name="mine", size=(4.0, 2.0, 1.5), origin_up=0.75, **properties):
+    """A user's own vehicle: a box around its origin that drives along a curve of keyframes."""
+    x, y, z = np.array(size) / 2
+    corners = [(sx * x, sy * y, sz * z) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], faces)
+    thing = bpy.data.objects.new(name, mesh)
+    for frame, place, yaw in ((1, 0.0, 0.0), (11, 20.0, 0.4), (21, 30.0, 3.5)):
+        thing.location, thing.rotation_euler = (place, -place / 2, origin_up), (0.0, 0.0, yaw)
+        thing.keyframe_insert("location", frame=frame)
+        thing.keyframe_insert("rotation_euler", frame=frame)
+    for key, value in properties.items():
+        thing[key] = value
+    contract.find_or_make(scene, contract.TRAFFIC).objects.link(thing)
+    return thing
+
+
+def test_the_users_objects_are_left_alone(scene):
+    mine = animated_cube(scene, seip_category="van")
+    borrowed = animate(scene, traffic(users=1))[0].data
+    keeper = bpy.data.objects.new("keeps the mesh", borrowed)
+    scene.collection.objects.link(keeper)
+    scene.frame_set(7)
+    before = np.array(mine.matrix_world)
+    animate(scene, traffic(users=2))
+    clear_traffic(scene)
+    scene.frame_set(7)
+    assert keeper.data == borrowed
+    assert mine.name in contract.find(scene, contract.TRAFFIC).objects
+    assert mine.animation_data.action is not None
+    assert np.array_equal(np.array(mine.matrix_world), before)
+
+
+def test_the_animation_survives_saving_and_opening(scene, tmp_path):
+    trajectories = traffic()
+    animate(scene, trajectories)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "traffic.blend"), check_existing=False)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "traffic.blend"))
+    scene = bpy.context.scene
+    things = [scene.objects[user.name] for user in trajectories.users]
+    check_frames(scene, trajectories, things, range(0, scene.frame_end, 7))
+
+
+def test_what_is_read_is_what_was_written(scene):
+    scene.render.fps = 25
+    trajectories = traffic(users=7, start=4.0)
+    animate(scene, trajectories)
+    read = finish(read_traffic(scene))
+    assert [user.name for user in read.users] == [user.name for user in trajectories.users]
+    for ours, theirs in zip(trajectories.users, read.users, strict=True):
+        assert theirs == ours
+    assert np.array_equal(read.origin, ORIGIN)
+    for frame in range(scene.frame_start, scene.frame_end + 1, 5):  # every fifth is a sample
+        ours, theirs = trajectories.at(round(frame * 0.04, 9)), read.at(frame / 25)
+        assert ours.user.tolist() == theirs.user.tolist()
+        assert np.allclose(ours.position, theirs.position, atol=2e-4)
+        assert np.allclose(np.exp(1j * ours.yaw), np.exp(1j * theirs.yaw), atol=1e-4)
+        assert np.allclose(ours.pitch, theirs.pitch, atol=1e-4)
+    assert all(np.abs(np.diff(read.yaw[a:b])).max() <= np.pi for a, b in zip(read.first, read.first[1:], strict=False))
+
+
+def test_a_users_own_vehicle_is_read_where_it_is_at_each_frame(scene):
+    mine = animated_cube(scene, seip_category="van", seip_paint=0.8)
+    scene.frame_start, scene.frame_end = 3, 21
+    scene.frame_set(17, subframe=0.5)
+    read = finish(read_traffic(scene))
+    assert (scene.frame_current, scene.frame_subframe) == (17, 0.5)
+    (user,) = read.users
+    assert user == RoadUser("mine", "van", 4.0, 2.0, 1.5, 0.8)
+    assert read.time.tolist() == [frame / 24 for frame in range(3, 22)]
+    for frame in range(3, 22):
+        scene.frame_set(frame)
+        (place,) = read.at(frame / 24).position
+        assert np.allclose(place, np.array(mine.matrix_world)[:3, 3] - (0, 0, 0.75), atol=1e-5)
+    steps = np.diff(read.position, axis=0) * 24
+    assert np.allclose(read.speed[0], np.linalg.norm(steps[0]))
+    assert np.allclose(read.speed[1:-1], np.linalg.norm((steps[1:] + steps[:-1]) / 2, axis=1))
+
+
+def test_children_instances_and_scale_make_the_box(scene):
+    collection = contract.find_or_make(scene, contract.TRAFFIC)
+    bed = animated_cube(scene, "bed", (6.0, 2.0, 1.0))
+    cab = animated_cube(scene, "cab", (2.0, 2.0, 2.0))
+    for part, place in ((bed, (-1.0, 0.0, 0.5)), (cab, (3.0, 0.0, 1.0))):
+        part.animation_data_clear()
+        part.location, part.rotation_euler = place, (0.0, 0.0, 0.0)
+    rig = bpy.data.objects.new("rig", None)
+    rig["seip_category"] = "truck"
+    collection.objects.link(rig)
+    bed.parent = cab.parent = rig
+    rig.location, rig.scale = (10.0, 20.0, 1.0), (2.0, 2.0, 2.0)
+    fleet = bpy.data.collections.new("fleet")
+    fleet.objects.link(bpy.data.objects.new("copy", bed.data))
+    instance = bpy.data.objects.new("instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", fleet
+    instance["seip_category"] = "bus"
+    collection.objects.link(instance)
+    scene.frame_start, scene.frame_end = 1, 2
+    by_instance, by_rig = finish(read_traffic(scene)).users
+    assert (by_instance.category, by_instance.length, by_instance.width, by_instance.height) == ("bus", 6.0, 2.0, 1.0)
+    assert (by_rig.category, by_rig.length, by_rig.width, by_rig.height) == ("truck", 16.0, 4.0, 4.0)
+    read = finish(read_traffic(scene))
+    assert read.position[read.first[1]].tolist() == pytest.approx([10.0, 20.0, 1.0])
+
+
+def test_one_that_hides_and_comes_back_is_two(scene):
+    mine = animated_cube(scene, seip_category="car")
+    for frame, hidden in ((1, False), (8, True), (12, False), (20, True)):
+        mine.hide_viewport = hidden
+        mine.keyframe_insert("hide_viewport", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 30
+    read = finish(read_traffic(scene))
+    assert [user.name for user in read.users] == ["mine", "mine (2)"]
+    assert (read.time * 24).round().tolist() == [*range(1, 8), *range(12, 20)]
+    assert read.first.tolist() == [0, 7, 15]
+
+
+@pytest.mark.parametrize(
+    ("prepare", "sentence"),
+    [
+        (lambda scene: None, "has no traffic: name a file of trajectories, or put animated vehicles"),
+        (animated_cube, "object 'mine' in 'SEIP Traffic' has no custom property 'seip_category': set it to one of car"),
+        (lambda scene: animated_cube(scene, seip_category="tank"), "has 'tank' as its custom property"),
+        (
+            lambda scene: setattr(animated_cube(scene, seip_category="car"), "hide_viewport", True),
+            "no object in 'SEIP Traffic' is shown at any frame from 1 to 250",
+        ),
+    ],
+)
+def test_what_cannot_be_read_is_one_sentence(scene, prepare, sentence):
+    prepare(scene)
+    with pytest.raises(SeipError, match=sentence):
+        finish(read_traffic(scene))
+
+
+def test_an_empty_without_faces_is_one_sentence(scene):
+    empty = bpy.data.objects.new("nothing", None)
+    empty["seip_category"] = "car"
+    contract.find_or_make(scene, contract.TRAFFIC).objects.link(empty)
+    with pytest.raises(SeipError, match="object 'nothing' in 'SEIP Traffic' has no faces: give it a mesh"):
+        finish(read_traffic(scene))
+
+
+@pytest.mark.parametrize("start", [-1.0, LAST_FRAME / 24])
+def test_times_beyond_the_timeline_are_one_sentence_and_change_nothing(scene, start):
+    animate(scene, traffic(users=1))
+    before = contents()
+    with pytest.raises(SeipError, match="Blender's timeline from 0 s to 43691 s: shift the traffic's times"):
+        animate(scene, traffic(start=start))
+    assert contents() == before
