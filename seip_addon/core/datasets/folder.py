@@ -9,18 +9,17 @@ from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import SeipError
 from ..progress import Progress
 from ..results.placement_record import versions
 from ..scans.frame import Frame
 from ..storage import digest, save_json, whole_file
 from .format import Format
-from .sample import FATES, SPLITS, WRITTEN, Sample, SensorPose, TrafficRun, fates, require_file_name, subset
+from .sample import FATES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
 
 SCHEMA = "seip-dataset/1"
 MANIFEST = "manifest.json"
+PARTS = {"format", "settings", "classes", "runs", "files"}
 
 Record = dict[str, Any]
 
@@ -70,9 +69,8 @@ def write_dataset(
     save_json(folder / MANIFEST, manifest)
     for done, (frame_id, frame) in enumerate(frames):
         _check(frame_id, frame, run, entry["samples"])
-        fate = fates(frame.labels, kind.classes, min_points)
-        sample = _sample(kind, entry["first"] + done, frame_id, frame, run, fate)
-        _count(entry, fate, sample)
+        sample = make_sample((entry["first"] + done, frame_id), run, frame, kind.classes, min_points)
+        _count(entry, sample)
         entry["samples"].append(_written(folder, kind, sample))
         yield Progress(done + 1, 0, f"writing {kind.name}")
     if not entry["samples"]:
@@ -97,12 +95,15 @@ def load_manifest(folder: str | Path) -> Record:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
         known = manifest["schema"] == SCHEMA
+        complete = not known or manifest.keys() >= PARTS
     except FileNotFoundError as error:
         raise SeipError(f"there is no dataset in {folder}: it has no {MANIFEST}; write one") from error
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise SeipError(f"{path} is damaged; delete the folder and write the dataset again") from error
     if not known:
         raise SeipError(f"{path} is not of this version; write the dataset again into another folder")
+    if not complete:
+        raise SeipError(f"{path} lacks a part; delete the folder and write the dataset again")
     return dict(manifest)
 
 
@@ -202,15 +203,9 @@ def _check(frame_id: str, frame: Frame, run: TrafficRun, samples: list[Record]) 
         )
 
 
-def _sample(kind: Format, number: int, frame_id: str, frame: Frame, run: TrafficRun, fate: list[str]) -> Sample:
-    boxes = subset(frame.labels, np.array([word == WRITTEN for word in fate], dtype=bool))
-    classes = tuple(kind.classes[str(category)] for category in boxes.category)
-    return Sample(number=number, frame_id=frame_id, run=run, frame=frame, boxes=boxes, classes=classes)
-
-
-def _count(entry: Record, fate: list[str], sample: Sample) -> None:
+def _count(entry: Record, sample: Sample) -> None:
     """Add a sample's labels to those of its run; a format of clouds alone counts none."""
-    counts = Counter(fate)
+    counts = Counter(sample.fates)
     entry["labels"] = {word: count + counts[word] for word, count in entry["labels"].items()}
     for name, count in sorted(Counter(sample.classes).items()):
         entry["classes"][name] = entry["classes"].get(name, 0) + count

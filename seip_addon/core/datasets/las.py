@@ -21,6 +21,9 @@ from .sample import Sample, TrafficRun
 RESOLUTION = 0.001
 """Of coordinates, metres."""
 
+CREATED = range(90, 94)
+"""The bytes of the header in which laspy puts the day of writing; zeros, for not known, keep them out of the file."""
+
 
 def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
     """Return ``SPLIT/RUN/FRAME.laz``."""
@@ -47,7 +50,6 @@ def _laz(sample: Sample) -> bytes:
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales = np.full(3, RESOLUTION)
     header.offsets = np.round(sample.run.origin)
-    header.creation_date = None  # of the run, not of the day on which it is written again
     header.generating_software = "SEIP"
     header.system_identifier = "simulation"
     header.global_encoding.wkt = True  # what point format 6 requires, with or without a reference system
@@ -61,7 +63,8 @@ def _laz(sample: Sample) -> bytes:
     points.instance = frame.instance
     buffer = io.BytesIO()
     points.write(buffer, do_compress=True, laz_backend=laspy.LazBackend.Lazrs)
-    return buffer.getvalue()
+    content = buffer.getvalue()
+    return content[: CREATED.start] + bytes(len(CREATED)) + content[CREATED.stop :]
 
 
 FORMAT = Format("las", "LAZ clouds", {}, sample_files, notes=notes)

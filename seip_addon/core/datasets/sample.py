@@ -103,6 +103,8 @@ class Sample:
     run : TrafficRun
     frame : Frame
         With all its labels.
+    fates : tuple of str
+        What becomes of each of them, one of `FATES`.
     boxes : Labels
         Those that are to be written.
     classes : tuple of str
@@ -113,6 +115,7 @@ class Sample:
     frame_id: str
     run: TrafficRun
     frame: Frame
+    fates: tuple[str, ...]
     boxes: Labels
     classes: tuple[str, ...]
 
@@ -122,13 +125,31 @@ class Sample:
         return f"{self.number:06d}"
 
 
-def fates(labels: Labels, classes: Mapping[str, str], min_points: int) -> list[str]:
-    """Return for each label whether it is written or why not, one of `FATES`."""
+def make_sample(
+    place: tuple[int, str], run: TrafficRun, frame: Frame, classes: Mapping[str, str], min_points: int
+) -> Sample:
+    """Return a frame with those labels that are to be written.
+
+    Parameters
+    ----------
+    place : (int, str)
+        The frame's number in the dataset and its id in the run.
+    run : TrafficRun
+    frame : Frame
+    classes : mapping of str to str
+        The format's name of each category.
+    min_points : int
+        Returns of all sensors together that a label needs.
+    """
+    labels = frame.labels
     returns = labels.points.sum(axis=1)
-    return [
+    found = tuple(
         OUTSIDE if not inside else NO_CLASS if str(category) not in classes else TOO_FEW if few else WRITTEN
         for inside, category, few in zip(labels.inside, labels.category, returns < min_points, strict=True)
-    ]
+    )
+    boxes = subset(labels, np.array([fate == WRITTEN for fate in found], dtype=bool))
+    names = tuple(classes[str(category)] for category in boxes.category)
+    return Sample(*place, run=run, frame=frame, fates=found, boxes=boxes, classes=names)
 
 
 def subset(labels: Labels, keep: Boolean) -> Labels:
@@ -145,7 +166,7 @@ def require_file_name(name: str, whose: str, cure: str) -> None:
     """Raise `SeipError` unless a name can be that of a file on every system."""
     if not _FILE_NAME.fullmatch(name):
         raise SeipError(
-            f"{whose} '{name}' cannot give its name to a file; {cure}, of up to 100 letters, digits, '_', '-' and '.'"
+            f"{whose} {name!r} cannot give its name to a file; {cure}, of up to 100 letters, digits, '_', '-' and '.'"
         )
 
 
