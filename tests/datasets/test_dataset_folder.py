@@ -14,7 +14,7 @@ from seip_addon.core.traffic.trajectories import CATEGORIES
 from tests.datasets.scan_frames import contents, make_frame, make_frames, make_run, make_sensors, write
 
 for library in ("laspy", "lazrs"):
-    pytest.importorskip(library, reason="LAZ is written by laspy and lazrs: pip install --group test")
+    pytest.importorskip(library, reason="LAZ is written by laspy and lazrs: pip install laspy lazrs")
 
 LABELLED = [key for key, kind in FORMATS.items() if kind.classes]
 NUMBERED = ["openpcdet", "mmdetection3d", "kitti"]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float
 from ..errors import SeipError
@@ -157,7 +158,7 @@ def subset(labels: Labels, keep: Boolean) -> Labels:
     return Labels(**{part.name: getattr(labels, part.name)[keep] for part in fields(Labels)})
 
 
-def cloud(frame: Frame) -> np.ndarray[Any, np.dtype[np.float32]]:
+def cloud(frame: Frame) -> NDArray[np.float32]:
     """Return x, y, z (metres, local site axes) and intensity (0 to 1) of all points, (n, 4) float32 little-endian."""
     return np.column_stack([frame.points, frame.intensity]).astype("<f4")
 
