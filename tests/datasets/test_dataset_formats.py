@@ -99,7 +99,7 @@ def test_kitti_labels_turn_back_into_the_boxes(seed):
         assert -math.pi <= turn < math.pi
         assert _same_direction(-turn - math.pi / 2, sample.boxes.yaw[row])
         # seen from the camera along its own ray, alpha is the turn
-        assert _same_direction(float(words[3]) + math.atan2(x, z), turn)
+        assert math.remainder(float(words[3]) + math.atan2(x, z) - turn, math.tau) == pytest.approx(0.0, abs=1e-6)
         assert words[4:8] == ["0", "0", "100", "100"]
 
 

@@ -78,7 +78,8 @@ def _label_file(sample: Sample) -> bytes:
     x, y, z = boxes.centre.T
     camera = np.column_stack([-y, height / 2 - z, x])
     rotation = _wrapped(-boxes.yaw - np.pi / 2)
-    alpha = _wrapped(rotation - np.arctan2(camera[:, 0], camera[:, 2]))
+    # rounded: numpy's versions differ in the last digit of an arctangent
+    alpha = np.round(_wrapped(rotation - np.arctan2(camera[:, 0], camera[:, 2])), 6)
     occluded = np.where(boxes.visibility >= FULLY, 0, np.where(boxes.visibility >= PARTLY, 1, 2))
     numbers = np.column_stack([height, width, length, camera, rotation])
     lines = "".join(
