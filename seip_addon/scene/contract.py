@@ -30,6 +30,9 @@ TITLE = "seip_title"
 ORIGIN = "seip_origin"
 MAP = "seip_map"
 GEO_REFERENCE = "seip_geo_reference"
+REFLECTIVITY = "seip_reflectivity"
+SENSOR = "seip_sensor"
+LABEL = "seip_label"
 HEADER_OFFSET = "seip_header_offset"
 
 NUMBER = re.compile(r"\.\d{3,}$")
