@@ -100,7 +100,7 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
     poles_with_faces = [p for p in free if contract.OCCLUDERS not in p.collections and p.triangles is not None]
     geometry = SceneGeometry(
         name=str(scene.get(contract.TITLE, scene.name)),
-        origin=_origin(scene),
+        origin=origin_of(scene),
         roads=roads,
         ground=ground,
         occluders=_meshes(free, contract.OCCLUDERS) + _meshes(poles_with_faces, contract.POLES),
@@ -288,7 +288,8 @@ def _finite_foot(part: _Shown) -> Float:
     return foot
 
 
-def _origin(scene: bpy.types.Scene) -> Float:
+def origin_of(scene: bpy.types.Scene) -> Float:
+    """Return the map coordinates (3,) of the scene's local origin, metres."""
     stored = scene.get(contract.ORIGIN, (0.0, 0.0, 0.0))
     try:
         values = [] if isinstance(stored, str) else [float(value) for value in stored]
