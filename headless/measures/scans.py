@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-
-from headless.measures.expense import Expense
-from headless.measures.visibility import ENGINES
 
 import numpy as np
-import shapely
 
-from seip_addon.core.arrays import Float
-from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import LidarModel, return_chance
-from seip_addon.core.progress import finish
-from seip_addon.core.scans import MountedSensor, ScanSettings, StaticScene, level_orientation, prepare
+from seip_addon.core.arrays import Integer
+from seip_addon.core.lidar import return_chance
+from seip_addon.core.scans import StaticScene
 from seip_addon.core.scans.frame import STATIC
 from seip_addon.core.scans.motion import rotations
 from seip_addon.core.scans.scanner import Scan, Scanner, Shape, Surface
-from seip_addon.core.traffic import Snapshot, Trajectories
+from seip_addon.core.traffic import Snapshot
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 _RAYS_AT_ONCE = 1 << 17
@@ -28,7 +20,9 @@ SAME = 1e-4
 """Metres by which the same return may differ."""
 
 
-def combined(static: StaticScene, bodies: Sequence[Shape], snapshot: Snapshot, engine: Engine) -> tuple[Surface, Float]:
+def combined(
+    static: StaticScene, bodies: Sequence[Shape], snapshot: Snapshot, engine: Engine
+) -> tuple[Surface, Integer]:
     """Put the road users of an instant among what stands still; return that, and which road user each triangle is."""
     placed = [
         position + bodies[user].triangles @ attitude.T

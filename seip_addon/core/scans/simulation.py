@@ -71,6 +71,16 @@ class Simulation:
         self._static, self._trajectories, self._shapes, self._settings = static, trajectories, shapes, settings
         self._revolution = max(1.0 / scanner.sensor.model.rotation_rate for scanner in scanners)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know before trusting the scans, in sentences."""
+        return tuple(
+            f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
+            "look whether it hangs where it should"
+            for scanner in self.scanners
+            if scanner.sees_nothing
+        )
+
     def frame(self, number: int, time: float) -> Frame:
         """Return what all sensors measure in the revolution that begins at a time.
 
