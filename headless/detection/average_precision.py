@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,15 +13,17 @@ from seip_addon.core.errors import SeipError
 
 from .frame_results import FrameResult
 from .intervals import Interval, percentiles
-from .matching import NOBODY, Match, Rule, match
+from .matching import Match, Rule, match
 
 BLOCK = 10.0
-"""Seconds of one run whose frames are drawn together, since they show much the same vehicles in much the same places."""
+"""Seconds of a run whose frames are drawn together: they show much the same vehicles in much the same places."""
 
 FEWEST_BLOCKS = 5
 """Blocks below which an interval would say more about chance than about the traffic."""
 
 RESAMPLES, AT_ONCE = 1000, 50
+
+Table = TypeVar("Table", "Judged", "Wanted")
 
 MISSED = -np.inf
 """The score at which a road user is found that none finds."""
@@ -37,15 +40,19 @@ class Judged:
         Whether it found a road user; false otherwise.
     frame : (d,) int64
         The frame it is from.
-    points, density, distance
-        As in `Detected`.
+    density : (d,) float64, per square metre
+        Of the returns around it.
+    points : (d,) int64
+        Returns from the road user that it found; in the box itself where it is false.
+    distance : (d,) float64, metres
+        From the road user that it found to the nearest sensor; from the box itself where it is false.
     """
 
     score: Float
     hit: Boolean
     frame: Integer
-    points: Integer
     density: Float
+    points: Integer
     distance: Float
 
     def __len__(self) -> int:
@@ -132,14 +139,13 @@ def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
         No frame has a road user that counts.
     """
     matches = [match(frame, rule) for frame in frames]
-    wanted = _wanted(frames, matches)
-    if len(wanted) == 0:
+    if not any(found.counted.any() for found in matches):
         raise SeipError(
             f"none of {len(frames)} frames has a {' or '.join(rule.categories)} in the region with "
             f"{rule.fewest_points} returns or more: there is no average precision without one, so evaluate on frames "
             "with traffic"
         )
-    return Evaluation(rule, _judged(frames, matches), wanted, _blocks(frames))
+    return Evaluation(rule, _judged(frames, matches), _wanted(frames, matches), _blocks(frames))
 
 
 def precision_recall(evaluation: Evaluation) -> Curve:
@@ -224,20 +230,20 @@ def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Wanted:
 
 
 def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Judged:
-    found = [frame.detected for frame in frames]
+    found, pairs = [frame.detected for frame in frames], list(zip(frames, matches, strict=True))
     everything = Judged(
         score=np.concatenate([boxes.score for boxes in found]),
         hit=np.concatenate([one.hit for one in matches]),
         frame=np.repeat(np.arange(len(frames)), [len(boxes) for boxes in found]),
-        points=np.concatenate([boxes.points for boxes in found]),
         density=np.concatenate([boxes.density for boxes in found]),
-        distance=np.concatenate([boxes.distance for boxes in found]),
+        points=np.concatenate([one.of_found(f.truth.points, f.detected.points) for f, one in pairs]),
+        distance=np.concatenate([one.of_found(f.truth.distance, f.detected.distance) for f, one in pairs]),
     )
     judged = np.nonzero(np.concatenate([one.judged for one in matches]))[0]
     return _rows(everything, judged[np.argsort(-everything.score[judged], kind="stable")])
 
 
-def _rows[Table: (Judged, Wanted)](table: Table, rows: Boolean | Integer) -> Table:
+def _rows(table: Table, rows: Boolean | Integer) -> Table:
     return replace(table, **{column.name: getattr(table, column.name)[rows] for column in fields(table)})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +13,7 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from .average_precision import Evaluation, evaluate, part
 from .frame_results import FrameResult
 from .intervals import Interval
-from .matching import Rule
+from .matching import Rule, must_be_found
 
 ALONG_DISTANCE = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
 ALONG_POINTS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)
@@ -47,8 +47,8 @@ class Bin:
 def average_precision_by(evaluation: Evaluation, quantity: str, edges: Sequence[float]) -> tuple[Bin, ...]:
     """Return the average precision in parts.
 
-    A hit belongs to the part of the road user it found (it may lie beyond the
-    edge itself), a false detection to its own.
+    A hit belongs to the part of the road user that it found (the box itself
+    may lie beyond the edge), a false detection to its own.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def average_precision_by(evaluation: Evaluation, quantity: str, edges: Sequence[
     edges : sequence of float
         Ascending.
     """
-    wanted, detections = getattr(evaluation.wanted, quantity), _of_its_road_user(evaluation, quantity)
+    wanted, detections = getattr(evaluation.wanted, quantity), getattr(evaluation.detections, quantity)
     parts = [
         (low, high, part(evaluation, _between(detections, low, high), _between(wanted, low, high)))
         for low, high in pairwise(edges)
@@ -129,21 +129,20 @@ def false_positives(evaluation: Evaluation, score: float) -> FalsePositives:
     return FalsePositives(float(false.sum()) / len(evaluation.block), sparse)
 
 
-def evaluate_by_category(
-    frames: Sequence[FrameResult], rule: Rule, groups: Sequence[tuple[str, ...]]
+def evaluate_by_class(
+    frames: Sequence[FrameResult], rule: Rule, classes: Sequence[tuple[str, ...]]
 ) -> dict[tuple[str, ...], Evaluation]:
-    """Judge the detections of each group of categories alone; a group that no road user is of is left out."""
-    present = {name for frame in frames for name in frame.truth.category[frame.truth.inside].tolist()}
+    """Judge each of the detector's classes alone; one of which no road user has to be found is left out.
+
+    A road user of another class, taken for one of this, neither counts nor
+    punishes: its own class has missed it already.
+    """
+    rules = {members: replace(rule, categories=members) for members in classes}
     return {
-        group: evaluate(frames, Rule(rule.iou, rule.in_space, group, rule.fewest_points))
-        for group in groups
-        if present.intersection(group)
+        members: evaluate(frames, own)
+        for members, own in rules.items()
+        if any(must_be_found(frame, own).any() for frame in frames)
     }
-
-
-def _of_its_road_user(evaluation: Evaluation, quantity: str) -> Float | Integer:
-    """Return for each hit the quantity of the road user that it found, for each false detection its own."""
-    raise NotImplementedError
 
 
 def _is_false(evaluation: Evaluation, score: float) -> Boolean:

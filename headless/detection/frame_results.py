@@ -102,7 +102,7 @@ class FrameResult:
     detected: Detected
 
 
-def frame_result(  # noqa: PLR0913 - a frame, what was found in it, and what both are measured by
+def frame_result(
     frame: Frame,
     detections: Detections,
     *,

@@ -79,9 +79,9 @@ def _scores_of_hits(scene: _Scene) -> Float:
     free = np.ones(len(scene.score), dtype=np.bool_)
     found = []
     for counts, (rows, _) in zip(scene.counted, scene.near, strict=True):
-        rows = rows[free[rows]]
-        if len(rows):
-            best = rows[scene.score[rows].argmax()]
+        left = rows[free[rows]]
+        if len(left):
+            best = left[scene.score[left].argmax()]
             free[best] = False
             if counts:
                 found.append(scene.score[best])
@@ -89,7 +89,7 @@ def _scores_of_hits(scene: _Scene) -> Float:
 
 
 def _thresholds(scores: Float, wanted: int) -> list[float]:
-    """Return the scores at which recall is nearest to 0, 1/40, 2/40 …"""
+    """Return the scores at which recall is nearest to 0, 1/40, 2/40 and so on."""
     ordered = np.sort(scores)[::-1].tolist()
     thresholds: list[float] = []
     for place, score in enumerate(ordered):

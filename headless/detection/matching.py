@@ -16,9 +16,11 @@ classes of KITTI (Geiger et al. 2012).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 
@@ -29,7 +31,7 @@ VEHICLES = ("car", "van", "truck", "bus")
 """Categories whose average precision the study compares."""
 
 NOBODY = -1
-"""The detection that found a road user that none found."""
+"""Whom a detection found that found none, and by which a road user was found that none found."""
 
 
 @dataclass(frozen=True)
@@ -64,16 +66,27 @@ class Match:
         Whether the road user is one that had to be found.
     found_by : (g,) int64
         The detection that found it, `NOBODY` where none did.
-    hit : (k,) bool
-        Whether the detection found a road user that counts.
+    found : (k,) int64
+        The road user that each detection found, `NOBODY` where it found none that counts.
     judged : (k,) bool
         Whether it is a hit or false; the rest neither helps nor harms.
     """
 
     counted: Boolean
     found_by: Integer
-    hit: Boolean
+    found: Integer
     judged: Boolean
+
+    @property
+    def hit(self) -> Boolean:
+        """Whether each detection found a road user that counts, (k,) bool."""
+        return self.found != NOBODY
+
+    def of_found(self, of_truth: NDArray[Any], own: NDArray[Any]) -> NDArray[Any]:
+        """Return for each detection a quantity of the road user that it found; its own where it found none."""
+        values = own.copy()
+        values[self.hit] = of_truth[self.found[self.hit]]
+        return values
 
 
 def match(frame: FrameResult, rule: Rule) -> Match:
@@ -82,23 +95,23 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     counted = must_be_found(frame, rule)
     overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
     best = overlap.max(axis=1, initial=0.0)
-    found_by = np.full(len(truth), NOBODY)
-    hit = np.zeros(len(detected), dtype=np.bool_)
+    found_by, found = np.full(len(truth), NOBODY), np.full(len(detected), NOBODY)
     for row in np.lexsort((-best, -detected.score)):
         if best[row] <= rule.iou:
             continue
         free = np.where(counted & (found_by == NOBODY), overlap[row], 0.0)
         if free.max() > rule.iou:
-            found_by[free.argmax()] = row
-            hit[row] = True
+            found[row] = free.argmax()
+            found_by[found[row]] = row
     excused = (overlap[:, ~counted] > rule.iou).any(axis=1) | ~detected.inside
-    return Match(counted, found_by, hit, hit | (of_its_kind(frame, rule) & ~excused))
+    return Match(counted, found_by, found, (found != NOBODY) | (of_its_kind(frame, rule) & ~excused))
 
 
 def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:
     """Return which road users count, (g,) bool."""
     truth = frame.truth
-    return np.isin(truth.category, rule.categories) & truth.inside & (truth.points >= rule.fewest_points)
+    counts: Boolean = np.isin(truth.category, rule.categories) & truth.inside & (truth.points >= rule.fewest_points)
+    return counts
 
 
 def of_its_kind(frame: FrameResult, rule: Rule) -> Boolean:
