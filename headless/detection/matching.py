@@ -80,7 +80,8 @@ class Match:
     @property
     def hit(self) -> Boolean:
         """Whether each detection found a road user that counts, (k,) bool."""
-        return self.found != NOBODY
+        hit: Boolean = self.found != NOBODY
+        return hit
 
     def of_found(self, of_truth: NDArray[Any], own: NDArray[Any]) -> NDArray[Any]:
         """Return for each detection a quantity of the road user that it found; its own where it found none."""
