@@ -3,11 +3,9 @@
 import math
 from dataclasses import replace
 
-import pytest
-
-pytest.importorskip("torch", reason="the detector's torch is optional")
-
 from headless.detection.claims import Trial, judge
+
+import pytest
 
 PRICE = {"type1": 6000.0, "type2": 15000.0, "type3": 80000.0}
 PUBLISHED = {"type1": (0.60, 0.80, 0.87), "type2": (0.75, 0.85, 0.90), "type3": (0.90, 0.91, 0.91)}
