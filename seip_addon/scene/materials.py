@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.errors import SeipError
 from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_WORDS
+from ..core.scene_geometry import DEFAULT_REFLECTIVITY
+from . import contract
 
 PREFIX = "SEIP "
 VIEWPORT_GAMMA = 0.65  # the viewport's studio light is dimmer than the sun
@@ -64,6 +67,33 @@ PAINT_COLOURS = {
 COLOURS |= {f"{what} {name}": colour for what in ("paint", "cloth") for name, colour in PAINT_COLOURS.items()}
 """Of the colours that `core.traffic.bodies` names, on vehicles and on people."""
 
+REFLECTIVITY = {
+    "asphalt": 0.17,
+    "asphalt shoulder": 0.17,
+    "asphalt parking": 0.20,
+    "asphalt cycle": 0.25,
+    "median": 0.30,
+    "pavement": 0.35,
+    "kerb": 0.40,
+    "verge": 0.45,
+    "marking": 0.60,
+    "wall": 0.40,
+    "facade brick": 0.40,
+    "facade plaster": 0.60,
+    "facade sand": 0.50,
+    "facade grey": 0.40,
+    "roof": 0.25,
+    "glass": 0.05,
+    "steel": 0.40,
+    "luminaire": 0.50,
+    "signal housing": 0.08,
+    "bark": 0.30,
+    "leaves": 0.45,
+}
+"""Share of near infrared (905 nm) that each material scatters back, assumed; plants are bright there. Those not named
+have the default."""
+_OWN = {PREFIX + name: share for name, share in REFLECTIVITY.items()}
+
 VEIL_OPACITY = 0.25
 """Of areas that mean something and are not there to be seen in a render."""
 
@@ -85,6 +115,27 @@ def material(name: str) -> bpy.types.Material:
     opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
     shown = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
     return _made(name, (*COLOURS[name], 1.0), shown, roughness=ROUGHNESS.get(name, 0.9), specular=0.5)
+
+
+def reflectivity(of: bpy.types.Material | None) -> float:
+    """Return a material's ``seip_reflectivity``, else that of the material of this add-on that it is, else the default.
+
+    Raises
+    ------
+    SeipError
+        The property is no number from 0 to 1.
+    """
+    if of is None:
+        return DEFAULT_REFLECTIVITY
+    given = of.get(contract.REFLECTIVITY)
+    if given is None:
+        name = contract.NUMBER.sub("", of.name)
+        return _OWN.get(name, DEFAULT_REFLECTIVITY)
+    if isinstance(given, bool) or not isinstance(given, int | float) or not 0 <= given <= 1:
+        raise SeipError(
+            f"property {contract.REFLECTIVITY} of material {of.name!r} must be a number from 0 to 1, not {given!r}"
+        )
+    return float(given)
 
 
 def linear(colour: str) -> tuple[float, float, float, float]:
