@@ -52,3 +52,12 @@ def full_scan(scanner: Scanner, surface: Surface, owner: Integer, users: int) ->
     nobody = np.zeros(users, dtype=np.int64)
     chance = return_chance(model, distance, intensity).astype(np.float32)
     return Scan(distance, intensity, chance, instance, nobody, nobody)
+
+
+def differing(one: Scan, other: Scan) -> Integer:
+    """Return the rays that do not end at the same place on the same thing."""
+    hit, there = np.isfinite(one.distance), np.isfinite(other.distance)
+    both = hit & there
+    apart = hit != there
+    apart[both] = np.abs(one.distance[both] - other.distance[both]) > SAME
+    return np.flatnonzero(apart | (one.instance != other.instance))

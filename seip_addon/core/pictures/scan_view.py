@@ -30,7 +30,7 @@ SENSOR_COLOURS = ("#56b4e9", "#e69f00", "#3cc99b", "#f07ac0", "#f0e442", "#d55e0
 """Told apart by colour-blind people, on a dark ground (after Okabe and Ito 2008)."""
 STRENGTH = LinearSegmentedColormap.from_list("strength", ("#27408b", "#1fa187", "#fde725", "#ffffff"))
 STRONGEST = 0.6
-"""Intensity from which on returns have the last colour."""
+"""Intensity from which on returns have the last colour; below, colours go by its square root."""
 SEEN, UNSEEN = "#ffffff", "#ff5a4f"
 
 
@@ -60,7 +60,7 @@ def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSenso
     palette = np.array([to_rgb(SENSOR_COLOURS[number % len(SENSOR_COLOURS)]) for number in range(len(sensors))])
     colours = (
         palette[frame.sensor],
-        STRENGTH(np.minimum(frame.intensity / STRONGEST, 1.0))[:, :3],
+        STRENGTH(np.sqrt(np.minimum(frame.intensity / STRONGEST, 1.0)))[:, :3],
     )
     for number, colour in enumerate(colours):
         axes = _axes(figure, MARGIN + number * (MAP + MARGIN), FOOT, MAP, tall)
@@ -137,24 +137,27 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
         Line2D([], [], color=SENSOR_COLOURS[number % len(SENSOR_COLOURS)], marker="o", linestyle="none")
         for number in range(len(sensors))
     ]
-    words = [f"{sensor.label}  {sensor.model.key}" for sensor in sensors]
+    types = [f"{sensor.label}  {sensor.model.key}" for sensor in sensors]
     legend = figure.legend(
-        marks, words, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), frameon=False, ncols=8, fontsize=9
+        marks, types, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), frameon=False, ncols=8, fontsize=9
     )
     for text in legend.get_texts():
         text.set_parse_math(False)
     bar = figure.add_axes(((2 * MARGIN + MAP) / width, 0.3 / height, 3.0 / width, 0.12 / height))
-    bar.imshow(np.linspace(0, 1, 256)[None], cmap=STRENGTH, aspect="auto", extent=(0, STRONGEST, 0, 1))
-    bar.set(yticks=(), xticks=(0, STRONGEST / 2, STRONGEST))
-    bar.set_xticklabels(("0", f"{STRONGEST / 2:g}", f"{STRONGEST:g} and more"), size=8, color=INK)
+    bar.imshow(np.linspace(0, 1, 256)[None], cmap=STRENGTH, aspect="auto", extent=(0, 1, 0, 1))
+    shares = np.array([0.0, 0.05, 0.25, 1.0])
+    words = [*(f"{share * STRONGEST:g}" for share in shares[:-1]), f"{STRONGEST:g} and more"]
+    bar.set(yticks=(), xticks=np.sqrt(shares))
+    bar.set_xticklabels(words, size=8, color=INK)
     bar.set_title("intensity", size=8, color=INK, pad=2)
-    boxes = [Line2D([], [], color=INK, linewidth=1.2), Line2D([], [], color=UNSEEN, linewidth=1.2)]
+    boxes = [Line2D([], [], color=colour, linewidth=1.5) for colour in (SEEN, UNSEEN)]
     figure.legend(
         boxes,
-        ["box with returns (white)", "box without a return"],
+        ["road user with returns", "without a return"],
         loc="lower right",
         bbox_to_anchor=(1 - MARGIN / width, 0.0),
-        frameon=False,
+        facecolor=NIGHT,
+        labelcolor=SEEN,
         ncols=2,
         fontsize=9,
     )

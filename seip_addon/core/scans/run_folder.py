@@ -208,7 +208,7 @@ def _frame_record(number: int, frame: Frame) -> Record:
 
 
 def _sensor_record(sensor: MountedSensor) -> Record:
-    model = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in _fields(sensor.model)}
+    model = {name: np.asarray(value).tolist() for name, value in _fields(sensor.model)}
     return {
         "label": sensor.label,
         "sensor": sensor.model.key,

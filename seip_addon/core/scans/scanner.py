@@ -24,6 +24,7 @@ from .sensor import MountedSensor
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of the static scan
 _MARGIN = 1e-3
 """Metres by which bounding boxes are larger than what they bound: engines compute in float32."""
+_LEVEL = 1e-12  # a ray of less slope than this is off by less than the margin at any range
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
 
@@ -103,7 +104,7 @@ class SolidShape(Surface):
         -------
         (n,) bool
         """
-        slowness = 1.0 / np.where(directions == 0.0, np.finfo(float).tiny, directions)
+        slowness = 1.0 / np.where(np.abs(directions) < _LEVEL, _LEVEL, directions)
         one, other = (self.low[:, None] - origin) * slowness, (self.high[:, None] - origin) * slowness
         enter = np.minimum(one, other).max(axis=0)
         leave = np.maximum(one, other).min(axis=0)
