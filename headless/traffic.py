@@ -16,7 +16,7 @@ import math
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -29,6 +29,7 @@ from headless import session, survey
 import bpy
 import numpy as np
 
+from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scene_geometry import SceneGeometry, joined
@@ -37,6 +38,7 @@ from seip_addon.core.traffic.demand import Demand
 from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories, some
 from seip_addon.core.traffic.overlaps import find_overlaps, without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
+from seip_addon.core.traffic.smooth_walks import smooth_walks
 from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
 from seip_addon.core.traffic.sumo_files import read_net_offset
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
@@ -63,15 +65,17 @@ def main(argv: list[str]) -> None:
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
     window = Window(options.begin, options.end, _bounds(geometry, MARGIN))
-    trajectories = _read(options.fcd, options.routes, options.net, window, geometry, options.fcd.name)
+    read = _read(options.fcd, options.routes, options.net, window, geometry.origin, options.fcd.name)
+    trajectories = _fitted(read, geometry)
     overlaps = _run(find_overlaps(trajectories, LOOKS))
     if len(overlaps):
         worst = int(overlaps.area.argmax())
         one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
-        session.say(
-            f"warning: {len(overlaps)} pairs of road users stand in one another; {one} and {other} "
+        sentence = (
+            f"{len(overlaps)} pairs of road users stand in one another; {one} and {other} "
             f"share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
         )
+        _warn([sentence])
     return trajectories
 
 
@@ -85,7 +89,8 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         files = _run(simulate(options.simulate, Path(folder), scenario, _bounds(geometry, 0.0)))
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
         window = Window(options.warm_up, end, _bounds(geometry, MARGIN))
-        simulated = _read(files.floating_car_data, [files.routes], files.network, window, geometry, source)
+        read = _read(files.floating_car_data, [files.routes], files.network, window, geometry.origin, source)
+    simulated = _fitted(smooth_walks(read), geometry)
     apart, collided = _run(without_overlaps(simulated))
     if collided:
         session.say(
@@ -95,15 +100,24 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
 
 
 def _read(  # all that a file of traffic needs beside it
-    path: Path, routes: list[Path], net: Path | None, window: Window, geometry: SceneGeometry, source: str
+    path: Path, routes: list[Path], net: Path | None, window: Window, origin: Float, source: str
 ) -> Trajectories:
     offset = None if net is None else read_net_offset(net)
     data = _run(read_floating_car_data(path, offset, window))
-    trajectories, warnings = read_trajectories(data, _run(read_vehicle_types(routes)), geometry.origin, source)
+    trajectories, warnings = read_trajectories(data, _run(read_vehicle_types(routes)), origin, source)
+    _warn(warnings)
+    return trajectories
+
+
+def _fitted(trajectories: Trajectories, geometry: SceneGeometry) -> Trajectories:
     fit = fit_to_road(trajectories, geometry)
-    for sentence in (*warnings, *fit.warnings):
-        session.say(f"warning: {sentence}")
+    _warn(fit.warnings)
     return fit.trajectories
+
+
+def _warn(sentences: Iterable[str]) -> None:
+    for sentence in sentences:
+        session.say(f"warning: {sentence}")
 
 
 def _bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:

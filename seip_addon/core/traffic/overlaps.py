@@ -40,7 +40,7 @@ class Overlaps:
 
 
 def footprints(trajectories: Trajectories, snapshot: Snapshot) -> Float:
-    """Return the corners (k, 4, 2) in plan of the road users of an instant, metres."""
+    """Return the corners (k, 4, 2) in plan of an instant's road users, counter-clockwise from the front left."""
     half = np.array([(user.length / 2.0, user.width / 2.0) for user in trajectories.users])[snapshot.user]
     heading = np.stack([np.cos(snapshot.yaw), np.sin(snapshot.yaw)], axis=1)
     ahead = heading * half[:, :1]

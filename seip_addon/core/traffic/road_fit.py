@@ -13,6 +13,7 @@ from ..errors import SeipError
 from ..plan_geometry import LEAST_AREA, heights_over, plane_height, signed_area
 from ..scene_geometry import SceneGeometry, joined
 from .floating_car_data import some, unwrapped
+from .smooth_walks import put_elsewhere
 from .trajectories import RoadUser, Trajectories
 
 TOLERANCE = 1.0
@@ -44,7 +45,7 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
 
     Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
     is nearest to the height in the trajectories counts, and the highest where they say none. A road user who leaves
-    the road or the scene and comes back is another road user then: NAME/2.
+    the road or the scene and comes back, or whom the simulation puts somewhere else, is another one then: NAME/2.
 
     Parameters
     ----------
@@ -164,6 +165,7 @@ def _only(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajector
     user, time = user[kept], trajectories.time[kept]
     new = np.ones(len(kept), dtype=np.bool_)
     new[1:] = (np.diff(user) != 0) | (np.diff(kept) > 1) | (np.diff(time) > _longest_gap(trajectories))
+    new[1:] |= put_elsewhere(trajectories)[kept[1:] - 1]
     begin = np.flatnonzero(new)
     end = np.append(begin[1:], len(kept))
     stays = end - begin > 1
