@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from seip_addon.core.deployment import deploy
+from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.render import save_rendered_view
+from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import LIFT, clear_result, write_result
 from tests.scene_by_hand import make_scene
 from tests.small_junction import make_example
@@ -163,6 +165,24 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
     assert "Fra:" not in capfd.readouterr().out
+
+
+def test_the_rendered_view_shows_traffic_where_it_is_now(example, scene, tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
+    time, still = np.array((0.0, 2.0)), np.zeros(2)
+    way = np.array(((0.0, 0.0, 0.0), (48.0, 0.0, 0.0)))
+    car = RoadUser("car", "car", 4.5, 1.8, 1.5)
+    origin = example.geometry.origin
+    (thing,) = animate(scene, Trajectories((car,), origin, np.array((0, 2)), time, way, still, still, still))
+    scene.frame_set(30)
+    write_result(scene, example.site, example.deployment)
+    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", lambda *_: seen.append(thing.location.x))
+    save_rendered_view(tmp_path / "view.png", scene, example.site, example.deployment)
+    assert seen == [30.0]
+    assert thing.location.x == 30.0
 
 
 def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path, monkeypatch):
