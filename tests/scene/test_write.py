@@ -179,7 +179,12 @@ def test_the_rendered_view_shows_traffic_where_it_is_now(example, scene, tmp_pat
     (thing,) = animate(scene, Trajectories((car,), origin, np.array((0, 2)), time, way, still, still, still))
     scene.frame_set(30)
     write_result(scene, example.site, example.deployment)
-    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", lambda *_: seen.append(thing.location.x))
+
+    def look(*_):
+        shown = bpy.data.scenes["SEIP view"].view_layers[0].depsgraph.object_instances
+        seen.extend(each.matrix_world[0][3] for each in shown if each.object.original == thing)
+
+    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", look)
     save_rendered_view(tmp_path / "view.png", scene, example.site, example.deployment)
     assert seen == [30.0]
     assert thing.location.x == 30.0
