@@ -1,6 +1,7 @@
 import hashlib
 
 import bpy
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -168,26 +169,25 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
 
 
 def test_the_rendered_view_shows_traffic_where_it_is_now(example, scene, tmp_path, monkeypatch):
-    seen = []
+    pictures = []
     monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
-    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 64)
-    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 36)
-    time, still = np.array((0.0, 2.0)), np.zeros(2)
-    way = np.array(((0.0, 0.0, 0.0), (48.0, 0.0, 0.0)))
-    car = RoadUser("car", "car", 4.5, 1.8, 1.5)
-    origin = example.geometry.origin
-    (thing,) = animate(scene, Trajectories((car,), origin, np.array((0, 2)), time, way, still, still, still))
-    scene.frame_set(30)
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 160)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 90)
+    monkeypatch.setattr(
+        "seip_addon.scene.render.save_labelled_view", lambda *given: pictures.append(plt.imread(given[1]))
+    )
     write_result(scene, example.site, example.deployment)
-
-    def look(*_):
-        shown = bpy.data.scenes["SEIP view"].view_layers[0].depsgraph.object_instances
-        seen.extend(each.matrix_world[0][3] for each in shown if each.object.original == thing)
-
-    monkeypatch.setattr("seip_addon.scene.render.save_labelled_view", look)
-    save_rendered_view(tmp_path / "view.png", scene, example.site, example.deployment)
-    assert seen == [30.0]
-    assert thing.location.x == 30.0
+    for begin, end in ((-24.0, 24.0), (6.0, 6.0), (-24.0, -24.0)):  # driving, and parked where it is now and where not
+        truck = RoadUser("truck", "truck", 16.5, 2.55, 4.0)
+        way, still = np.array(((begin, 0.0, 0.0), (end, 0.0, 0.0))), np.zeros(2)
+        times = np.array((0.0, 2.0))
+        origin = example.geometry.origin
+        animate(scene, Trajectories((truck,), origin, np.array((0, 2)), times, way, still, still, still))
+        scene.frame_set(30)
+        save_rendered_view(tmp_path / "view.png", scene, example.site, example.deployment)
+    driving, here, elsewhere = pictures
+    assert np.array_equal(driving, here)
+    assert not np.array_equal(driving, elsewhere)
 
 
 def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path, monkeypatch):
