@@ -1,12 +1,15 @@
 import hashlib
 
 import bpy
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 from seip_addon.core.deployment import deploy
+from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.render import save_rendered_view
+from seip_addon.scene.traffic import animate
 from seip_addon.scene.write import LIFT, clear_result, write_result
 from tests.scene_by_hand import make_scene
 from tests.small_junction import make_example
@@ -163,6 +166,28 @@ def test_the_rendered_view_changes_nothing_in_the_file(example, scene, tmp_path,
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
     assert "Fra:" not in capfd.readouterr().out
+
+
+def test_the_rendered_view_shows_traffic_where_it_is_now(example, scene, tmp_path, monkeypatch):
+    pictures = []
+    monkeypatch.setattr("seip_addon.scene.render.SAMPLES", 1)
+    monkeypatch.setattr("seip_addon.scene.render.WIDTH", 160)
+    monkeypatch.setattr("seip_addon.scene.render.HEIGHT", 90)
+    monkeypatch.setattr(
+        "seip_addon.scene.render.save_labelled_view", lambda *given: pictures.append(plt.imread(given[1]))
+    )
+    write_result(scene, example.site, example.deployment)
+    for begin, end in ((-24.0, 24.0), (6.0, 6.0), (-24.0, -24.0)):  # driving, and parked where it is now and where not
+        truck = RoadUser("truck", "truck", 16.5, 2.55, 4.0)
+        way, still = np.array(((begin, 0.0, 0.0), (end, 0.0, 0.0))), np.zeros(2)
+        times = np.array((0.0, 2.0))
+        origin = example.geometry.origin
+        animate(scene, Trajectories((truck,), origin, np.array((0, 2)), times, way, still, still, still))
+        scene.frame_set(30)
+        save_rendered_view(tmp_path / "view.png", scene, example.site, example.deployment)
+    driving, here, elsewhere = pictures
+    assert np.array_equal(driving, here)
+    assert not np.array_equal(driving, elsewhere)
 
 
 def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path, monkeypatch):
