@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 
-from headless.measures.scans import SAME, combined, differing, full_scan
+from headless.measures.scans import SAME, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
 
 import numpy as np
 import pytest
@@ -159,24 +159,19 @@ def test_merged_returns_are_those_of_a_full_scan(engine, place) -> None:
         np.testing.assert_allclose(scan.distance[same_place], full.distance[same_place], atol=SAME, rtol=0)
         np.testing.assert_allclose(scan.intensity[same_place], full.intensity[same_place], atol=1e-5)
         for ray in rays:
-            assert grazes_an_edge(scanner.sensor.xyz, scanner.directions[ray], surface.caster.triangles)
-
-
-def grazes_an_edge(origin, direction, triangles) -> bool:
-    """Tell whether a ray passes within a tenth of a millimetre of some triangle's edge."""
-    start = np.concatenate([triangles[:, k] for k in range(3)]) - origin
-    edge = np.concatenate([triangles[:, (k + 1) % 3] - triangles[:, k] for k in range(3)])
-    flat_start, flat_edge = (part - np.outer(part @ direction, direction) for part in (start, edge))
-    length = np.maximum((flat_edge**2).sum(axis=1), 1e-30)
-    share = np.clip(-(flat_start * flat_edge).sum(axis=1) / length, 0, 1)
-    return bool(np.linalg.norm(flat_start + share[:, None] * flat_edge, axis=1).min() < 1e-4)
+            assert grazes(scanner.sensor.xyz, scanner.directions[ray], surface.caster.triangles, scan.distance[ray])
 
 
 def test_an_edge_is_found_where_it_is() -> None:
     box = box_triangles((9.0, -1.0, -1.0), (11.0, 1.0, 1.0))
+    ahead = np.array([1.0, 0.0, 0.0])
+    assert exact_hit(np.zeros(3), rotations(np.array([0.02]), np.array([0.01]))[0][:, 0], box) == pytest.approx(
+        9.0 / math.cos(0.02) / math.cos(0.01)
+    )
+    assert exact_hit(np.zeros(3), -ahead, box) == math.inf
     beside = np.array([9.0, 1.0, 0.3]) / np.linalg.norm([9.0, 1.0, 0.3])
-    assert grazes_an_edge(np.zeros(3), beside, box)
-    assert not grazes_an_edge(
+    assert passes_an_edge(np.zeros(3), beside, box)
+    assert not passes_an_edge(
         np.zeros(3), np.array([1.0, 0.0, 0.0]) @ rotations(np.array([0.02]), np.array([0.01]))[0].T, box
     )
 

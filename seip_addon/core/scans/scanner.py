@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern, LidarModel, return_chance, return_intensity
+from ..lidar import BeamPattern, return_chance, return_intensity
 from ..visibility.ray_casting import RayCaster
 from .beam_windows import BeamWindows
 from .frame import STATIC
@@ -57,10 +57,11 @@ class Surface:
         normal = np.cross(b - a, c - a)
         self._normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
-    def intensity(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Float:
-        """Return the intensity (n,) of returns, given their rays' directions in the triangles' axes."""
+    def reflected(self, directions: Float, triangle: Integer) -> Float:
+        """Return reflectivity times cosine (n,) where rays, with directions in the triangles' axes, meet triangles."""
         cos_incidence = np.einsum("ni,ni->n", self._normal[triangle], directions)
-        return return_intensity(model, distance, cos_incidence, self._reflectivity[triangle])
+        reflected: Float = np.abs(cos_incidence) * self._reflectivity[triangle]
+        return reflected
 
 
 class SolidShape(Surface):
@@ -167,9 +168,11 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class _Hits:
+    """What some rays meet; n hits."""
+
     ray: Integer
     distance: Float
-    intensity: Float
+    reflected: Float
 
 
 class Scanner:
@@ -200,11 +203,12 @@ class Scanner:
         self.directions: Float = pattern.directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
         self._distance = np.full(len(rays), np.inf)
-        self._intensity = np.zeros(len(rays))
+        reflected = np.zeros(len(rays))
         for begin in range(0, len(rays), _RAYS_AT_ONCE):
             part = slice(begin, begin + _RAYS_AT_ONCE)
             hits = self._cast(ground, sensor.xyz, self.directions[part], rays[part])
-            self._distance[hits.ray], self._intensity[hits.ray] = hits.distance, hits.intensity
+            self._distance[hits.ray], reflected[hits.ray] = hits.distance, hits.reflected
+        self._intensity = return_intensity(self._model, self._distance, reflected)
         self._chance = return_chance(sensor.model, self._distance, self._intensity).astype(np.float32)
         self._stood: dict[int, tuple[Motion, _Hits]] = {}
 
@@ -221,17 +225,20 @@ class Scanner:
     def scan(self, traffic: Traffic, users: int) -> Scan:
         """Return what the rays end on with traffic that is one of so many road users."""
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
+        reflected = np.empty(len(distance))
         instance = np.full(len(distance), STATIC, dtype=np.int32)
         could = np.zeros(users, dtype=np.int64)
         for motion, hits in self._hits(traffic):
             could[motion.user] = self.in_range(hits.distance).sum()
             nearest = hits.distance < distance[hits.ray]
             ray = hits.ray[nearest]
-            distance[ray], intensity[ray] = hits.distance[nearest], hits.intensity[nearest]
+            distance[ray], reflected[ray] = hits.distance[nearest], hits.reflected[nearest]
             instance[ray] = motion.user
-            chance[ray] = return_chance(self._model, distance[ray], intensity[ray])
         on_traffic = np.flatnonzero(instance != STATIC)
-        met = by_user(instance[on_traffic[self.in_range(distance[on_traffic])]], users)
+        far = distance[on_traffic]
+        intensity[on_traffic] = return_intensity(self._model, far, reflected[on_traffic])
+        chance[on_traffic] = return_chance(self._model, far, intensity[on_traffic])
+        met = by_user(instance[on_traffic[self.in_range(far)]], users)
         return Scan(distance, intensity, chance, instance, could, met)
 
     def in_range(self, distance: Float) -> Boolean:
@@ -270,8 +277,7 @@ class Scanner:
     def _cast(self, surface: Surface, origin: Float, directions: Float, ray: Integer) -> _Hits:
         distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
         hit = np.flatnonzero(triangle >= 0)
-        intensity = surface.intensity(self._model, directions[hit], distance[hit], triangle[hit])
-        return _Hits(ray[hit], distance[hit], intensity)
+        return _Hits(ray[hit], distance[hit], surface.reflected(directions[hit], triangle[hit]))
 
 
 def by_user(instance: NDArray[np.int32], users: int) -> Integer:

@@ -91,13 +91,16 @@ class Simulation:
         time : float, seconds
         """
         snapshot = self._trajectories.at(time)
-        scans = self.scans(snapshot)
+        return self.measure(number, snapshot, self.scans(snapshot))
+
+    def measure(self, number: int, snapshot: Snapshot, scans: Sequence[Scan]) -> Frame:
+        """Return what the sensors make of their scans at an instant: noisy and incomplete, with labels."""
         parts = [
             _returns(scanner, scan, sensor, self._random(sensor, number), rolling=self._settings.rolling_shutter)
             for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
         ]
         merged = {part.name: np.concatenate([getattr(one, part.name) for one in parts]) for part in fields(_Returns)}
-        return Frame(time=time, labels=self._labels(snapshot, scans, parts), **merged)
+        return Frame(time=snapshot.time, labels=self._labels(snapshot, scans, parts), **merged)
 
     def scans(self, snapshot: Snapshot) -> list[Scan]:
         """Return what the rays of each sensor end on, without noise or losses."""
