@@ -368,11 +368,25 @@ def test_kitti_takes_the_nearest_of_many_recalls():
     assert average_precision(frames) == pytest.approx((40 + 40 * 80 / 81) / 80, abs=1e-15)
 
 
+def test_kitti_takes_the_nearer_of_two_recalls():
+    """Forty-seven cars, all found: 1/5 is due after eight thresholds, and 9/47 = 0.191 is nearer than 10/47 = 0.213.
+
+    A false detection scores between hits 9 and 10. Nine thresholds lie before it, 32 after, whose best precision is
+    the last: AP40 = (8 + 32 · 47/48)/40.
+    """
+    score = np.linspace(0.99, 0.2, 47)
+    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
+    frames.append(frame(truth([]), detected([box(0)], [(score[8] + score[9]) / 2])))
+    assert kitti(frames, AT_07).ap40 == pytest.approx((8 + 32 * 47 / 48) / 40, abs=1e-15)
+
+
 def test_kitti_lets_be_who_does_not_count():
+    """Of each frame's five detections one is a hit, one is false, and three are let be: precision 1/2."""
     boxes = [box(0), box(20), box(40)]
     there = truth(boxes, category=["car", "pedestrian", "car"], inside=[True, True, False])
-    told = [frame(there, detected([*boxes, box(FAR)], [0.5, 0.9, 0.8, 0.95], inside=[True, True, False, False]))] * 50
-    assert kitti(told, AT_07).ap40 == pytest.approx(1)
+    inside = [True, True, False, False, True]
+    told = [frame(there, detected([*boxes, box(FAR), box(-FAR)], [0.5, 0.9, 0.8, 0.95, 0.7], inside=inside))] * 50
+    assert kitti(told, AT_07).ap40 == pytest.approx(1 / 2)
 
 
 def test_kitti_is_near_the_interpolated_average():

@@ -19,7 +19,7 @@ from headless.detection.matching import Rule
 RULE = Rule()
 TOLD = frame(
     truth([box(0), box(20), box(40)], distance=[5, 15, 25], inside=[True, True, False]),
-    detected([box(0), box(20), box(90)], [0.9, 0.3, 0.6], distance=[5, 15, 7]),
+    detected([box(0), box(20), box(90), box(-90)], [0.9, 0.3, 0.6, 0.7], inside=[True, True, True, False]),
 )
 
 
@@ -48,7 +48,7 @@ def test_parts_have_the_edges_of_the_bins():
     edges = (0, 10, math.inf)
     drawn = parts("distance (m)", "AP", {"2 × type1": average_precision_by(evaluation, "distance", edges)})
     assert drawn.edges == edges
-    assert drawn.lines == {"2 × type1": (1.0, 1.0)}
+    assert drawn.lines == {"2 × type1": (1.0, 0.5)}
     assert drawn.road_users == (1, 1)
     assert parts("density", "false", {"2 × type1": false_by(evaluation, "density", edges, 0.1)}).road_users == ()
 
@@ -58,6 +58,6 @@ def test_error_view_shows_what_reaches_the_score():
     view = error_view("a", TOLD, RULE, score=0.5, **place)
     assert view.wanted.tolist() == [True, True, False]
     assert view.missed.tolist() == [False, True, False]
-    assert view.false.tolist() == [False, True]
+    assert view.false.tolist() == [False, True, False]  # outside the region nothing is false
     assert view.truth[0].tolist() == [0, 0, 4.5, 1.8, 0]
     assert error_view("a", TOLD, RULE, score=0.1, **place).missed.tolist() == [False, False, False]

@@ -142,6 +142,13 @@ def test_matrices_hold_every_pair():
     assert torch.allclose(iou_matrix_3d(a, b).ravel(), paired_iou_3d(a[i.ravel()], b[j.ravel()]), rtol=0, atol=1e-15)
 
 
+def test_matrices_hold_boxes_that_meet_with_their_corners():
+    """Two squares on their corners, 2.8 m apart, share a square on its corner of width 2√2 − 2.8."""
+    squares = torch.tensor([[0, 0, 2, 2, math.pi / 4], [2.8, 0, 2, 2, math.pi / 4]], dtype=torch.float64)
+    shared = (2 * math.sqrt(2) - 2.8) ** 2 / 2
+    assert iou_matrix(squares[:1], squares[1:]).item() == pytest.approx(shared / (8 - shared), abs=1e-12)
+
+
 def test_matrices_of_no_boxes():
     none, one = torch.zeros(0, 5), torch.ones(1, 5)
     assert iou_matrix(none, one).shape == (0, 1)
