@@ -1,0 +1,1 @@
+"""Detection of road users in merged clouds, and how well it is done."""

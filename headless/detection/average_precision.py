@@ -1,0 +1,284 @@
+"""Average precision over many frames, how sure it is, and what it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
+
+import numpy as np
+
+from seip_addon.core.arrays import Boolean, Float, Integer, Text
+from seip_addon.core.errors import SeipError
+
+from .frame_results import FrameResult
+from .intervals import Interval, percentiles
+from .matching import Match, Rule, match
+
+BLOCK = 10.0
+"""Seconds of a run whose frames are drawn together: they show much the same vehicles in much the same places."""
+
+FEWEST_BLOCKS = 5
+"""Blocks below which an interval would say more about chance than about the traffic."""
+
+RESAMPLES, AT_ONCE = 1000, 50
+
+Table = TypeVar("Table", "Judged", "Wanted")
+
+MISSED = -np.inf
+"""The score at which a road user is found that none finds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The judged detections of all frames, best first; d of them.
+
+    Parameters
+    ----------
+    score : (d,) float64
+    hit : (d,) bool
+        Whether it found a road user; false otherwise.
+    frame : (d,) int64
+        The frame it is from.
+    density : (d,) float64, per square metre
+        Of the returns around it.
+    points : (d,) int64
+        Returns from the road user that it found; in the box itself where it is false.
+    distance : (d,) float64, metres
+        From the road user that it found to the nearest sensor; from the box itself where it is false.
+    """
+
+    score: Float
+    hit: Boolean
+    frame: Integer
+    density: Float
+    points: Integer
+    distance: Float
+
+    def __len__(self) -> int:
+        """Return the number of detections."""
+        return len(self.score)
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """The road users of all frames that count; t of them.
+
+    Parameters
+    ----------
+    score : (t,) float64
+        Of the detection that found it, `MISSED` where none did.
+    frame : (t,) int64
+        The frame it is in.
+    category, points, visibility, distance
+        As in `Truth`.
+    """
+
+    score: Float
+    frame: Integer
+    category: Text
+    points: Integer
+    visibility: Float
+    distance: Float
+
+    def __len__(self) -> int:
+        """Return the number of road users."""
+        return len(self.score)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Precision and recall at each score that a detection has, the highest first.
+
+    Parameters
+    ----------
+    score, precision, recall : (s,) float64
+        Of all detections with at least that score: the share that are hits, and the share of road users they find.
+    """
+
+    score: Float
+    precision: Float
+    recall: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """How the detections of all frames were judged.
+
+    Parameters
+    ----------
+    rule : Rule
+    detections : Judged
+    wanted : Wanted
+    block : (f,) int64
+        The block of each frame; frames of one block are drawn together.
+    """
+
+    rule: Rule
+    detections: Judged
+    wanted: Wanted
+    block: Integer
+
+    @property
+    def average_precision(self) -> float:
+        """The area under the curve of the best precision at each recall or beyond; NaN where nothing had to be found.
+
+        All-point interpolation of PASCAL VOC 2010, on all detections of all
+        frames in one order. Equal scores make one point of the curve: no
+        threshold can tell them apart.
+        """
+        return float(_areas(self, np.ones((1, len(self.detections))), np.array([float(len(self.wanted))]))[0])
+
+
+def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
+    """Judge all detections.
+
+    Raises
+    ------
+    SeipError
+        No frame has a road user that counts.
+    """
+    matches = [match(frame, rule) for frame in frames]
+    if not any(found.counted.any() for found in matches):
+        raise SeipError(
+            f"none of {len(frames)} frames has a {' or '.join(rule.categories)} in the region with "
+            f"{rule.fewest_points} returns or more: there is no average precision without one, so evaluate on frames "
+            "with traffic"
+        )
+    return Evaluation(rule, _judged(frames, matches), _wanted(frames, matches), _blocks(frames))
+
+
+def precision_recall(evaluation: Evaluation) -> Curve:
+    """Return precision and recall at each score."""
+    detections = evaluation.detections
+    last = _last_of_equals(detections.score)
+    hits = np.cumsum(detections.hit)[last]
+    return Curve(detections.score[last], hits / (last + 1), hits / max(len(evaluation.wanted), 1))
+
+
+def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | None:
+    """Return the 95 % interval of the average precision over other traffic like this, or None on too few blocks.
+
+    Bootstrap (Efron 1979) over blocks of `BLOCK` seconds of each run: frames
+    that follow each other are nearly the same, and drawn one by one they would
+    feign certainty. It says nothing about another training.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    seed : int
+        The same seed draws the same blocks.
+    """
+    count = int(evaluation.block.max()) + 1
+    if count < FEWEST_BLOCKS:
+        return None
+    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
+    of_detection = evaluation.block[evaluation.detections.frame]
+    of_wanted = np.bincount(evaluation.block[evaluation.wanted.frame], minlength=count)
+    areas = [
+        _areas(evaluation, times[:, of_detection], times @ of_wanted)
+        for times in np.split(drawn, range(AT_ONCE, RESAMPLES, AT_ONCE))
+    ]
+    return percentiles(np.concatenate(areas))
+
+
+def balanced_score(evaluation: Evaluation) -> float:
+    """Return the score with the highest F1, the harmonic mean of precision and recall; 0 without detections.
+
+    Choose it on validation frames and keep it, where false positives are
+    compared at a fixed score.
+    """
+    curve = precision_recall(evaluation)
+    if not curve.recall.any():
+        return 0.0
+    both = curve.precision + curve.recall
+    balance = np.divide(curve.precision * curve.recall, both, out=np.zeros_like(both), where=both > 0)
+    return float(curve.score[balance.argmax()])
+
+
+def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evaluation:
+    """Return the evaluation of some detections and some road users alone.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    detections : (d,) bool
+        Of the judged detections. Who found whom stays as it was.
+    wanted : (t,) bool
+        Of the road users that count.
+    """
+    return replace(
+        evaluation, detections=_rows(evaluation.detections, detections), wanted=_rows(evaluation.wanted, wanted)
+    )
+
+
+def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Wanted:
+    truths = [frame.truth for frame in frames]
+    score = [
+        np.append(frame.detected.score, MISSED)[found.found_by]  # NOBODY is the last
+        for frame, found in zip(frames, matches, strict=True)
+    ]
+    everyone = Wanted(
+        score=np.concatenate(score),
+        frame=np.repeat(np.arange(len(frames)), [len(truth) for truth in truths]),
+        category=np.concatenate([truth.category for truth in truths]),
+        points=np.concatenate([truth.points for truth in truths]),
+        visibility=np.concatenate([truth.visibility for truth in truths]),
+        distance=np.concatenate([truth.distance for truth in truths]),
+    )
+    return _rows(everyone, np.concatenate([found.counted for found in matches]))
+
+
+def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Judged:
+    found, pairs = [frame.detected for frame in frames], list(zip(frames, matches, strict=True))
+    everything = Judged(
+        score=np.concatenate([boxes.score for boxes in found]),
+        hit=np.concatenate([one.hit for one in matches]),
+        frame=np.repeat(np.arange(len(frames)), [len(boxes) for boxes in found]),
+        density=np.concatenate([boxes.density for boxes in found]),
+        points=np.concatenate([one.of_found(f.truth.points, f.detected.points) for f, one in pairs]),
+        distance=np.concatenate([one.of_found(f.truth.distance, f.detected.distance) for f, one in pairs]),
+    )
+    judged = np.nonzero(np.concatenate([one.judged for one in matches]))[0]
+    return _rows(everything, judged[np.argsort(-everything.score[judged], kind="stable")])
+
+
+def _rows(table: Table, rows: Boolean | Integer) -> Table:
+    return replace(table, **{column.name: getattr(table, column.name)[rows] for column in fields(table)})
+
+
+def _blocks(frames: Sequence[FrameResult]) -> Integer:
+    """Return the number of each frame's block, counted through all runs."""
+    runs = np.array([frame.run for frame in frames])
+    times = np.array([frame.time for frame in frames])
+    names, run = np.unique(runs, return_inverse=True)
+    start = np.array([times[runs == name].min() for name in names])
+    keys = np.column_stack([run, (times - start[run]) // BLOCK])
+    block: Integer = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    return block
+
+
+def _areas(evaluation: Evaluation, times: Float | Integer, wanted: Float | Integer) -> Float:
+    """Return average precisions where detections come several times or not at all.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    times : (b, d) array
+        How often each detection is there.
+    wanted : (b,) array
+        The number of road users that count.
+    """
+    detections = evaluation.detections
+    last = _last_of_equals(detections.score)
+    hits = np.cumsum(times * detections.hit, axis=1)[:, last]
+    found = np.cumsum(times, axis=1)[:, last]
+    precision = np.divide(hits, found, out=np.zeros(hits.shape), where=found > 0)
+    best_from_here = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
+    areas = (np.diff(hits, axis=1, prepend=0) * best_from_here).sum(axis=1)
+    return np.divide(areas, wanted, out=np.full(len(areas), np.nan), where=wanted > 0)
+
+
+def _last_of_equals(score: Float) -> Integer:
+    """Return the place of the last of each row of equal scores."""
+    return np.nonzero(np.append(score[1:] != score[:-1], True)[: len(score)])[0]

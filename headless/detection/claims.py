@@ -1,0 +1,232 @@
+"""What detection on this site says to the claims of the study.
+
+Claims 5 to 9 of Qu, Huang and Suo, "SEIP: Simulation-based Design and
+Evaluation of Infrastructure-based Collective Perception", section V. Gains are
+in points of average precision. All figures are means over the seeds of the
+training with Student's 95 % interval; seeds are compared pair by pair. A claim
+holds where the interval lies within what is claimed, does not hold where it
+lies outside, and is undecided between the two. Where the study says "about",
+from half to twice its figure is meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seip_addon.core.coverage_study import NUMBERS, Claim
+from seip_addon.core.coverage_study.claims import UNDECIDED
+
+from .intervals import Interval, judge_above, judge_all, judge_within, mean_interval
+
+ABOUT = 2.0
+"""Factor up to which a figure is about another."""
+
+FEWEST_SEEDS = 3
+"""Seeds below which nothing is decided."""
+
+PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
+"""What the study gained from one to two and from two to four sensors, of the simplest type and the next."""
+
+FEW, SOME, MANY = NUMBERS
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One training, judged with one placement.
+
+    Parameters
+    ----------
+    sensor : str
+        Catalogue key.
+    count : int
+        N, the number of sensors that were allowed.
+    seed : int
+        Of the training.
+    average_precision : float, 0 to 1
+        Of vehicles at an intersection over union of 0.7 in plan.
+    price : float, US dollars
+        Of all sensors.
+    coverage : float, 0 to 1
+        Share of targets that the placement sees.
+    false_positives : float
+        Per frame, at a score that all trials share.
+    sparse : float, 0 to 1
+        Share of these where the cloud is sparser than around half of the hits; NaN where there are none.
+    padded : bool
+        Whether empty places in pillars were fed to the network as points, and not masked: the ablation of claim 9.
+    """
+
+    sensor: str
+    count: int
+    seed: int
+    average_precision: float
+    price: float
+    coverage: float
+    false_positives: float
+    sparse: float
+    padded: bool = False
+
+
+def judge(trials: Sequence[Trial]) -> tuple[Claim, ...]:
+    """Hold claims 5 to 9 of the study against what was measured.
+
+    Claims for which a type or the ablation is missing are left out.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Types in the order from the simplest to the best; several seeds of each.
+    """
+    masked = [trial for trial in trials if not trial.padded]
+    sensors = list(dict.fromkeys(trial.sensor for trial in masked))
+    claims = [
+        _gains(number, masked, sensor, published)
+        for number, sensor, published in zip((5, 6), sensors, PUBLISHED_GAINS, strict=False)  # a study may have one
+    ]
+    if len(sensors) > 1:
+        claims.append(_simple_sensors_gain_more(masked, sensors))
+    if sensors:
+        claims.append(_false_where_sparse(masked, sensors[0]))
+    if len(masked) < len(trials):
+        claims.append(_padding(trials))
+    return tuple(claims)
+
+
+def _gains(number: int, trials: Sequence[Trial], sensor: str, published: tuple[float, float]) -> Claim:
+    steps = ((FEW, SOME), (SOME, MANY))
+    gains = [_mean(_gain(trials, sensor, *step)) for step in steps]
+    verdicts = [_about(gain, expected) for gain, expected in zip(gains, published, strict=True)]
+    figures = [f"{a} to {b}: {gain.points()}" for (a, b), gain in zip(steps, gains, strict=True)]
+    return Claim(
+        number,
+        f"{sensor}: AP rises by about {100 * published[0]:g} points from N = {FEW} to {SOME} and by about "
+        f"{100 * published[1]:g} from {SOME} to {MANY}",
+        judge_all(verdicts),
+        f"{'; '.join(figures)}; {_seeds(gains)}",
+    )
+
+
+def _simple_sensors_gain_more(trials: Sequence[Trial], sensors: Sequence[str]) -> Claim:
+    simple, *better = sensors
+    gains = {sensor: _gain(trials, sensor, FEW, MANY) for sensor in sensors}
+    leads = [_mean(_differences(gains[simple], gains[other])) for other in better]
+    rows = [f"{sensor} {_mean(gains[sensor]).points()}{_per_price(trials, sensor)}" for sensor in sensors]
+    ahead = [f"{lead.points()} more than {other}" for other, lead in zip(better, leads, strict=True)]
+    return Claim(
+        7,
+        f"adding {simple} sensors gains more AP than adding {' or '.join(better)}",
+        judge_all([_above(lead) for lead in leads]),
+        f"N = {FEW} to {MANY}: {'; '.join(rows)}; {simple} gains {', '.join(ahead)}",
+    )
+
+
+def _false_where_sparse(trials: Sequence[Trial], sensor: str) -> Claim:
+    false = {count: _by_seed(trials, sensor, count, lambda trial: trial.false_positives) for count in NUMBERS}
+    more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
+    sparse = [_mean(_by_seed(trials, sensor, count, lambda trial: trial.sparse)) for count in (FEW, SOME)]
+    rows = [f"N = {count} {_mean(false[count]).plain()}" for count in NUMBERS]
+    shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
+    return Claim(
+        8,
+        f"{sensor}: N = {FEW} and {SOME} give more false positives than N = {MANY}, mostly where the cloud is sparse",
+        judge_all([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
+        f"per frame: {'; '.join(rows)}; of them in the sparser half: {'; '.join(shares)}",
+    )
+
+
+def _padding(trials: Sequence[Trial]) -> Claim:
+    cells = dict.fromkeys((trial.sensor, trial.count) for trial in trials if trial.padded)
+    rows, verdicts = [], []
+    for sensor, count in cells:
+        padded, masked = (
+            _by_seed([trial for trial in trials if trial.padded == which], sensor, count, _sparse_false_positives)
+            for which in (True, False)
+        )
+        more = _mean(_differences(padded, masked))
+        verdicts.append(_above(more))
+        rows.append(f"{sensor}, N = {count}: {_mean(padded).plain()} padded, {_mean(masked).plain()} masked")
+    return Claim(
+        9,
+        "zero-padded pillars cause false positives where the cloud is sparse",
+        judge_all(verdicts),
+        f"false positives per frame in the sparser half: {'; '.join(rows)}",
+    )
+
+
+@dataclass(frozen=True)
+class _Mean:
+    """The mean over seeds, and its interval where they are enough."""
+
+    value: float
+    seeds: int
+    interval: Interval | None
+
+    def points(self) -> str:
+        return self._written(lambda value: f"{100 * value:+.1f}", " points")
+
+    def share(self) -> str:
+        return self._written(lambda value: f"{100 * value:.0f}", " %")
+
+    def plain(self) -> str:
+        return self._written(lambda value: f"{value:.2f}", "")
+
+    def _written(self, figure: Callable[[float], str], unit: str) -> str:
+        if not self.seeds:
+            return "not measured"
+        between = "" if self.interval is None else f" ({figure(self.interval[0])} to {figure(self.interval[1])})"
+        return f"{figure(self.value)}{unit}{between}"
+
+
+BySeed = dict[int, float]
+
+
+def _mean(of: BySeed) -> _Mean:
+    values = list(of.values())
+    if not values:
+        return _Mean(np.nan, 0, None)
+    interval = mean_interval(values) if len(values) >= FEWEST_SEEDS else None
+    return _Mean(float(np.mean(values)), len(values), interval)
+
+
+def _by_seed(trials: Sequence[Trial], sensor: str, count: int, figure: Callable[[Trial], float]) -> BySeed:
+    """Return a figure of one cell by seed; a seed for which it is not known is left out."""
+    cell = {trial.seed: figure(trial) for trial in trials if (trial.sensor, trial.count) == (sensor, count)}
+    return {seed: value for seed, value in cell.items() if not np.isnan(value)}
+
+
+def _gain(trials: Sequence[Trial], sensor: str, few: int, more: int) -> BySeed:
+    before, after = (_by_seed(trials, sensor, n, lambda trial: trial.average_precision) for n in (few, more))
+    return _differences(after, before)
+
+
+def _differences(more: BySeed, less: BySeed) -> BySeed:
+    return {seed: more[seed] - less[seed] for seed in more if seed in less}
+
+
+def _sparse_false_positives(trial: Trial) -> float:
+    return trial.false_positives * trial.sparse if trial.false_positives else 0.0
+
+
+def _per_price(trials: Sequence[Trial], sensor: str) -> str:
+    """Return the gain for each thousand dollars that the added sensors cost, in words."""
+    price = {count: _mean(_by_seed(trials, sensor, count, lambda trial: trial.price)).value for count in (FEW, MANY)}
+    spent = (price[MANY] - price[FEW]) / 1000
+    if not spent > 0:
+        return ""
+    return f", {100 * _mean(_gain(trials, sensor, FEW, MANY)).value / spent:+.2f} for each $1,000"
+
+
+def _seeds(gains: Sequence[_Mean]) -> str:
+    fewest = min(gain.seeds for gain in gains)
+    return f"{fewest} seed{'' if fewest == 1 else 's'}"
+
+
+def _about(mean: _Mean, expected: float) -> str:
+    return UNDECIDED if mean.interval is None else judge_within(mean.interval, expected / ABOUT, expected * ABOUT)
+
+
+def _above(mean: _Mean, least: float = 0.0) -> str:
+    return UNDECIDED if mean.interval is None else judge_above(mean.interval, least)

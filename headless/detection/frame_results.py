@@ -1,0 +1,175 @@
+"""What was there in a frame and what was detected, with all that errors are told apart by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.arrays import Boolean, Float, Integer, Text
+from seip_addon.core.scans.frame import Frame
+
+from .detections import Detections
+
+NEIGHBOURHOOD = 3.0
+"""Radius in metres of the circle around a box in which the density of returns is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The road users of a frame, all of them; g boxes.
+
+    Parameters
+    ----------
+    boxes : (g, 7) float64
+        x, y, z of the middle, length, width, height (metres), yaw (radians, counter-clockwise from +x).
+    category : (g,) str
+    points : (g,) int64
+        Returns from it, of all sensors.
+    visibility : (g,) float64, 0 to 1
+        Of the rays that would meet it with nothing else there, the share that does.
+    inside : (g,) bool
+        Whether its middle is in the region of interest.
+    distance : (g,) float64, metres
+        From its middle to the nearest sensor.
+    """
+
+    boxes: Float
+    category: Text
+    points: Integer
+    visibility: Float
+    inside: Boolean
+    distance: Float
+
+    def __len__(self) -> int:
+        """Return the number of road users."""
+        return len(self.boxes)
+
+
+@dataclass(frozen=True, eq=False)
+class Detected:
+    """The detections of a frame; k boxes.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float64
+        As in `Truth`.
+    score : (k,) float64
+    category : (k,) str
+        What it was taken for; a class of several categories goes by its first.
+    points : (k,) int64
+        Returns in the box.
+    density : (k,) float64, per square metre
+        Returns within `NEIGHBOURHOOD` of its middle in plan.
+    inside, distance
+        As in `Truth`.
+    """
+
+    boxes: Float
+    score: Float
+    category: Text
+    points: Integer
+    density: Float
+    inside: Boolean
+    distance: Float
+
+    def __len__(self) -> int:
+        """Return the number of detections."""
+        return len(self.boxes)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameResult:
+    """One frame: what was there and what was detected.
+
+    Parameters
+    ----------
+    run : str
+        The traffic run it is from.
+    time : float, seconds
+        In that run.
+    truth : Truth
+    detected : Detected
+    """
+
+    run: str
+    time: float
+    truth: Truth
+    detected: Detected
+
+
+def frame_result(
+    frame: Frame,
+    detections: Detections,
+    *,
+    classes: Sequence[Sequence[str]],
+    region: BaseGeometry,
+    sensors: Float,
+    run: str,
+) -> FrameResult:
+    """Set detections beside the road users of a frame.
+
+    Parameters
+    ----------
+    frame : Frame
+    detections : Detections
+    classes : sequence of sequence of str
+        Categories of road users in each of the detector's classes.
+    region : shapely geometry, metres
+        Region of interest in plan.
+    sensors : (s, 3) float64, metres
+        Where the sensors are.
+    run : str
+        The traffic run that the frame is from.
+    """
+    labels, boxes = frame.labels, detections.boxes
+    first = np.array([members[0] for members in classes], dtype=np.str_)
+    points, density = _returns_around(boxes, frame.points)
+    return FrameResult(
+        run=run,
+        time=frame.time,
+        truth=Truth(
+            boxes=np.column_stack([labels.centre, labels.size, labels.yaw]),
+            category=labels.category,
+            points=labels.points.sum(axis=1),
+            visibility=labels.visibility,
+            inside=labels.inside,
+            distance=_nearest(labels.centre, sensors),
+        ),
+        detected=Detected(
+            boxes=boxes,
+            score=detections.score,
+            category=first[detections.category],
+            points=points,
+            density=density,
+            inside=np.asarray(shapely.contains_xy(region, boxes[:, 0], boxes[:, 1]), dtype=np.bool_),
+            distance=_nearest(boxes[:, :3], sensors),
+        ),
+    )
+
+
+def _nearest(points: Float, sensors: Float) -> Float:
+    """Return the distance from each point to the nearest sensor."""
+    distance: Float = np.linalg.norm(points[:, None] - sensors, axis=2).min(axis=1, initial=np.inf)
+    return distance
+
+
+def _returns_around(boxes: Float, cloud: NDArray[np.float32]) -> tuple[Integer, Float]:
+    """Return the number of returns in each box, and how dense they are in the plan around it."""
+    inside, near = np.zeros(len(boxes), dtype=np.int64), np.zeros(len(boxes), dtype=np.int64)
+    order = np.argsort(cloud[:, 0])
+    along = cloud[order, 0]
+    for row, (x, y, z, length, width, height, yaw) in enumerate(boxes):
+        reach = max(NEIGHBOURHOOD, np.hypot(length, width) / 2)
+        first, last = np.searchsorted(along, np.array([x - reach, x + reach], dtype=along.dtype))
+        here = cloud[order[first:last]].astype(np.float64) - (x, y, z)
+        near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= NEIGHBOURHOOD**2)
+        ahead = np.cos(yaw) * here[:, 0] + np.sin(yaw) * here[:, 1]
+        aside = np.cos(yaw) * here[:, 1] - np.sin(yaw) * here[:, 0]
+        within = (np.abs(ahead) <= length / 2) & (np.abs(aside) <= width / 2) & (np.abs(here[:, 2]) <= height / 2)
+        inside[row] = np.count_nonzero(within)
+    return inside, near / (np.pi * NEIGHBOURHOOD**2)

@@ -1,0 +1,127 @@
+"""Which detection found which road user of its frame.
+
+The rule: detections take turns, the best score first (of equal scores the one
+that overlaps its road user most). Each takes, of the road users that count and
+that none has taken, the one it overlaps most, if the overlap exceeds the
+threshold. One that finds none of these, but overlaps a road user that does not
+count, or has its middle outside the region, is not judged. All others are false.
+
+This is the rule of PASCAL VOC (Everingham et al. 2010) and COCO (Lin et al.
+2014); the two differ where road users overlap each other alone. Road users
+count that are of the categories asked for, have their middle in the region and
+return enough points. All others neither count nor punish, as the neighbouring
+classes of KITTI (Geiger et al. 2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from seip_addon.core.arrays import Boolean, Float, Integer
+
+from .frame_results import FrameResult
+from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
+
+VEHICLES = ("car", "van", "truck", "bus")
+"""Categories whose average precision the study compares."""
+
+NOBODY = -1
+"""Whom a detection found that found none, and by which a road user was found that none found."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What is to be found, and what finding is.
+
+    Parameters
+    ----------
+    iou : float, 0 to 1
+        Intersection over union that a detection has to exceed.
+    in_space : bool
+        Whether boxes have to agree in height as well; in plan otherwise.
+    categories : tuple of str
+        Of the road users that count and of the detections that are judged.
+    fewest_points : int
+        Returns from a road user below which it does not count; 0 counts those that no sensor sees as well.
+    """
+
+    iou: float = 0.7
+    in_space: bool = False
+    categories: tuple[str, ...] = VEHICLES
+    fewest_points: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Who found whom in one frame; g road users, k detections.
+
+    Parameters
+    ----------
+    counted : (g,) bool
+        Whether the road user is one that had to be found.
+    found_by : (g,) int64
+        The detection that found it, `NOBODY` where none did.
+    found : (k,) int64
+        The road user that each detection found, `NOBODY` where it found none that counts.
+    judged : (k,) bool
+        Whether it is a hit or false; the rest neither helps nor harms.
+    """
+
+    counted: Boolean
+    found_by: Integer
+    found: Integer
+    judged: Boolean
+
+    @property
+    def hit(self) -> Boolean:
+        """Whether each detection found a road user that counts, (k,) bool."""
+        hit: Boolean = self.found != NOBODY
+        return hit
+
+    def of_found(self, of_truth: NDArray[Any], own: NDArray[Any]) -> NDArray[Any]:
+        """Return for each detection a quantity of the road user that it found; its own where it found none."""
+        values = own.copy()
+        values[self.hit] = of_truth[self.found[self.hit]]
+        return values
+
+
+def match(frame: FrameResult, rule: Rule) -> Match:
+    """Return who found whom."""
+    truth, detected = frame.truth, frame.detected
+    counted = must_be_found(frame, rule)
+    overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
+    best = overlap.max(axis=1, initial=0.0)
+    found_by, found = np.full(len(truth), NOBODY), np.full(len(detected), NOBODY)
+    for row in np.lexsort((-best, -detected.score)):
+        if best[row] <= rule.iou:
+            continue
+        free = np.where(counted & (found_by == NOBODY), overlap[row], 0.0)
+        if free.max() > rule.iou:
+            found[row] = free.argmax()
+            found_by[found[row]] = row
+    excused = (overlap[:, ~counted] > rule.iou).any(axis=1) | ~detected.inside
+    return Match(counted, found_by, found, (found != NOBODY) | (of_its_kind(frame, rule) & ~excused))
+
+
+def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:
+    """Return which road users count, (g,) bool."""
+    truth = frame.truth
+    counts: Boolean = np.isin(truth.category, rule.categories) & truth.inside & (truth.points >= rule.fewest_points)
+    return counts
+
+
+def of_its_kind(frame: FrameResult, rule: Rule) -> Boolean:
+    """Return which detections are of the categories asked for, (k,) bool."""
+    return np.isin(frame.detected.category, rule.categories)
+
+
+def overlaps(frame: FrameResult, rule: Rule) -> Float:
+    """Return the intersection over union of each detection with each road user, (k, g) float64."""
+    detected, truth = torch.from_numpy(frame.detected.boxes), torch.from_numpy(frame.truth.boxes)
+    found = iou_matrix_3d(detected, truth) if rule.in_space else iou_matrix(in_plan(detected), in_plan(truth))
+    return np.asarray(found.numpy(), dtype=np.float64)
