@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import pickle
+import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -112,7 +113,7 @@ def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
     """Write plain values and tensors."""
     with whole_file(path) as temporary, temporary.open("wb") as file:
         # To an open file: a name would go into the bytes.
-        torch.save({"schema": SCHEMA, "version": VERSION, **state}, file)
+        torch.save(_shared_text({"schema": SCHEMA, "version": VERSION, **state}), file)
 
 
 def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -143,6 +144,17 @@ def _fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except damage as error:
         raise SeipError(f"{path} is no detector, or is damaged; train it again") from error
+
+
+def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
+    """Return a value in which equal texts are one object, which pickle writes once: so equal values give equal bytes."""
+    if isinstance(value, str):
+        return sys.intern(value)
+    if isinstance(value, dict):
+        return {_shared_text(key): _shared_text(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_shared_text(part) for part in value]
+    return value
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:

@@ -8,10 +8,10 @@ SIZES = {"car": (4.4, 1.8, 1.5), "truck": (9.0, 2.5, 3.4), "bicycle": (1.8, 0.6,
 SENSORS = np.array([[16.0, 16.0, 5.0], [-16.0, -16.0, 5.0]])
 
 
-def street_frame(seed, *, half=16.0, users=6, rays=6000, time=0.0):
+def street_frame(seed, *, half=16.0, users=6, rays=6000, time=0.0, kinds=tuple(SIZES)):
     """Return a frame of a square of 2 · half metres, seen by two sensors at its corners."""
     random = np.random.default_rng(seed)
-    boxes, names = _parked(random, half, users)
+    boxes, names = _parked(random, half, users, kinds)
     clouds = [_ground(random, half, rays)]
     instances = [np.full(len(clouds[0]), STATIC)]
     for number, box in enumerate(boxes):
@@ -44,12 +44,12 @@ def street_frame(seed, *, half=16.0, users=6, rays=6000, time=0.0):
     )
 
 
-def _parked(random, half, count):
+def _parked(random, half, count, kinds):
     boxes, names = np.zeros((0, 7)), []
     for _ in range(1000):
         if len(boxes) == count:
             break
-        name = str(random.choice(list(SIZES), p=[0.7, 0.1, 0.1, 0.1]))
+        name = str(random.choice(kinds))
         length, width, height = np.array(SIZES[name]) * random.uniform(0.9, 1.1)
         x, y = random.uniform(-half + 4, half - 4, 2)
         apart = np.hypot(boxes[:, 0] - x, boxes[:, 1] - y)
