@@ -92,12 +92,13 @@ def _thresholds(scores: Float, wanted: int) -> list[float]:
     """Return the scores at which recall is nearest to 0, 1/40, 2/40 and so on."""
     ordered = np.sort(scores)[::-1].tolist()
     thresholds: list[float] = []
+    recall = 0.0
     for place, score in enumerate(ordered):
-        recall = len(thresholds) / (POINTS - 1)
         is_last = place == len(ordered) - 1
         here, beyond = (place + 1) / wanted, (place + 2) / wanted
         if is_last or beyond - recall >= recall - here:
             thresholds.append(score)
+            recall += 1 / (POINTS - 1)  # summed up as KITTI does, for ties fall by its rounding
     return thresholds
 
 

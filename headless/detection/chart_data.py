@@ -1,0 +1,102 @@
+"""What the charts of detection draw, from what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.pictures.detection_charts import Cell, Curve, Parts
+from seip_addon.core.pictures.error_view import ErrorView
+
+from .average_precision import Evaluation, precision_recall
+from .breakdown import Bin
+from .claims import Trial
+from .frame_results import FrameResult
+from .intervals import mean_interval
+from .matching import NOBODY, Rule, match
+
+IN_PLAN = [0, 1, 3, 4, 6]
+
+
+def cells(trials: Sequence[Trial]) -> tuple[Cell, ...]:
+    """Return each type and number of sensors with the average precision of all its seeds."""
+    grouped: dict[tuple[str, int], list[Trial]] = {}
+    for trial in trials:
+        grouped.setdefault((trial.sensor, trial.count), []).append(trial)
+    made = []
+    for (sensor, count), own in grouped.items():
+        values = tuple(trial.average_precision for trial in own)
+        interval = mean_interval(values) if len(values) > 1 else None
+        made.append(Cell(sensor, count, own[0].price, own[0].coverage, values, interval))
+    return tuple(made)
+
+
+def curve(sensor: str, count: int, evaluation: Evaluation) -> Curve:
+    """Return precision and recall of one type and number of sensors."""
+    found = precision_recall(evaluation)
+    return Curve(sensor, count, found.recall, found.precision, evaluation.average_precision)
+
+
+def parts(what: str, figure: str, lines: Mapping[str, Sequence[Bin]]) -> Parts:
+    """Return a figure in parts, one line for each name.
+
+    Parameters
+    ----------
+    what, figure : str
+        As in `Parts`.
+    lines : mapping of str to sequence of Bin
+        With the same edges; road users are drawn as the first has them.
+    """
+    first = next(iter(lines.values()), ())
+    wanted = tuple(one.wanted for one in first)
+    return Parts(
+        what=what,
+        figure=figure,
+        edges=(*(one.low for one in first), *(one.high for one in first[-1:])),
+        lines={name: tuple(one.value for one in bins) for name, bins in lines.items()},
+        road_users=wanted if any(wanted) else (),
+    )
+
+
+def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
+    name: str,
+    frame: FrameResult,
+    rule: Rule,
+    *,
+    score: float,
+    cloud: NDArray[np.float32],
+    region: BaseGeometry,
+    sensors: Float,
+) -> ErrorView:
+    """Return a frame with the detections of at least some score, and what of them is wrong.
+
+    Parameters
+    ----------
+    name : str
+    frame : FrameResult
+    rule : Rule
+    score : float
+    cloud : (n, 3) float32, metres
+    region : shapely geometry
+    sensors : (s, 3) float64, metres
+    """
+    kept = frame.detected.score >= score
+    columns = {column: values[kept] for column, values in vars(frame.detected).items()}
+    shown = replace(frame, detected=replace(frame.detected, **columns))
+    found = match(shown, rule)
+    return ErrorView(
+        name=name,
+        cloud=cloud[:, :2].astype(np.float64),
+        region=region,
+        sensors=sensors[:, :2],
+        truth=frame.truth.boxes[:, IN_PLAN],
+        wanted=found.counted,
+        missed=found.counted & (found.found_by == NOBODY),
+        detected=shown.detected.boxes[:, IN_PLAN],
+        false=found.judged & ~found.hit,
+    )

@@ -1,0 +1,401 @@
+"""Average precision by hand, against another's evaluation, and by what must hold whatever is detected."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from told_frames import SIZES, box, detected, frame, traffic, truth
+
+pytest.importorskip("torch", reason="the detector's torch is optional")
+
+from headless.detection.average_precision import (
+    average_precision_interval,
+    balanced_score,
+    evaluate,
+    precision_recall,
+)
+from headless.detection.kitti import kitti
+from headless.detection.matching import NOBODY, VEHICLES, Rule, match
+
+from seip_addon.core.errors import SeipError
+
+AT_07 = Rule()
+FAR = 500.0  # where nobody is
+
+
+def average_precision(frames, rule=AT_07):
+    return evaluate(frames, rule).average_precision
+
+
+# Worked examples ------------------------------------------------------------------------------------------------
+
+
+def test_example_with_one_missed_and_two_false():
+    """Three cars; by score: found 0.9, false 0.8, found 0.7, false 0.6. The third car is missed.
+
+    Precision after each 1/1, 1/2, 2/3, 2/4; recall 1/3, 1/3, 2/3, 2/3. The best precision at recall 1/3 is 1, at 2/3
+    it is 2/3, beyond there is none: 1/3 · 1 + 1/3 · 2/3 + 1/3 · 0 = 5/9.
+    """
+    told = frame(
+        truth([box(0), box(20), box(40)]), detected([box(0), box(FAR), box(20), box(-FAR)], [0.9, 0.8, 0.7, 0.6])
+    )
+    evaluation = evaluate([told], AT_07)
+    assert evaluation.average_precision == pytest.approx(5 / 9, abs=1e-15)
+    curve = precision_recall(evaluation)
+    assert curve.precision.tolist() == pytest.approx([1, 1 / 2, 2 / 3, 2 / 4])
+    assert curve.recall.tolist() == pytest.approx([1 / 3, 1 / 3, 2 / 3, 2 / 3])
+    assert evaluation.wanted.score.tolist() == [0.9, 0.7, -math.inf]
+    # F1 is 2/4, 2/5, 4/6 and 4/7 (twice the hits over detections plus road users): the third is best.
+    assert balanced_score(evaluation) == 0.7
+
+
+def test_scores_are_sorted_over_all_frames():
+    """One car in each of two frames; a false detection of the second scores between the hits.
+
+    Precision 1/1, 1/2, 2/3 at recall 1/2, 1/2, 1: 1/2 · 1 + 1/2 · 2/3 = 5/6. Frame by frame it would be 1 and 1/2.
+    """
+    first = frame(truth([box(0)]), detected([box(0)], [0.5]))
+    second = frame(truth([box(0)]), detected([box(0), box(FAR)], [0.9, 0.7]))
+    assert average_precision([first, second]) == pytest.approx(5 / 6, abs=1e-15)
+
+
+def test_precision_rises_again_with_later_hits():
+    """False 0.9, then three hits of three cars: precision 0, 1/2, 2/3, 3/4, of which 3/4 is the best everywhere."""
+    boxes = [box(0), box(20), box(40)]
+    told = frame(truth(boxes), detected([box(FAR), *boxes], [0.9, 0.8, 0.7, 0.6]))
+    assert average_precision([told]) == pytest.approx(3 / 4, abs=1e-15)
+
+
+def test_equal_scores_are_one_point_of_the_curve():
+    """A hit and a false detection of equal score, in whatever order: precision 1/2 at recall 1."""
+    for boxes in ([box(0), box(FAR)], [box(FAR), box(0)]):
+        assert average_precision([frame(truth([box(0)]), detected(boxes, [0.5, 0.5]))]) == 0.5
+
+
+def test_a_car_is_found_once():
+    """Two good detections of one car: the second is false, the first gives recall 1 at precision 1."""
+    told = frame(truth([box(0)]), detected([box(0.1), box(0)], [0.9, 0.8]))
+    found = match(told, AT_07)
+    assert found.hit.tolist() == [True, False]
+    assert found.judged.tolist() == [True, True]
+    assert found.found_by.tolist() == [0]
+    assert average_precision([told]) == 1
+
+
+def test_the_better_overlap_goes_first_among_equal_scores():
+    told = frame(truth([box(0)]), detected([box(0.3), box(0)], [0.8, 0.8]))
+    assert match(told, AT_07).hit.tolist() == [False, True]
+
+
+def test_overlap_decides():
+    """Shifted by d along its 4.5 m, a car shares (4.5 − d)/(4.5 + d): 0.7 at d = 0.794, 0.5 at d = 1.5."""
+    for shift, found, loosely in ((0.79, True, True), (0.80, False, True), (1.49, False, True), (1.51, False, False)):
+        told = frame(truth([box(0)]), detected([box(shift)], [0.9]))
+        assert match(told, AT_07).hit.tolist() == [found]
+        assert match(told, Rule(iou=0.5)).hit.tolist() == [loosely]
+
+
+def test_overlap_in_space_takes_height_into_account():
+    raised = np.array(box(0))
+    raised[2] += 0.3  # shares 1.2/1.8 in height: 0.667
+    told = frame(truth([box(0)]), detected([raised], [0.9]))
+    assert match(told, AT_07).hit.tolist() == [True]
+    assert match(told, Rule(in_space=True)).hit.tolist() == [False]
+    assert match(told, Rule(in_space=True, iou=0.66)).hit.tolist() == [True]
+
+
+def test_who_does_not_count_neither_helps_nor_harms():
+    """Outside the region, without returns, or of another category: found or not, nothing changes."""
+    boxes = [box(0), box(20), box(40), box(60)]
+    there = truth(
+        boxes,
+        category=["car", "car", "car", "pedestrian"],
+        points=[9, 9, 0, 9],
+        inside=[True, False, True, True],
+    )
+    rule = replace(AT_07, fewest_points=1)
+    for rows in ([0], [0, 1], [0, 1, 2, 3]):
+        told = frame(there, detected([boxes[row] for row in rows], np.linspace(0.5, 0.9, len(rows))))
+        assert average_precision([told], rule) == 1
+        assert match(told, rule).judged.tolist() == [True] + [False] * (len(rows) - 1)
+    assert len(evaluate([frame(there, detected([], []))], AT_07).wanted) == 2  # the car without returns counts here
+
+
+def test_false_detections_outside_the_region_do_not_count_but_hits_do():
+    """The region ends at x = 0: a car just inside, found just outside, is found; what else lies outside is let be."""
+    told = frame(truth([box(0)]), detected([box(0.1), box(FAR)], [0.8, 0.9], inside=False))
+    assert match(told, AT_07).judged.tolist() == [True, False]
+    assert average_precision([told]) == 1
+
+
+def test_detections_of_other_kinds_are_let_be():
+    told = frame(
+        truth([box(0, size=SIZES["truck"])], category="truck"),
+        detected([box(0, size=SIZES["truck"]), box(FAR)], [0.8, 0.9], category=["car", "pedestrian"]),
+    )
+    assert average_precision([told]) == 1  # a truck taken for a car is a vehicle that was found
+    assert average_precision([told], replace(AT_07, categories=("truck",))) == 0  # but not as a truck
+
+
+def test_the_free_car_is_taken_where_two_overlap_enough():
+    """Two cars 1 m apart overlap (3.5/5.5 = 0.64); both detections lie nearest to the first."""
+    told = frame(truth([box(0), box(1.0)]), detected([box(0), box(0.4)], [0.9, 0.8]))
+    found = match(told, Rule(iou=0.5))
+    assert found.found.tolist() == [0, 1]
+    assert found.found_by.tolist() == [0, 1]
+
+
+def test_frames_without_vehicles_or_detections():
+    nothing = frame(truth([]), detected([], []))
+    false = frame(truth([]), detected([box(0)], [0.9]))
+    missed = frame(truth([box(0)]), detected([], []))
+    assert match(missed, AT_07).found_by.tolist() == [NOBODY]
+    assert average_precision([nothing, missed]) == 0
+    assert average_precision([false, frame(truth([box(0)]), detected([box(0)], [0.5]))]) == 0.5
+    assert balanced_score(evaluate([missed], AT_07)) == 0
+    for frames in ([], [nothing], [nothing, false]):
+        with pytest.raises(SeipError, match=f"none of {len(frames)} frames has a car or van or truck or bus"):
+            evaluate(frames, AT_07)
+
+
+# Another's evaluation ---------------------------------------------------------------------------------------------
+
+
+def records(frames, *, is_truth):
+    for number, told in enumerate(frames):
+        boxes = told.truth.boxes if is_truth else told.detected.boxes
+        for row, (x, y, z, length, width, height, yaw) in enumerate(boxes.tolist()):
+            record = {
+                "sample_token": str(number),
+                "translation": [x, y, z],
+                "size": [width, length, height],
+                # It reads sin(yaw) from the place where the matrix has its negative.
+                "rotation": [math.cos(-yaw / 2), 0.0, 0.0, math.sin(-yaw / 2)],
+                "name": "car",
+            }
+            yield record if is_truth else record | {"score": float(told.detected.score[row])}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("iou", [0.5, 0.7])
+def test_agrees_with_the_lyft_kit(iou):
+    """Lyft's kit judges in space; its cars stand apart, where its rule and ours are the same."""
+    kit = pytest.importorskip(
+        "lyft_dataset_sdk.eval.detection.mAP_evaluation",
+        reason="pip install --no-deps --group second-opinion",
+    )
+    for seed in range(3):
+        frames = traffic(seed, frames=40)
+        theirs = kit.get_average_precisions(
+            list(records(frames, is_truth=True)), list(records(frames, is_truth=False)), ["car"], iou
+        )[0]
+        ours = average_precision(frames, Rule(iou=iou, in_space=True))
+        assert 0.05 < ours < 0.95
+        assert ours == pytest.approx(theirs, abs=1e-6)
+
+
+# Properties -------------------------------------------------------------------------------------------------------
+
+
+def test_perfect_detection_scores_one():
+    told = [
+        replace(one, detected=detected(one.truth.boxes, np.linspace(0.2, 0.9, len(one.truth)))) for one in traffic(1)
+    ]
+    for rule in (AT_07, Rule(iou=0.99), Rule(iou=0.99, in_space=True)):
+        assert average_precision(told, rule) == 1
+    assert kitti(told, AT_07).ap40 == pytest.approx(1)
+    assert kitti(told, AT_07).ap11 == pytest.approx(1)
+
+
+seeds = st.integers(0, 2**31)
+
+
+def small(seed):
+    return traffic(seed, frames=4, cars=6)
+
+
+@settings(deadline=None)
+@given(seeds, st.data())
+def test_removing_a_false_detection_never_harms(seed, data):
+    frames = small(seed)
+    before = average_precision(frames)
+    false = [
+        (number, row) for number, told in enumerate(frames) for row in np.nonzero(~match(told, AT_07).hit)[0].tolist()
+    ]
+    if not false:
+        return
+    number, row = data.draw(st.sampled_from(false))
+    frames[number] = replace(
+        frames[number],
+        detected=replace(
+            frames[number].detected,
+            **{name: np.delete(value, row, axis=0) for name, value in vars(frames[number].detected).items()},
+        ),
+    )
+    assert average_precision(frames) >= before - 1e-12
+
+
+@settings(deadline=None)
+@given(seeds, seeds)
+def test_the_order_does_not_matter(seed, shuffle):
+    frames, rng = small(seed), np.random.default_rng(shuffle)
+    frames = [replace(told, detected=replace(told.detected, score=np.round(told.detected.score, 1))) for told in frames]
+    mixed = [
+        replace(
+            frames[number],
+            truth=shuffled(frames[number].truth, rng),
+            detected=shuffled(frames[number].detected, rng),
+        )
+        for number in rng.permutation(len(frames))
+    ]
+    assert average_precision(mixed) == pytest.approx(average_precision(frames), abs=1e-12)
+
+
+def shuffled(table, rng):
+    order = rng.permutation(len(table))
+    return replace(table, **{name: value[order] for name, value in vars(table).items()})
+
+
+@settings(deadline=None)
+@given(seeds, st.floats(-7, 7), st.floats(-200, 200), st.floats(-200, 200))
+def test_moving_the_world_does_not_matter(seed, turn, east, north):
+    frames = small(seed)
+    moved = [
+        replace(
+            told,
+            truth=replace(told.truth, boxes=carried(told.truth.boxes, turn, east, north)),
+            detected=replace(told.detected, boxes=carried(told.detected.boxes, turn, east, north)),
+        )
+        for told in frames
+    ]
+    for rule in (AT_07, Rule(in_space=True)):
+        assert average_precision(moved, rule) == pytest.approx(average_precision(frames, rule), abs=1e-12)
+    assert kitti(moved, AT_07).ap40 == pytest.approx(kitti(frames, AT_07).ap40, abs=1e-12)
+
+
+def carried(boxes, turn, east, north):
+    x, y, z, *size, yaw = boxes.T
+    cosine, sine = math.cos(turn), math.sin(turn)
+    return np.column_stack([cosine * x - sine * y + east, sine * x + cosine * y + north, z, *size, yaw + turn])
+
+
+@settings(deadline=None)
+@given(seeds)
+def test_a_lower_bar_finds_no_less(seed):
+    frames = small(seed)
+    recall = [np.isfinite(evaluate(frames, Rule(iou=iou)).wanted.score).mean() for iou in (0.3, 0.5, 0.7, 0.9)]
+    assert recall == sorted(recall, reverse=True)
+
+
+# Its interval -----------------------------------------------------------------------------------------------------
+
+
+def test_interval_holds_the_estimate_and_repeats():
+    evaluation = evaluate(traffic(3, frames=120, seconds=2.0), AT_07)
+    low, high = average_precision_interval(evaluation, seed=0)
+    assert low < evaluation.average_precision < high
+    assert 0.01 < high - low < 0.2
+    assert average_precision_interval(evaluation, seed=0) == (low, high)
+    assert average_precision_interval(evaluation, seed=1) != (low, high)
+
+
+def test_repeated_frames_give_no_certainty():
+    """Each frame 20 times within a block: as sure as with one of them, and not √20 times as sure."""
+    once = traffic(4, frames=30, seconds=10.0)
+    often = [replace(told, time=told.time + 0.5 * step) for told in once for step in range(20)]
+    single, repeated = (average_precision_interval(evaluate(frames, AT_07), seed=0) for frames in (once, often))
+    assert np.diff(repeated) == pytest.approx(np.diff(single), rel=0.15)
+
+
+def test_interval_is_that_of_the_plain_bootstrap():
+    """Blocks drawn and judged again, one by one."""
+    frames = traffic(5, frames=12, seconds=10.0)
+    rng = np.random.default_rng(1)
+    plain = [
+        average_precision([frames[row] for row in rng.integers(len(frames), size=len(frames))]) for _ in range(300)
+    ]
+    low, high = average_precision_interval(evaluate(frames, AT_07), seed=0)
+    assert (low, high) == pytest.approx(np.quantile(plain, [0.025, 0.975]), abs=0.02)
+
+
+def test_runs_are_blocks_apart():
+    frames = [told for number in range(6) for told in traffic(number, frames=3, seconds=1.0, run=f"run {number}")]
+    assert len(set(evaluate(frames, AT_07).block.tolist())) == 6
+    assert average_precision_interval(evaluate(frames, AT_07), seed=0) is not None
+
+
+def test_too_few_blocks_give_no_interval():
+    assert average_precision_interval(evaluate(traffic(6, frames=20, seconds=1.0), AT_07), seed=0) is None
+
+
+# KITTI ------------------------------------------------------------------------------------------------------------
+
+
+def test_kitti_by_hand():
+    """Five cars in five frames; found with 0.9, 0.8, 0.7, 0.6, the fifth missed; false at 0.85 and 0.65.
+
+    Recall after each hit is 1/5, 2/5, 3/5, 4/5. A hit's score becomes a threshold unless the next hit's recall is
+    nearer to the recall due, which rises by 1/40 from 0 with each threshold: at the first hit 0 is due, and 1/5 is
+    nearer than 2/5. So each of the four becomes a threshold, and no other: with precisions 1/1, 2/3, 3/4 and 4/6 at
+    0.9, 0.8, 0.7 and 0.6. The best from each on: 1, 3/4, 3/4, 2/3, then nothing up to the 41st.
+    AP40 = (3/4 + 3/4 + 2/3)/40; AP11, from the 1st, 5th, 9th and so on, 1/11.
+    """
+    score = [0.9, 0.8, 0.7, 0.6]
+    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
+    frames.append(frame(truth([box(0)]), detected([box(FAR), box(-FAR)], [0.85, 0.65])))
+    figures = kitti(frames, AT_07)
+    assert figures.ap40 == pytest.approx((3 / 4 + 3 / 4 + 2 / 3) / 40, abs=1e-15)
+    assert figures.ap11 == pytest.approx(1 / 11, abs=1e-15)
+
+
+def test_kitti_takes_the_nearest_of_many_recalls():
+    """Eighty cars, all found: recall rises by 1/80, so that every other hit becomes a threshold.
+
+    The first (recall 1/80, 0 due) stands; 1/40 is due next and hit 2 has it; then 4, 6 … 80: 41 thresholds. The false
+    detection scores between hits 40 and 41, so that precision is 1 down to hit 40 and at last 80/81, its best.
+    Thresholds at hits 1, 2, 4 … 40 are 21, and 20 lie below: AP40 = (20 · 1 + 20 · 80/81)/40. AP11 takes
+    thresholds 1, 5 … 41, of which six are up to 21: (6 + 5 · 80/81)/11.
+    """
+    score = np.linspace(0.99, 0.2, 80)
+    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
+    frames.append(frame(truth([]), detected([box(0)], [(score[39] + score[40]) / 2])))
+    figures = kitti(frames, AT_07)
+    assert figures.ap40 == pytest.approx((20 + 20 * 80 / 81) / 40, abs=1e-15)
+    assert figures.ap11 == pytest.approx((6 + 5 * 80 / 81) / 11, abs=1e-15)
+    assert average_precision(frames) == pytest.approx((40 + 40 * 80 / 81) / 80, abs=1e-15)
+
+
+def test_kitti_takes_the_nearer_of_two_recalls():
+    """Forty-seven cars, all found: 1/5 is due after eight thresholds, and 9/47 = 0.191 is nearer than 10/47 = 0.213.
+
+    A false detection scores between hits 9 and 10. Nine thresholds lie before it, 32 after, whose best precision is
+    the last: AP40 = (8 + 32 · 47/48)/40.
+    """
+    score = np.linspace(0.99, 0.2, 47)
+    frames = [frame(truth([box(0)]), detected([box(0)], [value])) for value in score]
+    frames.append(frame(truth([]), detected([box(0)], [(score[8] + score[9]) / 2])))
+    assert kitti(frames, AT_07).ap40 == pytest.approx((8 + 32 * 47 / 48) / 40, abs=1e-15)
+
+
+def test_kitti_lets_be_who_does_not_count():
+    """Of each frame's five detections one is a hit, one is false, and three are let be: precision 1/2."""
+    boxes = [box(0), box(20), box(40)]
+    there = truth(boxes, category=["car", "pedestrian", "car"], inside=[True, True, False])
+    inside = [True, True, False, False, True]
+    told = [frame(there, detected([*boxes, box(FAR), box(-FAR)], [0.5, 0.9, 0.8, 0.95, 0.7], inside=inside))] * 50
+    assert kitti(told, AT_07).ap40 == pytest.approx(1 / 2)
+
+
+def test_kitti_is_near_the_interpolated_average():
+    frames = traffic(7, frames=60)
+    figures, plain = kitti(frames, AT_07), average_precision(frames)
+    assert figures.ap40 != plain
+    assert figures.ap40 == pytest.approx(plain, abs=0.04)
+    assert figures.ap11 == pytest.approx(plain, abs=0.08)
+
+
+def test_vehicles_are_what_the_study_compares():
+    assert Rule(iou=0.7, in_space=False, categories=VEHICLES, fewest_points=0) == AT_07

@@ -1,0 +1,116 @@
+"""Where detection fails, on frames that are told."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from told_frames import SIZES, box, detected, frame, traffic, truth
+
+pytest.importorskip("torch", reason="the detector's torch is optional")
+
+from headless.detection.average_precision import evaluate
+from headless.detection.breakdown import (
+    ALONG_DISTANCE,
+    average_precision_by,
+    evaluate_by_class,
+    false_by,
+    false_positives,
+    recall_by,
+)
+from headless.detection.matching import Rule
+
+AT_07 = Rule()
+
+
+def told():
+    """Near: found, found; one false at 0.8. Far: found at 0.5, missed, one false at 0.7."""
+    there = truth(
+        [box(0), box(20), box(40), box(60)],
+        distance=[5, 15, 45, 55],
+        points=[300, 200, 30, 0],
+        visibility=[1.0, 0.9, 0.4, 0.0],
+    )
+    found = detected(
+        [box(0), box(20), box(40), box(200), box(300)],
+        [0.9, 0.6, 0.5, 0.8, 0.7],
+        distance=[6, 14, 39, 10, 50],
+        points=[300, 200, 30, 7, 2],
+        density=[40, 30, 8, 10, 0.5],
+    )
+    return frame(there, found)
+
+
+def values(bins):
+    return [None if math.isnan(one.value) else pytest.approx(one.value) for one in bins]
+
+
+def test_average_precision_by_distance():
+    """Near: hit, false, hit of two: 1/2 · 1 + 1/2 · 2/3. Far: false, hit of two: 1/2 · 1/2. The box of the far hit
+    lies at 39 m, but the car it found at 45 m."""
+    bins = average_precision_by(evaluate([told()], AT_07), "distance", (0, 40, 60, 100))
+    assert [(one.low, one.high, one.wanted) for one in bins] == [(0, 40, 2), (40, 60, 2), (60, 100, 0)]
+    assert values(bins) == [5 / 6, 1 / 4, None]
+
+
+def test_average_precision_by_returns():
+    """Up to 100 returns: false 0.8 with 7 returns, false 0.7 with 2, hit 0.5 of two: 1/2 · 1/3; the rest is perfect."""
+    bins = average_precision_by(evaluate([told()], AT_07), "points", (0, 100, math.inf))
+    assert values(bins) == [1 / 6, 1]
+
+
+def test_the_parts_hold_everything():
+    evaluation = evaluate(traffic(1), AT_07)
+    bins = average_precision_by(evaluation, "distance", ALONG_DISTANCE)
+    assert sum(one.wanted for one in bins) == len(evaluation.wanted)
+    whole = average_precision_by(evaluation, "distance", (0, math.inf))
+    assert whole[0].value == evaluation.average_precision
+
+
+def test_recall_by_visibility_at_a_score():
+    evaluation = evaluate([told()], AT_07)
+    assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.1)) == [1 / 2, 1, 1]
+    assert values(recall_by(evaluation, "visibility", (0, 0.5, 0.95, 2), 0.6)) == [0, 1, 1]
+    assert values(recall_by(evaluation, "visibility", (2, 3), 0.1)) == [None]
+
+
+def test_false_detections_by_density_and_distance():
+    evaluation = evaluate([told(), told()], AT_07)
+    assert values(false_by(evaluation, "density", (0, 1, 20), 0.1)) == [1, 1]
+    assert values(false_by(evaluation, "density", (0, 1, 20), 0.75)) == [0, 1]
+    assert values(false_by(evaluation, "distance", (0, 20, 60), 0.1)) == [1, 1]
+
+
+def test_false_positives_and_how_many_are_in_sparse_places():
+    """Around half of the hits the density is under 30: both false ones are in sparser places."""
+    evaluation = evaluate([told()], AT_07)
+    found = false_positives(evaluation, 0.1)
+    assert (found.per_frame, found.sparse) == (2, 1)
+    # From 0.9 on there is one hit with density 40, and nothing is false.
+    found = false_positives(evaluation, 0.9)
+    assert found.per_frame == 0
+    assert math.isnan(found.sparse)
+
+
+def test_density_that_says_nothing_gives_a_half():
+    frames = traffic(2, frames=200)
+    assert false_positives(evaluate(frames, AT_07), 0.2).sparse == pytest.approx(0.5, abs=0.06)
+
+
+def test_each_class_alone():
+    """The truck is found as a truck and, beside it, taken for a car, which neither counts nor punishes."""
+    truck = box(40, size=SIZES["truck"])
+    there = truth([box(0), box(20), truck], category=["car", "van", "truck"])
+    found = detected([box(0), truck, truck], [0.9, 0.8, 0.7], category=["car", "car", "truck"])
+    classes = (("car", "van"), ("truck", "bus"), ("pedestrian",))
+    by_class = evaluate_by_class([frame(there, found)], AT_07, classes)
+    assert {members: one.average_precision for members, one in by_class.items()} == {
+        ("car", "van"): 0.5,
+        ("truck", "bus"): 1.0,
+    }
+    assert np.array_equal(by_class["car", "van"].wanted.category, ["car", "van"])
+
+
+def test_a_class_without_enough_returns_is_left_out():
+    there = replace(truth([box(0)]), points=np.array([3]))
+    assert evaluate_by_class([frame(there, detected([], []))], replace(AT_07, fewest_points=4), (("car",),)) == {}

@@ -1,0 +1,100 @@
+"""What a frame's detections are set beside, counted by hand."""
+
+import math
+
+from headless.detection.detections import Detections
+from headless.detection.frame_results import NEIGHBOURHOOD, frame_result
+
+import numpy as np
+import pytest
+import shapely
+
+from seip_addon.core.scans.frame import Frame, Labels
+
+CLASSES = (("car", "van"), ("truck", "bus"))
+REGION = shapely.box(-20, -20, 20, 20)
+SENSORS = np.array([[0.0, 0.0, 6.0], [30.0, 0.0, 6.0]])
+
+
+def simulated(points):
+    labels = Labels(
+        user=np.array([0, 1]),
+        category=np.array(["van", "bus"]),
+        centre=np.array([[3.0, 4.0, 6.0], [30.0, 8.0, 0.0]]),
+        size=np.array([[5.0, 2.0, 2.2], [12.0, 2.5, 3.0]]),
+        yaw=np.array([0.5, -2.0]),
+        pitch=np.zeros(2),
+        speed=np.zeros(2),
+        points=np.array([[3, 4], [0, 0]]),
+        visibility=np.array([0.5, 0.0]),
+        inside=np.array([True, False]),
+    )
+    count = len(points)
+    return Frame(
+        time=1.5,
+        points=np.array(points, dtype=np.float32).reshape(-1, 3),
+        sensor=np.zeros(count, dtype=np.int16),
+        delay=np.zeros(count, dtype=np.float32),
+        intensity=np.zeros(count, dtype=np.float32),
+        instance=np.full(count, -1, dtype=np.int32),
+        labels=labels,
+    )
+
+
+def result(points, boxes):
+    boxes = np.array(boxes, dtype=float).reshape(-1, 7)
+    found = Detections(boxes, np.linspace(0.1, 0.9, len(boxes)), np.arange(len(boxes)) % 2)
+    return frame_result(simulated(points), found, classes=CLASSES, region=REGION, sensors=SENSORS, run="a")
+
+
+def test_road_users_are_those_of_the_frame():
+    told = result([], [])
+    assert (told.run, told.time) == ("a", 1.5)
+    assert told.truth.boxes.tolist() == [[3, 4, 6, 5, 2, 2.2, 0.5], [30, 8, 0, 12, 2.5, 3, -2]]
+    assert told.truth.points.tolist() == [7, 0]
+    assert told.truth.distance.tolist() == [5, 10]
+    assert told.truth.inside.tolist() == [True, False]
+    assert len(told.detected) == 0
+
+
+def test_detections_get_their_class_place_and_distance():
+    told = result([[0, 0, 0]], [[3, 4, 6, 4, 2, 2, 0], [30, 8, 0, 4, 2, 2, 0]])
+    assert told.detected.category.tolist() == ["car", "truck"]
+    assert told.detected.inside.tolist() == [True, False]
+    assert told.detected.distance.tolist() == [5, 10]
+    assert told.detected.score.tolist() == [0.1, 0.9]
+
+
+def test_returns_in_and_around_a_box():
+    """A box 4 × 2 × 2 m at a right angle: 2 returns lie in it, 4 within 3 m of its middle in plan."""
+    points = [
+        [10.0, 11.9, 1.0],  # in it
+        [10.9, 10.0, 0.1],  # in it
+        [11.1, 10.0, 1.0],  # beside it
+        [10.0, 10.0, 2.5],  # above it
+        [10.0, 13.1, 1.0],  # before it, too far
+        [-10.0, 10.0, 1.0],
+    ]
+    told = result(points, [[10, 10, 1, 4, 2, 2, math.pi / 2]])
+    assert told.detected.points.tolist() == [2]
+    assert told.detected.density.tolist() == pytest.approx([4 / (math.pi * NEIGHBOURHOOD**2)])
+
+
+def test_returns_as_a_plain_search_counts_them():
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-10, 10, (3000, 3)).astype(np.float32)
+    boxes = np.column_stack([rng.uniform(-10, 10, (20, 3)), rng.uniform(1, 14, (20, 3)), rng.uniform(-7, 7, 20)])
+    told = result(points, boxes)
+    for row, (x, y, z, length, width, height, yaw) in enumerate(boxes):
+        offset = points.astype(float) - [x, y, z]
+        turned = offset @ np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+        inside = np.all(np.abs(turned) <= np.array([length, width, height]) / 2, axis=1)
+        assert told.detected.points[row] == inside.sum()
+        near = np.hypot(offset[:, 0], offset[:, 1]) <= NEIGHBOURHOOD
+        assert told.detected.density[row] == pytest.approx(near.sum() / (math.pi * NEIGHBOURHOOD**2))
+
+
+def test_an_empty_cloud_has_no_returns():
+    told = result([], [[0, 0, 1, 4, 2, 2, 0]])
+    assert told.detected.points.tolist() == [0]
+    assert told.detected.density.tolist() == [0]

@@ -1,0 +1,92 @@
+"""Intervals and rank correlation against scipy, and verdicts at their edges."""
+
+import math
+
+from headless.detection.intervals import (
+    judge_above,
+    judge_all,
+    judge_within,
+    mean_interval,
+    rank_correlation,
+    rank_correlation_interval,
+    student_quantile,
+)
+
+import numpy as np
+import pytest
+import scipy.stats
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+
+
+@pytest.mark.parametrize("freedom", [*range(1, 31), 59, 60, 1000])
+def test_student_quantiles(freedom):
+    assert student_quantile(freedom) == pytest.approx(scipy.stats.t.ppf(0.975, freedom), abs=1e-9)
+
+
+def test_mean_interval_of_three_seeds_by_hand():
+    """Mean 0.7, standard deviation 0.1, t = 4.303: ± 4.303 · 0.1/√3 = 0.248."""
+    assert mean_interval([0.6, 0.7, 0.8]) == pytest.approx((0.7 - 0.24841, 0.7 + 0.24841), abs=1e-5)
+
+
+def test_three_seeds_are_covered_nineteen_times_of_twenty():
+    rng = np.random.default_rng(1)
+    intervals = np.array([mean_interval(values) for values in rng.normal(0.5, 0.1, (2000, 3))])
+    assert ((intervals[:, 0] <= 0.5) & (intervals[:, 1] >= 0.5)).mean() == pytest.approx(0.95, abs=0.015)
+
+
+def test_one_seed_gives_no_interval():
+    with pytest.raises(SeipError, match="1 seed gives no interval"):
+        mean_interval([0.5])
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=3, max_size=20))
+def test_rank_correlation(pairs):
+    x, y = zip(*pairs, strict=True)
+    if len(set(x)) == 1 or len(set(y)) == 1:
+        assert math.isnan(rank_correlation(x, y))
+    else:
+        assert rank_correlation(x, y) == pytest.approx(scipy.stats.spearmanr(x, y).statistic, abs=1e-12)
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.integers(0, 1000))
+def test_interval_of_rank_correlation(seed):
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=12)
+    y = x + rng.normal(size=12)
+    low, high = rank_correlation_interval(x, y, seed=0)
+    assert -1 <= low <= rank_correlation(x, y) <= high <= 1
+    assert rank_correlation_interval(x, y, seed=0) == (low, high)
+    theirs = scipy.stats.bootstrap(
+        (x, y),
+        lambda a, b: scipy.stats.spearmanr(a, b).statistic,
+        paired=True,
+        vectorized=False,
+        method="percentile",
+        n_resamples=500,
+        rng=rng,
+    ).confidence_interval
+    assert (low, high) == pytest.approx(tuple(theirs), abs=0.25)
+
+
+def test_too_few_pairs_give_no_interval():
+    assert rank_correlation_interval([1, 2, 3], [1, 2, 3], seed=0) is None
+    assert rank_correlation_interval([1, 1, 1, 1], [1, 2, 3, 4], seed=0) is None
+
+
+def test_verdicts():
+    assert judge_above((0.01, 0.2)) == "holds"
+    assert judge_above((-0.2, 0.0)) == "does not hold"
+    assert judge_above((-0.01, 0.2)) == "undecided"
+    assert judge_above((0.4, 0.6), 0.5) == "undecided"
+    assert judge_within((0.1, 0.2), 0.1, 0.4) == "holds"
+    assert judge_within((0.05, 0.2), 0.1, 0.4) == "undecided"
+    assert judge_within((0.0, 0.09), 0.1, 0.4) == "does not hold"
+    assert judge_within((0.41, 0.5), 0.1, 0.4) == "does not hold"
+    assert judge_within((0.0, 0.9), 0.1, 0.4) == "undecided"
+    assert judge_all(["holds", "undecided", "holds"]) == "undecided"
+    assert judge_all(["undecided", "does not hold"]) == "does not hold"
+    assert judge_all(["holds"]) == "holds"
