@@ -33,7 +33,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
     findings, names = measure(
         read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope or Scope()
     )
-    held = bars(findings.costs, findings.runs, names)
+    held = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in held:
         session.say(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
     with session.writing(options.output):

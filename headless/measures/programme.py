@@ -14,6 +14,7 @@ from headless.measures.growth import Growth, Scaled, placement_growth, repeated,
 from headless.measures.placement import Run, compare
 from headless.measures.report import Findings
 from headless.measures.rivals import RIVALS, can_run
+from headless.measures.scans import scan_costs
 from headless.measures.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
 from headless.street_visibility import street_problem
 
@@ -23,6 +24,7 @@ from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.goal import Goal, placement_problem
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.progress import finish
+from seip_addon.core.scans import static_scene
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site, make_site
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
@@ -50,6 +52,10 @@ class Scope:
         Of the scene, in a row.
     spacings : tuple of float, metres
         Of the targets.
+    scanned_by : str
+        Type of the sensors that scan traffic.
+    frames : int
+        Of scans.
     """
 
     layout: CandidateSettings = field(default_factory=CandidateSettings)
@@ -60,6 +66,8 @@ class Scope:
     multiples: tuple[int, ...] = (1, 2, 4, 8)
     copies: tuple[int, ...] = (1, 2, 4, 8, 16)
     spacings: tuple[float, ...] = (4.0, 2.0, 1.0, 0.5)
+    scanned_by: str = "type2"
+    frames: int = 10
 
 
 def measure(
@@ -80,6 +88,8 @@ def measure(
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
     runs, names = placements(site, models, settings, time_limit, scope)
     growths = growth(geometry, settings, time_limit, scope)
+    session.say("scans of traffic")
+    scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
         "scene": site.name,
         "targets": len(site.targets),
@@ -88,11 +98,12 @@ def measure(
         "places": len(sampled_places(site, samples)),
         "sensor": layout.sensors[0],
         "count": COUNT,
+        "scanned_by": scope.scanned_by,
         "time_limit": time_limit,
         "cores": os.cpu_count(),
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
-    return Findings(setting, costs, harm, limits, runs, growths), names
+    return Findings(setting, costs, harm, limits, runs, growths, scans), names
 
 
 def placements(

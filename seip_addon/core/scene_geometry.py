@@ -14,6 +14,9 @@ from .arrays import Float
 DEFAULT_WEIGHT = 2.0
 """Of a weighted region that does not say its own."""
 
+DEFAULT_REFLECTIVITY = 0.3
+"""Of a surface that is not known to reflect otherwise."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -25,10 +28,13 @@ class Mesh:
         The object's name, for messages.
     triangles : (n, 3, 3) float64, metres
         Corners in local site axes, z up.
+    reflectivity : (n,) float64, optional
+        Share of the light (0 to 1) that each triangle scatters back; `DEFAULT_REFLECTIVITY` where not given.
     """
 
     name: str
     triangles: Float
+    reflectivity: Float | None = None
 
 
 def joined(meshes: Sequence[Mesh]) -> Float:

@@ -86,19 +86,23 @@ class ArrayFile:
         What a file holds, for messages: "visibility grid".
     remedy : str
         How to get a new one, for messages: "delete it and compute it again".
+    compressed : bool
+        Not worth its time for arrays of measurements, whose noise does not compress.
     """
 
     schema: str
     version: int
     what: str
     remedy: str
+    compressed: bool = True
 
     def save(self, path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write a header, whose values JSON knows, and arrays by their names."""
         full = {"schema": self.schema, "version": self.version, **header}
         text = json.dumps(full, ensure_ascii=False, allow_nan=False)
+        write = np.savez_compressed if self.compressed else np.savez
         with whole_file(path) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, header=np.array(text), **dict(arrays))
+            write(file, header=np.array(text), **dict(arrays))
 
     @contextmanager
     def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:

@@ -17,11 +17,12 @@ FORBIDDEN_AREAS = "SEIP Forbidden Areas"
 MANDATORY_AREAS = "SEIP Mandatory Areas"
 SENSORS = "SEIP Sensors"
 COVERAGE = "SEIP Coverage"
+TRAFFIC = "SEIP Traffic"
 
 AREAS = (REGION, CANDIDATE_AREAS, WEIGHTED_REGIONS, FORBIDDEN_AREAS, MANDATORY_AREAS)
 """Collections whose objects mean an area in plan."""
 INPUTS = (*AREAS, ROADS, GROUND, OCCLUDERS, POLES)
-"""The collections that are read; `SENSORS` and `COVERAGE` are written."""
+"""The collections that a site is read from; `SENSORS` and `COVERAGE` are written, `TRAFFIC` is either."""
 
 WEIGHT = "seip_weight"
 FORBIDDEN = "seip_forbidden"
@@ -30,7 +31,12 @@ TITLE = "seip_title"
 ORIGIN = "seip_origin"
 MAP = "seip_map"
 GEO_REFERENCE = "seip_geo_reference"
+REFLECTIVITY = "seip_reflectivity"
+SENSOR = "seip_sensor"
+LABEL = "seip_label"
 HEADER_OFFSET = "seip_header_offset"
+CATEGORY = "seip_category"
+PAINT = "seip_paint"
 
 NUMBER = re.compile(r"\.\d{3,}$")
 

@@ -1,10 +1,13 @@
-"""Sober materials for a street and its sensors: one colour each, for renders and for the viewport."""
+"""Sober materials for a street, its traffic and its sensors: one colour each, for renders and for the viewport."""
 
 from __future__ import annotations
 
 import bpy
 
+from ..core.errors import SeipError
 from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_WORDS
+from ..core.scene_geometry import DEFAULT_REFLECTIVITY
+from . import contract
 
 PREFIX = "SEIP "
 VIEWPORT_GAMMA = 0.65  # the viewport's studio light is dimmer than the sun
@@ -32,6 +35,16 @@ COLOURS = {
     "red lamp": (0.750, 0.040, 0.030),
     "amber lamp": (0.300, 0.170, 0.020),
     "green lamp": (0.020, 0.190, 0.090),
+    "tyre": (0.022, 0.022, 0.023),
+    "trim": (0.030, 0.031, 0.033),
+    "rim": (0.420, 0.425, 0.430),
+    "frame": (0.060, 0.110, 0.140),
+    "headlamp": (0.860, 0.870, 0.860),
+    "tail lamp": (0.480, 0.020, 0.015),
+    "cargo box": (0.700, 0.695, 0.670),
+    "skin": (0.560, 0.330, 0.230),
+    "hair": (0.070, 0.045, 0.030),
+    "trousers": (0.045, 0.055, 0.085),
     "bark": (0.160, 0.110, 0.075),
     "leaves": (0.105, 0.210, 0.065),
     "region veil": (0.100, 0.450, 0.900),
@@ -40,12 +53,52 @@ COLOURS = {
     "mandatory veil": (0.100, 0.700, 0.250),
     "candidate veil": (0.650, 0.650, 0.600),
 }
-"""Linear RGB of each material that the solids of `core.streetscape.street_furniture` name."""
+"""Linear RGB of each material that `core.streetscape.street_furniture` and `core.traffic.bodies` name."""
+
+PAINT_COLOURS = {
+    "black": (0.020, 0.021, 0.024),
+    "blue": (0.035, 0.085, 0.200),
+    "green": (0.045, 0.110, 0.080),
+    "red": (0.260, 0.030, 0.027),
+    "grey": (0.150, 0.155, 0.165),
+    "silver": (0.450, 0.460, 0.470),
+    "white": (0.700, 0.700, 0.685),
+}
+COLOURS |= {f"{what} {name}": colour for what in ("paint", "cloth") for name, colour in PAINT_COLOURS.items()}
+"""Of the colours that `core.traffic.bodies` names, on vehicles and on people."""
+
+REFLECTIVITY = {
+    "asphalt": 0.17,
+    "asphalt shoulder": 0.17,
+    "asphalt parking": 0.20,
+    "asphalt cycle": 0.25,
+    "median": 0.30,
+    "pavement": 0.35,
+    "kerb": 0.40,
+    "verge": 0.45,
+    "marking": 0.60,
+    "wall": 0.40,
+    "facade brick": 0.40,
+    "facade plaster": 0.60,
+    "facade sand": 0.50,
+    "facade grey": 0.40,
+    "roof": 0.25,
+    "glass": 0.05,
+    "steel": 0.40,
+    "luminaire": 0.50,
+    "signal housing": 0.08,
+    "bark": 0.30,
+    "leaves": 0.45,
+}
+"""Share of near infrared (905 nm) that each material scatters back, assumed; plants are bright there. Those not named
+have the default."""
+_OWN = {PREFIX + name: share for name, share in REFLECTIVITY.items()}
 
 VEIL_OPACITY = 0.25
 """Of areas that mean something and are not there to be seen in a render."""
 
-ROUGHNESS = {"glass": 0.15, "steel": 0.4}
+ROUGHNESS = {"glass": 0.15, "steel": 0.4, "rim": 0.35, "headlamp": 0.2, "tail lamp": 0.3}
+ROUGHNESS |= {f"paint {name}": 0.35 for name in PAINT_COLOURS}
 
 RESULT_COLOURS = {"sensor": "#f2c230", "post": INK, **dict(zip(SEEN_WORDS, SEEN_COLOURS, strict=True))}
 """Web colour of each material of a result: matt, and the same in the viewport and in the legends of pictures."""
@@ -62,6 +115,27 @@ def material(name: str) -> bpy.types.Material:
     opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
     shown = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
     return _made(name, (*COLOURS[name], 1.0), shown, roughness=ROUGHNESS.get(name, 0.9), specular=0.5)
+
+
+def reflectivity(of: bpy.types.Material | None) -> float:
+    """Return a material's ``seip_reflectivity``, else that of the material of this add-on that it is, else the default.
+
+    Raises
+    ------
+    SeipError
+        The property is no number from 0 to 1.
+    """
+    if of is None:
+        return DEFAULT_REFLECTIVITY
+    given = of.get(contract.REFLECTIVITY)
+    if given is None:
+        name = contract.NUMBER.sub("", of.name)
+        return _OWN.get(name, DEFAULT_REFLECTIVITY)
+    if isinstance(given, bool) or not isinstance(given, int | float) or not 0 <= given <= 1:
+        raise SeipError(
+            f"property {contract.REFLECTIVITY} of material {of.name!r} must be a number from 0 to 1, not {given!r}"
+        )
+    return float(given)
 
 
 def linear(colour: str) -> tuple[float, float, float, float]:

@@ -10,11 +10,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.arrays import Float
+from ..core.arrays import Boolean, Float, Integer
 from ..core.errors import SeipError
 from ..core.plan_geometry import outline
 from ..core.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
 from . import contract
+from .materials import reflectivity
 
 SHAFT_REACH = 0.5
 """Of a pole's faces those within this (metres, in plan) of its foot are its shaft: arms may rise above it."""
@@ -52,6 +53,7 @@ class _Shown:
     collections: frozenset[str]
     matrix: Float
     triangles: Float | None
+    reflectivity: Float | None
     source: bpy.types.Object
 
 
@@ -98,7 +100,7 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
     poles_with_faces = [p for p in free if contract.OCCLUDERS not in p.collections and p.triangles is not None]
     geometry = SceneGeometry(
         name=str(scene.get(contract.TITLE, scene.name)),
-        origin=_origin(scene),
+        origin=origin_of(scene),
         roads=roads,
         ground=ground,
         occluders=_meshes(free, contract.OCCLUDERS) + _meshes(poles_with_faces, contract.POLES),
@@ -129,7 +131,7 @@ def _require_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.
 
 def _shown(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[_Shown]:
     depsgraph = _depsgraph(scene)
-    faces: dict[int, Float | None] = {}
+    faces: dict[int, _Faces | None] = {}
     counts: dict[str, int] = {}
     for instance in depsgraph.object_instances:
         shown = instance.object
@@ -143,14 +145,19 @@ def _shown(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) ->
             counts[name] = counts.get(name, 0) + 1
             name = f"{name} {counts[name]}"
         if shown.type != "MESH":
-            local = _local_triangles(shown)
+            local = _local_faces(shown)
         else:  # instances and copies share one evaluated mesh
             key = shown.data.as_pointer()
             if key not in faces:
-                faces[key] = _local_triangles(shown)
+                faces[key] = _local_faces(shown)
             local = faces[key]
         matrix = np.array(instance.matrix_world, dtype=np.float64)
-        yield _Shown(name, own, found, matrix, None if local is None else _place(local, matrix, name), source)
+        if local is None:
+            yield _Shown(name, own, found, matrix, None, None, source)
+            continue
+        triangles, solid = _place(local.triangles, matrix, name)
+        reflects = _reflectivity(shown, local.material[solid])
+        yield _Shown(name, own, found, matrix, triangles, reflects, source)
 
 
 def _depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
@@ -159,8 +166,16 @@ def _depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
     return layer.depsgraph
 
 
-def _local_triangles(evaluated: bpy.types.Object) -> Float | None:
-    """(n, 3, 3) corners in the object's own axes, or None where it has no faces to give."""
+@dataclass(frozen=True)
+class _Faces:
+    """(n, 3, 3) corners in the object's own axes, and the material slot (n,) of each triangle."""
+
+    triangles: Float
+    material: Integer
+
+
+def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
+    """Return an object's triangles, or None where it has no faces to give."""
     if evaluated.type not in _SURFACES:
         return None
     mesh = evaluated.data if evaluated.type == "MESH" else evaluated.to_mesh()
@@ -170,13 +185,23 @@ def _local_triangles(evaluated: bpy.types.Object) -> Float | None:
     mesh.loop_triangles.foreach_get("vertices", corners)
     places = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     mesh.vertices.foreach_get("co", places)
+    material = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("material_index", material)
     if evaluated.type != "MESH":
         evaluated.to_mesh_clear()
-    return places.reshape(-1, 3).astype(np.float64)[corners].reshape(-1, 3, 3)
+    triangles = places.reshape(-1, 3).astype(np.float64)[corners].reshape(-1, 3, 3)
+    return _Faces(triangles, material.astype(np.int64))
 
 
-def _place(local: Float, matrix: Float, name: str) -> Float:
-    """Corners in site axes without the triangles that have no area."""
+def _reflectivity(shown: bpy.types.Object, material: Integer) -> Float:
+    """Return the reflectivity of triangles (n,), given their material slots; beyond the last is the last."""
+    slots = np.array([reflectivity(slot.material) for slot in shown.material_slots] or [reflectivity(None)])
+    shares: Float = slots[np.clip(material, 0, len(slots) - 1)]
+    return shares
+
+
+def _place(local: Float, matrix: Float, name: str) -> tuple[Float, Boolean]:
+    """Return the corners in site axes of the triangles that have an area, and which have one."""
     world = local @ matrix[:3, :3].T + matrix[:3, 3]
     if not np.isfinite(world).all():
         raise SeipError(f"object {name!r} has a vertex or transform that is no finite number: repair or delete it")
@@ -184,8 +209,7 @@ def _place(local: Float, matrix: Float, name: str) -> Float:
     solid = area > 0
     if not solid.any():
         raise SeipError(f"object {name!r} has only faces of zero area: scale it up, repair it or delete it")
-    kept: Float = world[solid]
-    return kept
+    return world[solid], solid
 
 
 def _meshes(parts: list[_Shown], collection: str) -> tuple[Mesh, ...]:
@@ -195,7 +219,7 @@ def _meshes(parts: list[_Shown], collection: str) -> tuple[Mesh, ...]:
         if collection not in part.collections:
             continue
         if part.triangles is not None:
-            meshes.append(Mesh(part.name, part.triangles))
+            meshes.append(Mesh(part.name, part.triangles, part.reflectivity))
         elif part.source not in instancers and collection != contract.POLES:
             raise SeipError(
                 f"object {part.name!r} in {collection!r} has no mesh: give it faces or take it out of the collection"
@@ -264,7 +288,8 @@ def _finite_foot(part: _Shown) -> Float:
     return foot
 
 
-def _origin(scene: bpy.types.Scene) -> Float:
+def origin_of(scene: bpy.types.Scene) -> Float:
+    """Return the map coordinates (3,) of the scene's local origin, metres."""
     stored = scene.get(contract.ORIGIN, (0.0, 0.0, 0.0))
     try:
         values = [] if isinstance(stored, str) else [float(value) for value in stored]

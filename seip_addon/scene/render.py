@@ -72,6 +72,7 @@ def _stage(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
     try:
         for thing in shared:
             stage.collection.objects.link(thing)
+        stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # where the traffic stands now
         yield stage
     finally:
         own = [thing for thing in stage.collection.objects if thing not in shared]

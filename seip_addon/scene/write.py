@@ -87,8 +87,8 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
     empty.rotation_euler = (0.0, 0.0, sensor.yaw)
     properties = {
         MARK: True,
-        "seip_label": sensor.label,
-        "seip_sensor": sensor.model.key,
+        contract.LABEL: sensor.label,
+        contract.SENSOR: sensor.model.key,
         "seip_sensor_name": sensor.model.name,
         "seip_position": sensor.position_name,
         "seip_on_pole": sensor.on_pole,

@@ -18,6 +18,7 @@ from seip_addon.core.lidar import (
     find_models,
     load_catalogue,
     measured_returns,
+    return_chance,
     return_intensity,
 )
 
@@ -198,23 +199,30 @@ def test_noise_and_drop_off_have_their_rates() -> None:
     model = sensor(dropoff_general=0.25, dropoff_zero_intensity=0.4, dropoff_intensity_limit=0.8, range_noise_std=0.05)
     count = 200_000
     intensity = np.repeat([0.9, 0.4, 0.0], count)
-    measured = measured_returns(model, np.full(3 * count, 50.0), intensity, np.random.default_rng(1))
-    kept = np.isfinite(measured).reshape(3, count).mean(axis=1)
+    distance = np.full(3 * count, 50.0)
+    chance = return_chance(model, distance, intensity)
+    ray, measured = measured_returns(model, distance, chance, np.random.default_rng(1))
+    kept = np.bincount(ray // count) / count
     np.testing.assert_allclose(kept, 0.75 * np.array([1.0, 0.8, 0.6]), atol=0.005)
-    noise = measured[np.isfinite(measured)] - 50
+    noise = measured - 50
     assert abs(noise.mean()) < 1e-3
     assert noise.std() == pytest.approx(0.05, rel=0.02)
 
 
 def test_measured_returns_follow_the_seed_and_leave_misses() -> None:
     model = sensor()
-    distance = np.array([np.inf, 0.5, 50.0, 101.0, 20.0])
-    first, again = (measured_returns(model, distance, np.ones(5), np.random.default_rng(7)) for _ in range(2))
-    assert (first == again).all()
-    assert np.isinf(first[[0, 1, 3]]).all()
-    assert np.isfinite(first[[2, 4]]).all()
-    other = measured_returns(model, np.array([9.0, 9.0, 50.0, 9.0, 20.0]), np.ones(5), np.random.default_rng(7))
-    assert (other[[2, 4]] == first[[2, 4]]).all()
+
+    def returns(*distance: float) -> tuple[list[int], np.ndarray]:
+        far = np.array(distance)
+        ray, measured = measured_returns(model, far, return_chance(model, far, np.ones(5)), np.random.default_rng(7))
+        return ray.tolist(), measured
+
+    first, again = (returns(np.inf, 0.5, 50.0, 101.0, 20.0) for _ in range(2))
+    assert first[0] == again[0] == [2, 4]
+    assert (first[1] == again[1]).all()
+    rays, other = returns(9.0, 9.0, 50.0, 9.0, 20.0)
+    assert rays == [0, 1, 2, 3, 4]
+    assert (other[[2, 4]] == first[1]).all()
 
 
 def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:

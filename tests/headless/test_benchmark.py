@@ -15,6 +15,7 @@ from headless.measures.placement import Run, compare
 from headless.measures.programme import Scope
 from headless.measures.report import bars
 from headless.measures.rivals import RIVALS, can_run
+from headless.measures.scans import ScanCost
 from headless.measures.visibility import Cost
 from headless.street_visibility import street_problem
 
@@ -39,6 +40,8 @@ SMALL = Scope(
     multiples=(1, 2),
     copies=(1, 2),
     spacings=(8.0, 4.0),
+    scanned_by="type1",
+    frames=1,
 )
 
 
@@ -65,7 +68,8 @@ def test_the_figures_hold_every_way(folder):
     assert record["harm"]["exact"]["wrong"] == 0 < record["harm"]["azimuth ÷ 8"]["wrong"]
     ways = {run["way"] for run in record["placement"]}
     assert ways == {way for way in RIVALS if can_run(way)}
-    assert len(record["bars"]) == 6
+    assert len(record["bars"]) == 9
+    assert record["scans"]["kept embree"]["rays"] == record["scans"]["anew bvh"]["rays"] == 4 * 60_000
     assert all(len(growth["seconds"]) == len(growth["size"]) for growth in record["growth"])
 
 
@@ -98,11 +102,19 @@ def test_bars_are_met_by_what_meets_them_alone():
         run_of("many", "ours", 59.0, 991.0, 1000.0),
         run_of("largest", "ours", 119.0, 984.0, 1000.0),
     ]
-    held = bars(costs, runs, ("few", "many", "largest"))
-    assert [bar.met for bar in held] == [True, True, False, True, True, False]
+    scans = {
+        "kept bvh": ScanCost(Expense(7.0), 10, 1_000_000, 1),
+        "anew bvh": ScanCost(Expense(100.0), 10, 1_000_000),
+        "kept embree": ScanCost(Expense(5.0), 10, 1_000_000, 0),
+    }
+    held = bars(costs, runs, ("few", "many", "largest"), scans)
+    assert [bar.met for bar in held] == [True, True, False, True, True, False, False, True, True]
     assert held[2].measured == "9×"
     runs[0] = run_of("few", "PuLP + CBC", 30.0, 901.0, math.inf)  # better than what was said to be proven
-    assert not bars(costs, runs, ("few", "many", "largest"))[3].met
+    scans["kept bvh"].differing = 2
+    held = bars(costs, runs, ("few", "many", "largest"), scans)
+    assert not held[3].met
+    assert not held[8].met
 
 
 def test_fewer_rays_are_those_that_were_asked_for():

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+import functools
 
-from ..arrays import Float
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float, Integer
 from .model import LidarModel
 
 
@@ -33,29 +36,63 @@ def return_intensity(
     return np.where(hit, intensity, 0.0)
 
 
-def measured_returns(model: LidarModel, distance: Float, intensity: Float, random: np.random.Generator) -> Float:
-    """Return ranges as the sensor measures them: without the lost returns, and with noise.
+def return_chance(model: LidarModel, distance: Float, intensity: Float) -> Float:
+    """Return how likely each return is not to be lost: nought out of range, else CARLA's drop-off by intensity.
 
     Parameters
     ----------
     model : LidarModel
     distance : (n,) float64, metres
-        True ranges, infinite on a miss.
+        Infinite on a miss.
     intensity : (n,) float64
         Of each return, as `return_intensity` gives it.
-    random : numpy.random.Generator
-        The same number of values is drawn whatever the ranges are, so that one
-        ray's fate does not change another's.
 
     Returns
     -------
-    (n,) float64, metres
-        Infinite where there is no return.
+    (n,) float64, 0 to 1
     """
-    general, by_intensity = random.random((2, len(distance)))
-    noise = random.normal(0.0, model.range_noise_std, len(distance))
     slope = model.dropoff_zero_intensity / model.dropoff_intensity_limit
-    keep = np.minimum(1.0, slope * intensity + 1.0 - model.dropoff_zero_intensity)
-    kept = (general >= model.dropoff_general) & (by_intensity < keep)
+    keep = np.minimum(1.0, slope * intensity + (1.0 - model.dropoff_zero_intensity))
     within = (distance >= model.min_range) & (distance <= model.max_range)
-    return np.where(kept & within, np.maximum(distance + noise, 0.0), np.inf)
+    return np.where(within, (1.0 - model.dropoff_general) * keep, 0.0)
+
+
+def measured_returns(
+    model: LidarModel, distance: Float, chance: Float | NDArray[np.float32], random: np.random.Generator
+) -> tuple[Integer, Float]:
+    """Return which rays return to the sensor, and the noisy ranges that it measures of them.
+
+    Parameters
+    ----------
+    model : LidarModel
+    distance : (n,) float64, metres
+        True ranges.
+    chance : (n,) float32 or float64
+        Of each return, as `return_chance` gives it.
+    random : numpy.random.Generator
+        The same values are drawn for the same rays whatever the ranges are, so that
+        one ray's fate does not change another's.
+
+    Returns
+    -------
+    ray : (k,) int64
+        Ascending.
+    measured : (k,) float64, metres
+    """
+    fate, error = random.integers(2**32, size=(2, len(distance)), dtype=np.uint32)
+    ray = np.flatnonzero(fate < chance * 2.0**32)
+    return ray, np.maximum(distance[ray] + model.range_noise_std * _normal(error[ray]), 0.0)
+
+
+def _normal(bits: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Return normally distributed numbers (n,) made of 32 random bits each (Box and Muller 1958), up to 4.9."""
+    radius, cosine = _box_muller()
+    normal: NDArray[np.float32] = radius[bits >> 16] * cosine[bits & 0xFFFF]
+    return normal
+
+
+@functools.cache
+def _box_muller() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Radii and cosines for every 16 bits: looked up, they take a fifth of the time of a generator's own numbers."""
+    share = (np.arange(2**16) + 0.5) / 2**16
+    return np.sqrt(-2 * np.log(share)).astype(np.float32), np.cos(2 * np.pi * share).astype(np.float32)

@@ -92,7 +92,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
     sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
     draw_sensors(plan, deployment, sensors, site.targets.xyz[:, :2], zorder=SENSOR)
     inch = (window[2] - window[0]) / map_width
-    _draw_scale(plan, inch)
+    draw_scale(plan, inch)
     _draw_north(plan, inch)
     draw_title(figure, site, deployment, MARGIN)
     panel = _axes(figure, map_width + 2 * MARGIN, MARGIN, LEGEND_WIDTH, map_height)
@@ -133,9 +133,9 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
     pavement = shapely.intersection(geometry.candidate_areas, shown)
-    _draw_area(plan, closed(pavement, CRACK), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
+    draw_area(plan, closed(pavement, CRACK), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
-    _draw_area(plan, closed(roads, CRACK), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+    draw_area(plan, closed(roads, CRACK), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
 
 
 def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
@@ -169,7 +169,7 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
         ),
         autolim=False,
     )
-    _draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
     return norm
 
 
@@ -182,18 +182,16 @@ def _road_level(site: Site, points: Float) -> Float:
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
-    _draw_area(plan, closed(region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    draw_area(plan, closed(region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
         (geometry.forbidden_areas, FORBIDDEN, "////"),
         (geometry.mandatory_areas, MANDATORY, "...."),
     ):
         for area in areas:
-            _draw_area(
-                plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER
-            )
+            draw_area(plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER)
     for area in geometry.weighted_regions:
-        _draw_area(plan, area.polygon, facecolor="none", edgecolor=PAPER, linewidth=2.8, zorder=BORDER)
-        _draw_area(
+        draw_area(plan, area.polygon, facecolor="none", edgecolor=PAPER, linewidth=2.8, zorder=BORDER)
+        draw_area(
             plan,
             area.polygon,
             facecolor="none",
@@ -204,7 +202,7 @@ def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> No
         )
 
 
-def _draw_area(plan: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+def draw_area(plan: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw a polygon with its holes, or several."""
     polygons = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty]
     rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
@@ -219,7 +217,7 @@ def _draw_candidates(plan: Axes, site: Site) -> None:
         plan.plot(position[these, 0], position[these, 1], zorder=CANDIDATE, **style)
 
 
-def _draw_scale(plan: Axes, inch: float) -> None:
+def draw_scale(plan: Axes, inch: float) -> None:
     """Draw a bar of a round length, at most two inches of so many metres."""
     decade = 10.0 ** math.floor(math.log10(2 * inch))
     length = max(step * decade for step in (1, 2, 5) if step * decade <= 2 * inch)

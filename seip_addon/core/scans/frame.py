@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..arrays import Boolean, Float, Integer, Text
 from ..storage import ArrayFile
 
-FILE = ArrayFile("seip.frame", 1, "frame of scans", "simulate it again")
+FILE = ArrayFile("seip.frame", 1, "frame of scans", "simulate it again", compressed=False)
 _POINTS = ("points", "sensor", "delay", "intensity", "instance")
 
 STATIC = -1

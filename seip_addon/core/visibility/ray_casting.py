@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import importlib.util
+import itertools
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -52,11 +53,11 @@ class RayCaster(Protocol):
         """How many threads may cast at once to advantage."""
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
-        """Cast rays from one point.
+        """Cast rays from one point, or each from a point of its own.
 
         Parameters
         ----------
-        origin : (3,) float64, metres
+        origin : (3,) or (n, 3) float64, metres
         directions : (n, 3) float64
             Unit vectors.
         max_range : float, metres
@@ -131,15 +132,16 @@ class BvhRayCaster:
             self._tree = BVHTree.FromPolygons(points, faces, all_triangles=True)
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
-        """Cast rays from one point; see `RayCaster.cast`."""
+        """Cast rays; see `RayCaster.cast`."""
         start = (origin - self._centre).tolist()
-        ray_cast = self._tree.ray_cast
+        starts = itertools.repeat(start) if origin.ndim == 1 else start
+        ray_cast, reach = self._tree.ray_cast, max_range * _BEYOND
         with _no_garbage_collection():
-            reach = max_range * _BEYOND
-        hits = [ray_cast(start, direction, reach)[2:] for direction in directions.tolist()]
-        face = np.array([-1 if hit[0] is None else hit[0] for hit in hits], dtype=np.int64)
-        distance = np.array([np.inf if hit[1] is None else hit[1] for hit in hits], dtype=np.float64)
-        return _result(distance, face, self._index, max_range)
+            hits = [ray_cast(start, ray, reach)[2:] for start, ray in zip(starts, directions.tolist(), strict=False)]
+            # None, on a miss, becomes NaN
+            face = np.array([hit[0] for hit in hits], dtype=np.float64)
+            distance = np.array([hit[1] for hit in hits], dtype=np.float64)
+        return _result(distance, np.where(face >= 0, face, -1.0).astype(np.int64), self._index, max_range)
 
 
 class EmbreeRayCaster:
@@ -168,7 +170,7 @@ class EmbreeRayCaster:
         self.cast(self._centre, np.array([[0.0, 0.0, 1.0]]), 1.0)  # builds the tree, before threads may ask for it
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
-        """Cast rays from one point; see `RayCaster.cast`."""
+        """Cast rays; see `RayCaster.cast`."""
         if self._mesh is None or len(directions) == 0:
             return np.full(len(directions), np.inf), np.full(len(directions), -1, dtype=np.int64)
         start = np.broadcast_to((origin - self._centre).astype(np.float32), directions.shape)

@@ -1,0 +1,163 @@
+"""A bird's-eye view of a frame of scans: which sensor measured what, and how strong the returns are."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..scans.frame import Frame, Labels
+from ..scans.sensor import MountedSensor
+from .drawing import LABEL_SIZE, SENSOR_MARK, save_png
+from .palette import INK, PAPER, SOFT_INK
+from .plan_view import draw_area, draw_scale
+
+DPI = 160
+MAP, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches
+AROUND = 0.04  # of the region's size, shown around it
+PIXELS = 1100  # of a cloud's picture, along a side
+NIGHT = "#101820"
+SENSOR_COLOURS = ("#56b4e9", "#e69f00", "#3cc99b", "#f07ac0", "#f0e442", "#d55e00", "#8f9bff", "#cfd8dc")
+"""Told apart by colour-blind people, on a dark ground (after Okabe and Ito 2008)."""
+STRENGTH = LinearSegmentedColormap.from_list("strength", ("#27408b", "#1fa187", "#fde725", "#ffffff"))
+STRONGEST = 0.6
+"""Intensity from which on returns have the last colour; below, colours go by its square root."""
+SEEN, UNSEEN = "#ffffff", "#ff5a4f"
+
+
+def save_scan_view(
+    path: str | os.PathLike[str], frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSensor]
+) -> None:
+    """Draw a frame twice, its points coloured by sensor and by intensity, with the boxes of its road users, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    frame : Frame
+    region : shapely geometry
+        Region of interest in plan; the picture shows this and a little around it.
+    sensors : sequence of MountedSensor
+        In the order of the frame's numbers.
+    """
+    save_png(path, draw_scan(frame, region, sensors))
+
+
+def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSensor]) -> Figure:
+    """Return the view as a figure."""
+    west, south, east, north = region.bounds
+    left, bottom, right, top = region.buffer(AROUND * max(east - west, north - south)).bounds
+    tall = MAP * (top - bottom) / (right - left)
+    figure = Figure((2 * MAP + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
+    palette = np.array([to_rgb(SENSOR_COLOURS[number % len(SENSOR_COLOURS)]) for number in range(len(sensors))])
+    colours = (
+        palette[frame.sensor],
+        STRENGTH(np.sqrt(np.minimum(frame.intensity / STRONGEST, 1.0)))[:, :3],
+    )
+    for number, colour in enumerate(colours):
+        axes = _axes(figure, MARGIN + number * (MAP + MARGIN), FOOT, MAP, tall)
+        axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=NIGHT)
+        _draw_points(axes, frame.points, colour)
+        draw_area(axes, region, facecolor="none", edgecolor=SOFT_INK, linewidth=0.9)
+        _draw_boxes(axes, frame.labels)
+        _draw_sensors(axes, sensors, palette if number == 0 else np.ones((len(sensors), 3)))
+        draw_scale(axes, (right - left) / MAP)
+    _write_around(figure, frame, sensors)
+    return figure
+
+
+def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    page_width, page_height = figure.get_size_inches()
+    axes = figure.add_axes((left / page_width, bottom / page_height, width / page_width, height / page_height))
+    axes.set(xticks=(), yticks=())
+    return axes
+
+
+def _draw_points(axes: Axes, points: NDArray[np.float32], colour: Float) -> None:
+    """Paint points as pixels, the highest last: as many as there are, a picture is small and quick."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    shape = (round(PIXELS * (top - bottom) / (right - left)), PIXELS)
+    column = np.floor((points[:, 0] - left) / (right - left) * shape[1]).astype(np.int64)
+    row = np.floor((points[:, 1] - bottom) / (top - bottom) * shape[0]).astype(np.int64)
+    shown = np.flatnonzero((column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0]))
+    shown = shown[np.argsort(points[shown, 2], kind="stable")]
+    picture = np.empty((*shape, 3))
+    picture[:] = to_rgb(NIGHT)
+    picture[row[shown], column[shown]] = colour[shown]
+    axes.imshow(picture, extent=(left, right, bottom, top), origin="lower", interpolation="nearest", aspect="auto")
+
+
+def _draw_boxes(axes: Axes, labels: Labels) -> None:
+    """Draw each box in plan with a line from its middle to its front; those without returns in another colour."""
+    forward = np.stack([np.cos(labels.yaw), np.sin(labels.yaw)], axis=1) * labels.size[:, :1] / 2
+    left = np.stack([-np.sin(labels.yaw), np.cos(labels.yaw)], axis=1) * labels.size[:, 1:2] / 2
+    middle = labels.centre[:, :2]
+    corners = np.stack([middle + a * forward + b * left for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1)
+    noses = np.stack([middle, middle + forward], axis=1)
+    edge = np.where(labels.points.sum(axis=1) > 0, SEEN, UNSEEN)
+    for shapes, closed in ((corners, True), (noses, False)):
+        axes.add_collection(
+            PolyCollection(list(shapes), closed=closed, facecolors="none", edgecolors=edge, linewidths=0.8),
+            autolim=False,
+        )
+
+
+def _draw_sensors(axes: Axes, sensors: Sequence[MountedSensor], colours: Float) -> None:
+    for sensor, colour in zip(sensors, colours, strict=True):
+        axes.plot(*sensor.xyz[:2], marker="o", **SENSOR_MARK | {"mfc": colour, "mec": INK, "markersize": 8.0})
+        axes.annotate(
+            sensor.label,
+            (float(sensor.xyz[0]), float(sensor.xyz[1])),
+            xytext=(7, 5),
+            textcoords="offset points",
+            color=PAPER,
+            size=LABEL_SIZE,
+            weight="bold",
+            parse_math=False,
+        )
+
+
+def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]) -> None:
+    width, height = figure.get_size_inches()
+    style = {"x": MARGIN / width, "ha": "left", "va": "top"}
+    unseen = int((frame.labels.points.sum(axis=1) == 0).sum())
+    users = f"{len(frame.labels)} road users, {unseen} without a return"
+    counts = f"{len(frame):,} points of {len(sensors)} sensors  ·  {users}"
+    figure.text(y=1 - 0.20 / height, s=f"Scan at {frame.time:.2f} s", size=17, weight="bold", color=INK, **style)
+    figure.text(y=1 - 0.58 / height, s=counts, size=11, color=SOFT_INK, **style)
+    marks = [
+        Line2D([], [], color=SENSOR_COLOURS[number % len(SENSOR_COLOURS)], marker="o", linestyle="none")
+        for number in range(len(sensors))
+    ]
+    types = [f"{sensor.label}  {sensor.model.key}" for sensor in sensors]
+    legend = figure.legend(
+        marks, types, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), frameon=False, ncols=8, fontsize=9
+    )
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+    bar = figure.add_axes(((2 * MARGIN + MAP) / width, 0.3 / height, 3.0 / width, 0.12 / height))
+    bar.imshow(np.linspace(0, 1, 256)[None], cmap=STRENGTH, aspect="auto", extent=(0, 1, 0, 1))
+    shares = np.array([0.0, 0.05, 0.25, 1.0])
+    words = [*(f"{share * STRONGEST:g}" for share in shares[:-1]), f"{STRONGEST:g} and more"]
+    bar.set(yticks=(), xticks=np.sqrt(shares))
+    bar.set_xticklabels(words, size=8, color=INK)
+    bar.set_title("intensity", size=8, color=INK, pad=2)
+    boxes = [Line2D([], [], color=colour, linewidth=1.5) for colour in (SEEN, UNSEEN)]
+    figure.legend(
+        boxes,
+        ["road user with returns", "without a return"],
+        loc="lower right",
+        bbox_to_anchor=(1 - MARGIN / width, 0.0),
+        facecolor=NIGHT,
+        labelcolor=SEEN,
+        ncols=2,
+        fontsize=9,
+    )

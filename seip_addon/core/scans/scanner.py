@@ -1,0 +1,285 @@
+"""One sensor's scans: its static returns, found once, and those of the traffic before them.
+
+What moves is cast against in its own axes, in which its shape never changes, and only by the rays that pass through
+its bounding box. A ray ends at the nearest of what it meets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Boolean, Float, Integer
+from ..lidar import BeamPattern, return_chance, return_intensity
+from ..visibility.ray_casting import RayCaster
+from .beam_windows import BeamWindows
+from .frame import STATIC
+from .motion import Motion
+from .sensor import MountedSensor
+
+_RAYS_AT_ONCE = 1 << 17  # bounds the memory of the static scan
+_MARGIN = 1e-3
+"""Metres by which bounding boxes are larger than what they bound: engines compute in float32."""
+_LEVEL = 1e-12  # a ray of less slope than this is off by less than the margin at any range
+_CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
+
+
+class Shape(Protocol):
+    """What a road user looks like, in its own axes: forward, left, up, from the middle of its underside."""
+
+    @property
+    def triangles(self) -> Float:
+        """Corners, (n, 3, 3) float64, metres."""
+
+    @property
+    def reflectivity(self) -> Float:
+        """Of each triangle, (n,) float64, 0 to 1."""
+
+
+class Surface:
+    """Triangles that rays are cast against, and how they reflect.
+
+    Parameters
+    ----------
+    caster : RayCaster
+        Of the triangles.
+    reflectivity : (n,) float64, 0 to 1
+    """
+
+    def __init__(self, caster: RayCaster, reflectivity: Float) -> None:
+        self.caster = caster
+        self._reflectivity = reflectivity
+        a, b, c = caster.triangles.transpose(1, 0, 2)
+        normal = np.cross(b - a, c - a)
+        self._normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+
+    def reflected(self, directions: Float, triangle: Integer) -> Float:
+        """Return reflectivity times cosine (n,) where rays, with directions in the triangles' axes, meet triangles."""
+        cos_incidence = np.einsum("ni,ni->n", self._normal[triangle], directions)
+        reflected: Float = np.abs(cos_incidence) * self._reflectivity[triangle]
+        return reflected
+
+
+class SolidShape(Surface):
+    """A road user's surface in its own axes, with its bounding box.
+
+    Parameters
+    ----------
+    caster : RayCaster
+    reflectivity : (n,) float64, 0 to 1
+    """
+
+    def __init__(self, caster: RayCaster, reflectivity: Float) -> None:
+        super().__init__(caster, reflectivity)
+        points = caster.triangles.reshape(-1, 3)
+        self.low, self.high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+
+    def hull(self, motion: Motion) -> Float:
+        """Return points (8 s, 3) whose convex hull holds the bounding box during all of a motion, in site axes.
+
+        Between two samples a corner leaves its chord by an eighth of its greatest
+        acceleration times the time squared at most; angles change evenly.
+        """
+        size = self.high - self.low
+        corners = self.low + _CORNERS * size
+        turned = np.abs(np.diff(motion.yaw)) + np.abs(np.diff(motion.pitch))
+        bulge = np.linalg.norm(corners, axis=1).max() * turned.max(initial=0.0) ** 2 / 8
+        corners += (2 * _CORNERS - 1) * bulge
+        placed: Float = motion.position[:, None] + corners @ motion.attitude.transpose(0, 2, 1)
+        return placed.reshape(-1, 3)
+
+    def may_be_met(self, origin: Float, directions: Float, reach: float) -> Boolean:
+        """Tell which rays pass through the bounding box within so many metres, by its slabs (Kay and Kajiya 1986).
+
+        Parameters
+        ----------
+        origin : (3, 1) or (3, n) float64, metres
+        directions : (3, n) float64
+        reach : float, metres
+
+        Returns
+        -------
+        (n,) bool
+        """
+        slowness = 1.0 / np.where(np.abs(directions) < _LEVEL, _LEVEL, directions)
+        one, other = (self.low[:, None] - origin) * slowness, (self.high[:, None] - origin) * slowness
+        enter = np.minimum(one, other).max(axis=0)
+        leave = np.maximum(one, other).min(axis=0)
+        passes: Boolean = (enter <= leave) & (leave >= 0.0) & (enter <= reach)
+        return passes
+
+
+@dataclass(frozen=True, eq=False)
+class Traffic:
+    """What moves during a revolution; k road users.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    shapes : sequence of SolidShape
+        Of each, in the same order.
+    hulls : (k, m, 3) float64, metres
+        Points about each way, in site axes.
+    """
+
+    motions: Sequence[Motion]
+    shapes: Sequence[SolidShape]
+    hulls: Float
+
+    @classmethod
+    def of(cls, motions: Sequence[Motion], shapes: Sequence[SolidShape]) -> Traffic:
+        """Bound the ways of road users, given the shape of each."""
+        hulls = [shape.hull(motion) for motion, shape in zip(motions, shapes, strict=True)]
+        most = max(map(len, hulls), default=0)
+        even = [np.concatenate([hull, np.repeat(hull[-1:], most - len(hull), axis=0)]) for hull in hulls]
+        return cls(motions, shapes, np.array(even).reshape(len(hulls), most, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """What the rays of one revolution end on; r rays in the order of `BeamPattern`.
+
+    Parameters
+    ----------
+    distance : (r,) float64, metres
+        Infinite on a miss.
+    intensity : (r,) float64, 0 to 1
+    chance : (r,) float32
+        That the ray's return is not lost.
+    instance : (r,) int32
+        Road user, or `STATIC`.
+    could : (u,) int64
+        For each of the trajectories' road users, how many rays would return from it with nothing else there.
+    met : (u,) int64
+        How many of these do.
+    """
+
+    distance: Float
+    intensity: Float
+    chance: NDArray[np.float32]
+    instance: NDArray[np.int32]
+    could: Integer
+    met: Integer
+
+
+@dataclass(frozen=True, eq=False)
+class _Hits:
+    """What some rays meet; n hits."""
+
+    ray: Integer
+    distance: Float
+    reflected: Float
+
+
+class Scanner:
+    """Makes the scans of one sensor.
+
+    Parameters
+    ----------
+    sensor : MountedSensor
+    ground : Surface
+        All that stands still, in site axes.
+
+    Attributes
+    ----------
+    directions : (r, 3) float64
+        Of the rays, in site axes.
+    coarse_directions : (r, 3) float32
+        The same, for points: 1e-5 m at 200 m.
+    threads : int
+        How many scanners may scan at once to advantage.
+    """
+
+    def __init__(self, sensor: MountedSensor, ground: Surface) -> None:
+        self.sensor, self._model = sensor, sensor.model
+        self._windows = BeamWindows(sensor.model)
+        pattern = BeamPattern(sensor.model)
+        self._steps, self.threads = sensor.model.azimuth_count, ground.caster.threads
+        rays = np.arange(sensor.model.channels * self._steps)
+        self.directions: Float = pattern.directions(rays) @ sensor.orientation.T
+        self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
+        self._distance = np.full(len(rays), np.inf)
+        reflected = np.zeros(len(rays))
+        for begin in range(0, len(rays), _RAYS_AT_ONCE):
+            part = slice(begin, begin + _RAYS_AT_ONCE)
+            hits = self._cast(ground, sensor.xyz, self.directions[part], rays[part])
+            self._distance[hits.ray], reflected[hits.ray] = hits.distance, hits.reflected
+        self._intensity = return_intensity(self._model, self._distance, reflected)
+        self._chance = return_chance(sensor.model, self._distance, self._intensity).astype(np.float32)
+        self._stood: dict[int, tuple[Motion, _Hits]] = {}
+
+    @property
+    def sees_nothing(self) -> bool:
+        """Whether no ray ends on anything that stands still."""
+        return not np.isfinite(self._distance).any()
+
+    @property
+    def delay(self) -> Float:
+        """Seconds after the beginning of the revolution at which each azimuth step is taken, (azimuth_count,)."""
+        return np.arange(self._steps) / (self._steps * self._model.rotation_rate)
+
+    def scan(self, traffic: Traffic, users: int) -> Scan:
+        """Return what the rays end on with traffic that is one of so many road users."""
+        distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
+        reflected = np.empty(len(distance))
+        instance = np.full(len(distance), STATIC, dtype=np.int32)
+        could = np.zeros(users, dtype=np.int64)
+        for motion, hits in self._hits(traffic):
+            could[motion.user] = self.in_range(hits.distance).sum()
+            nearest = hits.distance < distance[hits.ray]
+            ray = hits.ray[nearest]
+            distance[ray], reflected[ray] = hits.distance[nearest], hits.reflected[nearest]
+            instance[ray] = motion.user
+        on_traffic = np.flatnonzero(instance != STATIC)
+        far = distance[on_traffic]
+        intensity[on_traffic] = return_intensity(self._model, far, reflected[on_traffic])
+        chance[on_traffic] = return_chance(self._model, far, intensity[on_traffic])
+        met = by_user(instance[on_traffic[self.in_range(far)]], users)
+        return Scan(distance, intensity, chance, instance, could, met)
+
+    def in_range(self, distance: Float) -> Boolean:
+        """Tell which distances the sensor can measure."""
+        return (distance >= self._model.min_range) & (distance <= self._model.max_range)
+
+    def _hits(self, traffic: Traffic) -> Iterator[tuple[Motion, _Hits]]:
+        """Return what the rays meet of each road user if nothing else is there; of one that stood still, as before."""
+        stood, self._stood = self._stood, {}
+        if not traffic.motions:
+            return
+        hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
+        first = np.searchsorted(hull, np.arange(len(traffic.motions) + 1))
+        for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
+            before, hits = stood.get(motion.user, (None, None))
+            if hits is None or not motion.same_as(before):
+                hits = self._meet(shape, motion, ray[first[number] : first[number + 1]])
+            if motion.stays:
+                self._stood[motion.user] = motion, hits
+            yield motion, hits
+
+    def _meet(self, shape: SolidShape, motion: Motion, ray: Integer) -> _Hits:
+        """Cast rays against one road user, in its axes."""
+        directions = self.directions.take(ray, axis=0)
+        if motion.stays:
+            origin = motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None]
+            directions = motion.attitude[0].T @ directions.T
+        else:
+            position, attitude = motion.at(self.delay[ray % self._steps])
+            origin = np.einsum("ni,nij->jn", self.sensor.xyz - position, attitude)
+            directions = np.einsum("ni,nij->jn", directions, attitude)
+        met = np.flatnonzero(shape.may_be_met(origin, directions, self._model.max_range))
+        start = origin[:, 0] if motion.stays else origin[:, met].T
+        return self._cast(shape, start, directions[:, met].T, ray[met])
+
+    def _cast(self, surface: Surface, origin: Float, directions: Float, ray: Integer) -> _Hits:
+        distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
+        hit = np.flatnonzero(triangle >= 0)
+        return _Hits(ray[hit], distance[hit], surface.reflected(directions[hit], triangle[hit]))
+
+
+def by_user(instance: NDArray[np.int32], users: int) -> Integer:
+    """Return how many of some returns are from each of so many road users, (u,)."""
+    return np.bincount(instance[instance != STATIC], minlength=users)

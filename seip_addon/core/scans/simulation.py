@@ -1,0 +1,260 @@
+"""Frames of scans: all sensors of a scene at the same instants of its traffic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..lidar import measured_returns
+from ..progress import Progress
+from ..traffic import Snapshot, Trajectories
+from ..visibility.ray_casting import Engine, make_ray_caster
+from .frame import Frame, Labels
+from .motion import moving, rotations, still
+from .scanner import Scan, Scanner, Shape, SolidShape, Surface, Traffic, by_user
+from .sensor import MountedSensor
+from .static_scene import StaticScene
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """How scans are made.
+
+    Parameters
+    ----------
+    seed : int
+        Of noise and lost returns, 0 or more.
+    noise : bool
+        Whether ranges are noisy and returns get lost, as the sensors' models say.
+    rolling_shutter : bool
+        Whether each azimuth is looked along at its own time, counter-clockwise from azimuth zero,
+        while the traffic moves. Else a revolution takes no time.
+    engine : {"auto", "bvh", "embree"}
+    """
+
+    seed: int = 0
+    noise: bool = True
+    rolling_shutter: bool = False
+    engine: Engine = "auto"
+
+
+class Simulation:
+    """The sensors of a scene and its traffic, ready to be scanned at any time.
+
+    Parameters
+    ----------
+    static : StaticScene
+    scanners : sequence of Scanner
+    trajectories : Trajectories
+    shapes : sequence of SolidShape
+        Of each road user.
+    settings : ScanSettings
+    """
+
+    def __init__(
+        self,
+        static: StaticScene,
+        scanners: Sequence[Scanner],
+        trajectories: Trajectories,
+        shapes: Sequence[SolidShape],
+        settings: ScanSettings,
+    ) -> None:
+        self.scanners = scanners
+        self._threads = scanners[0].threads
+        self._static, self._trajectories, self._shapes, self._settings = static, trajectories, shapes, settings
+        self._revolution = max(1.0 / scanner.sensor.model.rotation_rate for scanner in scanners)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know before trusting the scans, in sentences."""
+        return tuple(
+            f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
+            "look whether it hangs where it should"
+            for scanner in self.scanners
+            if scanner.sees_nothing
+        )
+
+    def frame(self, number: int, time: float) -> Frame:
+        """Return what all sensors measure in the revolution that begins at a time.
+
+        Parameters
+        ----------
+        number : int
+            Of the frame: noise and losses follow from it, the seed and the sensor's number, and from nothing else.
+        time : float, seconds
+        """
+        snapshot = self._trajectories.at(time)
+        return self.measure(number, snapshot, self.scans(snapshot))
+
+    def measure(self, number: int, snapshot: Snapshot, scans: Sequence[Scan]) -> Frame:
+        """Return what the sensors make of their scans at an instant: noisy and incomplete, with labels."""
+        parts = [
+            _returns(scanner, scan, sensor, self._random(sensor, number), rolling=self._settings.rolling_shutter)
+            for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
+        ]
+        merged = {part.name: np.concatenate([getattr(one, part.name) for one in parts]) for part in fields(_Returns)}
+        return Frame(time=snapshot.time, labels=self._labels(snapshot, scans, parts), **merged)
+
+    def scans(self, snapshot: Snapshot) -> list[Scan]:
+        """Return what the rays of each sensor end on, without noise or losses."""
+        rolling = self._settings.rolling_shutter
+        motions = moving(self._trajectories, snapshot, self._revolution) if rolling else still(snapshot)
+        traffic = Traffic.of(motions, [self._shapes[motion.user] for motion in motions])
+        with ThreadPoolExecutor(min(len(self.scanners), self._threads)) as pool:
+            return list(pool.map(lambda scanner: scanner.scan(traffic, len(self._trajectories)), self.scanners))
+
+    def _random(self, sensor: int, frame: int) -> np.random.Generator | None:
+        if not self._settings.noise:
+            return None
+        seed = np.random.SeedSequence(self._settings.seed, spawn_key=(sensor, frame))
+        return np.random.Generator(np.random.SFC64(seed))
+
+    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], parts: Sequence[_Returns]) -> Labels:
+        most = len(self._trajectories)
+        users = [self._trajectories.users[number] for number in snapshot.user]
+        size = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
+        up = rotations(snapshot.yaw, snapshot.pitch)[:, :, 2]
+        centre = snapshot.position + up * size[:, 2:] / 2
+        could = np.sum([scan.could for scan in scans], axis=0)
+        met = np.sum([scan.met for scan in scans], axis=0)
+        return Labels(
+            user=snapshot.user,
+            category=np.array([user.category for user in users], dtype=np.str_),
+            centre=centre,
+            size=size,
+            yaw=(snapshot.yaw + math.pi) % (2 * math.pi) - math.pi,
+            pitch=snapshot.pitch,
+            speed=snapshot.speed,
+            points=np.stack([by_user(part.instance, most)[snapshot.user] for part in parts], axis=1),
+            visibility=(met / np.maximum(could, 1))[snapshot.user],
+            inside=self._static.inside(centre),
+        )
+
+
+def prepare(
+    static: StaticScene,
+    sensors: Sequence[MountedSensor],
+    trajectories: Trajectories,
+    bodies: Sequence[Shape],
+    settings: ScanSettings,
+) -> Generator[Progress, None, Simulation]:
+    """Cast against what stands still, once for all frames.
+
+    Parameters
+    ----------
+    static : StaticScene
+    sensors : sequence of MountedSensor
+    trajectories : Trajectories
+        In the scene's local axes.
+    bodies : sequence of Shape
+        Of each road user. Those who share an array of triangles share its tree.
+    settings : ScanSettings
+
+    Yields
+    ------
+    Progress
+        Sensors done, of all.
+
+    Raises
+    ------
+    SeipError
+        There is no sensor, or the seed is below nought.
+    """
+    if not sensors:
+        raise SeipError("there is no sensor to scan with: place some first, with headless/place.py")
+    if settings.seed < 0:
+        raise SeipError(f"the seed must be a whole number from 0, not {settings.seed}")
+    distinct = {id(body.triangles): body.triangles for body in bodies}
+    trees = {key: make_ray_caster(triangles, settings.engine) for key, triangles in distinct.items()}
+    shapes = [SolidShape(trees[id(body.triangles)], body.reflectivity) for body in bodies]
+    ground = Surface(make_ray_caster(static.triangles, settings.engine), static.reflectivity)
+    scanners = []
+    for number, sensor in enumerate(sensors):
+        yield Progress(number, len(sensors), "what stands still")
+        scanners.append(Scanner(sensor, ground))
+    yield Progress(len(sensors), len(sensors), "what stands still")
+    return Simulation(static, scanners, trajectories, shapes, settings)
+
+
+def frame_times(
+    trajectories: Trajectories,
+    sensors: Sequence[MountedSensor],
+    *,
+    start: float | None = None,
+    duration: float | None = None,
+    rate: float | None = None,
+) -> Float:
+    """Return the times (n,) of frames in seconds.
+
+    Parameters
+    ----------
+    trajectories : Trajectories
+    sensors : sequence of MountedSensor
+    start : float, seconds, optional
+        Of the simulation; its first sample if not given.
+    duration : float, seconds, optional
+        To the last sample if not given.
+    rate : float, hertz, optional
+        That of the slowest sensor if not given, and no more than that.
+
+    Raises
+    ------
+    SeipError
+        The times are not among the trajectories', or sensors do not turn so quickly.
+    """
+    begin, end = trajectories.span
+    slowest = min(sensors, key=lambda sensor: sensor.model.rotation_rate)
+    fastest = slowest.model.rotation_rate
+    rate = fastest if rate is None else rate
+    if not 0 < rate <= fastest * (1 + 1e-9):
+        raise SeipError(f"{slowest.label} turns {fastest:g} times a second: ask for a rate from 0 to {fastest:g} Hz")
+    start = begin if start is None else start
+    duration = end - start if duration is None else duration
+    if not (begin <= start <= end and 0 <= duration <= end - start + _SLACK):
+        raise SeipError(f"the traffic is known from {begin:g} s to {end:g} s: choose start and duration within that")
+    return start + np.arange(math.floor(duration * rate + _SLACK) + 1) / rate
+
+
+_SLACK = 1e-6
+"""Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Returns:
+    """The points of one sensor, as in `Frame`."""
+
+    points: NDArray[np.float32]
+    sensor: NDArray[np.int16]
+    delay: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    instance: NDArray[np.int32]
+
+
+def _returns(
+    scanner: Scanner, scan: Scan, number: int, random: np.random.Generator | None, *, rolling: bool
+) -> _Returns:
+    """Return what a sensor measures of a scan, noisy and incomplete where a generator is given."""
+    sensor = scanner.sensor
+    if random is None:
+        ray = np.flatnonzero(scanner.in_range(scan.distance))
+        measured = scan.distance[ray]
+    else:
+        ray, measured = measured_returns(sensor.model, scan.distance, scan.chance, random)
+    points = scanner.coarse_directions.take(ray, axis=0)
+    points *= measured.astype(np.float32)[:, None]
+    points += sensor.xyz.astype(np.float32)
+    delay = scanner.delay[ray % sensor.model.azimuth_count] if rolling else np.zeros(len(ray))
+    return _Returns(
+        points=points,
+        sensor=np.full(len(ray), number, dtype=np.int16),
+        delay=delay.astype(np.float32),
+        intensity=scan.intensity[ray].astype(np.float32),
+        instance=scan.instance[ray],
+    )

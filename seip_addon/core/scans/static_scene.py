@@ -1,0 +1,46 @@
+"""What does not move, as scans need it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Boolean, Float
+from ..scene_geometry import DEFAULT_REFLECTIVITY, SceneGeometry, joined
+
+
+@dataclass(frozen=True, eq=False)
+class StaticScene:
+    """The surfaces that rays end on whatever the traffic does; n triangles.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64, metres
+        Local site axes.
+    reflectivity : (n,) float64, 0 to 1
+    region : shapely geometry
+        Region of interest in plan.
+    """
+
+    triangles: Float
+    reflectivity: Float
+    region: BaseGeometry
+
+    def inside(self, xyz: Float) -> Boolean:
+        """Tell which points (k, 3) are in the region of interest in plan, (k,)."""
+        return np.asarray(shapely.contains_xy(self.region, xyz[:, 0], xyz[:, 1]), dtype=bool)
+
+
+def static_scene(geometry: SceneGeometry) -> StaticScene:
+    """Join a scene's surfaces, in an order that does not depend on that of the objects."""
+    meshes = (*geometry.roads, *geometry.ground, *geometry.occluders)
+    given = [
+        np.full(len(mesh.triangles), DEFAULT_REFLECTIVITY) if mesh.reflectivity is None else mesh.reflectivity
+        for mesh in meshes
+    ]
+    triangles, reflectivity = joined(meshes), np.concatenate([np.empty(0), *given])
+    order = np.lexsort([reflectivity, *triangles.reshape(len(triangles), 9).T[::-1]])
+    return StaticScene(triangles[order], reflectivity[order], geometry.region)

@@ -1,0 +1,99 @@
+"""The sensors that hang in a scene: empties in ``SEIP Sensors``, wherever a result or a hand put them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import bpy
+import numpy as np
+
+from ..core.arrays import Float
+from ..core.errors import SeipError
+from ..core.lidar import LidarModel, find_models
+from ..core.scans.sensor import MountedSensor
+from . import contract
+
+
+def read_sensors(scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel]) -> tuple[MountedSensor, ...]:
+    """Read where each sensor is and how it is turned: as the viewport shows it, moved by hand or not.
+
+    An empty's x axis points along azimuth zero and its z axis along the sensor's
+    axis; its scale means nothing. Hidden empties do not count. One without a
+    label of its own gets the first that is free.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    catalogue : mapping of str to LidarModel
+        Of which the empties' ``seip_sensor`` are keys.
+
+    Returns
+    -------
+    tuple of MountedSensor
+        By label, S2 before S10.
+
+    Raises
+    ------
+    SeipError
+        There is no sensor, or one names no type, an unknown one, or has no proper transform.
+    """
+    layer = scene.view_layers[0]
+    layer.update()
+    collection = contract.find(scene, contract.SENSORS)
+    members = [] if collection is None else [thing for thing in collection.all_objects if thing.type == "EMPTY"]
+    empties = [thing for thing in members if thing.name in layer.objects and thing.visible_get(view_layer=layer)]
+    if not empties:
+        hidden = f"; {len(members)} hidden ones do not count" * bool(members)
+        raise SeipError(
+            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{hidden}: "
+            "place some with headless/place.py"
+        )
+    labels = _labels(empties)
+    sensors = [_mounted(thing, labels[thing.name], catalogue) for thing in empties]
+    return tuple(sorted(sensors, key=lambda sensor: _natural(sensor.label)))
+
+
+def _mounted(thing: bpy.types.Object, label: str, catalogue: Mapping[str, LidarModel]) -> MountedSensor:
+    key = thing.get(contract.SENSOR)
+    if not isinstance(key, str):
+        raise SeipError(
+            f"empty {thing.name!r} in {contract.SENSORS!r} names no LiDAR: "
+            f"set its custom property {contract.SENSOR} to a key of the catalogue, or take it out"
+        )
+    try:
+        model = find_models(catalogue, [key])[key]
+    except SeipError as error:
+        raise SeipError(f"empty {thing.name!r}: {error}") from error
+    matrix = np.array(thing.matrix_world, dtype=np.float64)
+    length = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not (np.isfinite(matrix).all() and (length > 0).all()):
+        raise SeipError(f"empty {thing.name!r} has no place, or a scale of zero: set its transform anew")
+    return MountedSensor(label, model, matrix[:3, 3], _orthonormal(matrix[:3, :3] / length))
+
+
+def _orthonormal(matrix: Float) -> Float:
+    """Return the orthogonal matrix next to one that single precision has left a little off (polar decomposition)."""
+    left, size, right = np.linalg.svd(matrix)
+    nearest: Float = left @ right
+    return nearest if np.allclose(size, 1.0, atol=1e-3) else matrix
+
+
+def _labels(empties: list[bpy.types.Object]) -> dict[str, str]:
+    """Return each empty's label by its name: its own, or a new one where it has none or a copy has the same."""
+    found: dict[str, str] = {}
+    for thing in sorted(empties, key=lambda thing: _natural(thing.name)):
+        label = thing.get(contract.LABEL)
+        if isinstance(label, str) and label and label not in found.values():
+            found[thing.name] = label
+    for thing in empties:
+        if thing.name not in found:
+            free = (f"S{number}" for number in range(1, len(empties) + 1))
+            taken = {*found.values(), *(other.get(contract.LABEL) for other in empties)}
+            found[thing.name] = next(label for label in free if label not in taken)
+    return found
+
+
+def _natural(text: str) -> list[tuple[int, str]]:
+    """Return a key by which numbers in texts sort by their value."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", text)]

@@ -1,0 +1,137 @@
+"""Sensors read back from the scene, where a result or a hand put them."""
+
+import math
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from scene_by_hand import make_scene
+from small_junction import make_example
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.scene_geometry import DEFAULT_REFLECTIVITY
+from seip_addon.scene import contract
+from seip_addon.scene.materials import REFLECTIVITY, material
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import read_sensors
+from seip_addon.scene.write import write_result
+
+CATALOGUE = load_catalogue()
+
+
+@pytest.fixture(scope="module")
+def example():
+    return make_example()
+
+
+@pytest.fixture
+def scene(example):
+    scene = make_scene(example.geometry)
+    write_result(scene, example.site, example.deployment)
+    return scene
+
+
+def empties(scene):
+    return [thing for thing in contract.find(scene, contract.SENSORS).objects if thing.type == "EMPTY"]
+
+
+def test_sensors_are_read_as_they_were_written(scene, example):
+    sensors = read_sensors(scene, CATALOGUE)
+    assert [sensor.label for sensor in sensors] == [sensor.label for sensor in example.deployment.sensors]
+    for read, written in zip(sensors, example.deployment.sensors, strict=True):
+        assert read.model is CATALOGUE[written.model.key]
+        np.testing.assert_allclose(read.xyz, written.xyz, atol=1e-5)
+        forward = (math.cos(written.yaw), math.sin(written.yaw), 0.0)
+        np.testing.assert_allclose(
+            read.orientation, np.column_stack([forward, (-forward[1], forward[0], 0), (0, 0, 1)]), atol=1e-6
+        )
+
+
+def test_what_a_hand_has_done_counts(scene):
+    thing = empties(scene)[0]
+    parent = bpy.data.objects.new("mast", None)
+    scene.collection.objects.link(parent)
+    parent.location = (1.0, 2.0, 3.0)
+    parent.rotation_euler = (0.0, 0.0, math.pi / 2)
+    thing.parent = parent
+    thing.location = (10.0, 0.0, 1.0)
+    thing.rotation_euler = (0.0, math.radians(20), 0.0)
+    thing.scale = (2.0, 0.5, 3.0)
+    sensor = next(s for s in read_sensors(scene, CATALOGUE) if s.label == thing["seip_label"])
+    np.testing.assert_allclose(sensor.xyz, (1.0, 12.0, 4.0), atol=1e-5)
+    np.testing.assert_allclose(
+        sensor.orientation[:, 0], (0.0, math.cos(math.radians(20)), -math.sin(math.radians(20))), atol=1e-6
+    )
+
+
+def test_a_copy_and_one_without_a_label_get_the_first_that_is_free(scene):
+    for thing in (empties(scene)[0].copy(), empties(scene)[1].copy()):
+        contract.find(scene, contract.SENSORS).objects.link(thing)
+    del thing["seip_label"]
+    extra = empties(scene)[-1].copy()
+    extra["seip_label"] = "S10"
+    contract.find(scene, contract.SENSORS).objects.link(extra)
+    assert [sensor.label for sensor in read_sensors(scene, CATALOGUE)] == ["S1", "S2", "S3", "S4", "S5", "S10"]
+
+
+def test_a_hidden_sensor_is_none(scene):
+    empties(scene)[0].hide_set(True)
+    assert len(read_sensors(scene, CATALOGUE)) == 2
+    for thing in empties(scene):
+        thing.hide_set(True)
+    with pytest.raises(SeipError, match="3 hidden ones"):
+        read_sensors(scene, CATALOGUE)
+
+
+def test_a_scene_without_sensors_has_its_sentence(example):
+    with pytest.raises(SeipError, match=r"no sensors in the collection 'SEIP Sensors': place some"):
+        read_sensors(make_scene(example.geometry), CATALOGUE)
+
+
+@pytest.mark.parametrize("key", [None, 5, "type9"])
+def test_a_type_that_nobody_knows_has_its_sentence(scene, key):
+    thing = empties(scene)[0]
+    if key is None:
+        del thing["seip_sensor"]
+    else:
+        thing["seip_sensor"] = key
+    with pytest.raises(SeipError, match="type9" if key == "type9" else "names no LiDAR"):
+        read_sensors(scene, CATALOGUE)
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 0.0), (1.0, 1.0, -1.0)])
+def test_a_squashed_or_mirrored_sensor_has_its_sentence(scene, scale):
+    empties(scene)[0].scale = scale
+    with pytest.raises(SeipError, match="set it"):
+        read_sensors(scene, CATALOGUE)
+
+
+def test_surfaces_reflect_as_their_materials_say(example):
+    scene = make_scene(example.geometry)
+    road = contract.find(scene, contract.ROADS).objects[0]
+    building, tree = (contract.find(scene, contract.OCCLUDERS).objects[number] for number in (0, 5))
+    road.data.materials.clear()
+    road.data.materials.append(material("asphalt"))
+    mirror = bpy.data.materials.new("mirror")
+    mirror["seip_reflectivity"] = 0.01
+    building.data.materials.append(mirror)
+    building.data.polygons.foreach_set("material_index", [0, 1] * (len(building.data.polygons) // 2))
+    geometry = read_scene(scene).geometry
+    meshes = {mesh.name: mesh for mesh in (*geometry.roads, *geometry.occluders)}
+    assert set(meshes[road.name].reflectivity) == {REFLECTIVITY["asphalt"]}
+    assert set(meshes[tree.name].reflectivity) == {DEFAULT_REFLECTIVITY}
+    assert sorted(meshes[building.name].reflectivity) == [0.01] * 6 + [DEFAULT_REFLECTIVITY] * 6
+    assert all(len(mesh.reflectivity) == len(mesh.triangles) for mesh in meshes.values())
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.5, "bright", True])
+def test_a_reflectivity_that_is_none_has_its_sentence(example, share):
+    scene = make_scene(example.geometry)
+    contract.find(scene, contract.ROADS).objects[0].data.materials[0]["seip_reflectivity"] = share
+    with pytest.raises(SeipError, match="seip_reflectivity of material"):
+        read_scene(scene)
