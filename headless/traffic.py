@@ -42,7 +42,9 @@ from seip_addon.core.traffic.smooth_walks import smooth_walks
 from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
 from seip_addon.core.traffic.sumo_files import read_net_offset
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
+from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
+from seip_addon.scene.traffic import animate
 
 Result = TypeVar("Result")
 
@@ -56,10 +58,15 @@ LOOKS = 1.0
 def main(argv: list[str]) -> None:
     """Read or simulate traffic, fit it to the road and write it."""
     options = _parser().parse_args(argv)
+    if options.animate is not None:
+        check_name(options.animate)
     session.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
     trajectories = _simulated(options, geometry) if options.fcd is None else _imported(options, geometry)
     trajectories.save(options.output)
+    if options.animate is not None:
+        animate(bpy.context.scene, trajectories)
+        save_blend(options.animate)
     session.say(f"{options.output}: {_in_words(trajectories)}")
 
 
@@ -149,6 +156,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="NPZ", help="file for the trajectories")
+    parser.add_argument("--animate", type=Path, metavar="BLEND", help="the scene with this traffic, to press play in")
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument(
         "--fcd", type=Path, metavar="FILE", help="SUMO's floating car data: .xml or .csv, or packed .gz"

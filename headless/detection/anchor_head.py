@@ -1,0 +1,249 @@
+"""The head as published: boxes of given sizes at 0 and 90 degrees in each cell, and what they must become.
+
+After A. H. Lang et al.: PointPillars. CVPR 2019, and Y. Yan, Y. Mao, B. Li:
+SECOND: Sparsely Embedded Convolutional Detection. Sensors 18 (2018).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from .heads import Candidates, Targets, cell_middles, inner_cells
+from .losses import focal_loss
+from .network import OUTPUT_STRIDE
+from .pillars import PillarGrid
+from .settings import CLASSES, GROUND_ABOVE_BOTTOM
+
+CHANNELS = 10
+"""Of an anchor: score, seven of its box, two of its direction."""
+
+DIRECTION_FROM = math.pi / 4
+"""Yaw at which the first of the two directions begins: no street of a crossing along the axes runs there."""
+
+SMOOTH = 1 / 9
+"""Where the smooth L1 loss turns from a square into a line."""
+
+RARE = 0.01
+"""Score that every anchor begins with."""
+
+MOST_CANDIDATES = 500
+"""Boxes of a cloud that are looked at, the best first."""
+
+
+@dataclass(frozen=True)
+class AnchorSize:
+    """A box that stands in every cell, at 0 and at 90 degrees.
+
+    Parameters
+    ----------
+    category : str
+        One of `settings.CLASSES`.
+    length, width, height : float, metres
+    positive, negative : float
+        Overlap from which an anchor must find a road user, and below which it must find none.
+    """
+
+    category: str
+    length: float
+    width: float
+    height: float
+    positive: float = 0.6
+    negative: float = 0.45
+
+
+SIZES = (
+    AnchorSize("car", 4.5, 1.8, 1.6),
+    AnchorSize("car", 5.8, 2.0, 2.4),
+    AnchorSize("truck", 8.0, 2.5, 3.3),
+    AnchorSize("truck", 12.0, 2.55, 3.2),
+    AnchorSize("cycle", 1.9, 0.7, 1.7, positive=0.5, negative=0.35),
+    AnchorSize("pedestrian", 0.6, 0.6, 1.75, positive=0.5, negative=0.35),
+)
+TURNS = (0.0, math.pi / 2)
+
+
+class AnchorHead(nn.Module):
+    """Scores, boxes and directions of all anchors from a feature map.
+
+    Parameters
+    ----------
+    channels : int
+        Of the feature map.
+    """
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        anchors = len(SIZES) * len(TURNS)
+        self.final = nn.Conv2d(channels, anchors * CHANNELS, 1)
+        start = torch.zeros(anchors, CHANNELS)
+        start[:, 0] = math.log(RARE / (1 - RARE))
+        nn.init.normal_(self.final.weight, std=0.01)
+        self.final.bias = nn.Parameter(start.flatten())
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Return (b, anchors · 10, rows, columns): anchor after anchor its score, box and direction."""
+        output: Tensor = self.final(features)
+        return output
+
+    def loss(self, output: Tensor, targets: list[Targets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+        """Return the parts of the loss; see `heads.DetectionHead`."""
+        predicted = _by_anchor(output)
+        assigned = torch.stack([assignment(wanted, grid) for wanted in targets])
+        counted = (assigned != UNCLEAR) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
+        positive = (assigned >= 0) & counted
+        score = focal_loss(predicted[..., 0], positive, counted)
+
+        cloud, anchor, row, column = torch.nonzero(positive, as_tuple=True)
+        first = torch.tensor([0, *(len(wanted.boxes) for wanted in targets)]).cumsum(0)[:-1].to(output.device)
+        target = torch.cat([wanted.boxes for wanted in targets])[first[cloud] + assigned[cloud, anchor, row, column]]
+        anchors = anchor_boxes(grid, anchor, row, column)
+        found = predicted[cloud, anchor, row, column]
+        count = max(1, len(found))
+        wanted = encoded(target, anchors)
+        # The sine of the difference of the angles: a box turned by 180 degrees is as good.
+        turn = torch.sin(found[:, 7] - wanted[:, 6])
+        error = torch.cat((found[:, 1:7] - wanted[:, :6], turn[:, None]), dim=1)
+        box = functional.smooth_l1_loss(error, torch.zeros_like(error), beta=SMOOTH, reduction="sum") / count
+        direction = functional.cross_entropy(found[:, 8:], direction_of(target[:, 6]), reduction="sum") / count
+        return {"score": score, "box": 2.0 * box, "direction": 0.2 * direction}
+
+    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[Candidates]:
+        """Return the boxes that anchors have become; see `heads.DetectionHead`."""
+        found = []
+        for cloud in _by_anchor(output):
+            scores = torch.sigmoid(cloud[..., 0])
+            anchor, row, column = torch.nonzero(scores >= least_score, as_tuple=True)
+            score = scores[anchor, row, column]
+            best = torch.sort(score, descending=True, stable=True).indices[:MOST_CANDIDATES]
+            anchor, row, column = anchor[best], row[best], column[best]
+            predicted = cloud[anchor, row, column]
+            boxes = decoded(predicted[:, 1:], anchor_boxes(grid, anchor, row, column))
+            category = _categories(output.device)[anchor]
+            found.append(Candidates(boxes, score[best], category))
+        return found
+
+
+NOTHING, UNCLEAR = -1, -2
+"""What an anchor is assigned to that must find no road user, and one that may do as it likes."""
+
+
+def assignment(wanted: Targets, grid: PillarGrid) -> Tensor:
+    """Return which box each anchor must find: (anchors, rows, columns) int64, or `NOTHING` or `UNCLEAR`.
+
+    An anchor belongs to the road user of its class that overlaps it most, both
+    set along the nearer axis, if that is its ``positive`` share or more. The
+    anchor that overlaps a road user most belongs to it in any case.
+    """
+    device = wanted.boxes.device
+    overlap = _overlaps(wanted, grid)  # (boxes, anchors, rows, columns)
+    positive, negative = (
+        torch.tensor([getattr(size, name) for size in SIZES for _ in TURNS], device=device)[:, None, None]
+        for name in ("positive", "negative")
+    )
+    shape = overlap.shape[1:]
+    if len(overlap) == 0:
+        return torch.full(shape, NOTHING, device=device)
+    learnt = torch.nonzero(wanted.learnt)[:, 0]
+    unclear = (overlap >= negative).any(dim=0)
+    assigned = torch.where(unclear, UNCLEAR, NOTHING)
+    if len(learnt) == 0:
+        return assigned
+    most, owner = overlap[learnt].max(dim=0)
+    assigned = torch.where(most >= positive, learnt[owner], assigned)
+    peak, place = overlap[learnt].flatten(1).max(dim=1)
+    flat = assigned.flatten()
+    # Where one anchor is the best of two road users the later keeps it, on every machine.
+    for box, index, value in zip(learnt.tolist(), place.tolist(), peak.tolist(), strict=True):
+        if value > 0:
+            flat[index] = box
+    return flat.view(shape)
+
+
+def anchor_boxes(grid: PillarGrid, anchor: Tensor, row: Tensor, column: Tensor) -> Tensor:
+    """Return the boxes (m, 7) of anchors given by number, row and column."""
+    x, y = cell_middles(grid, OUTPUT_STRIDE, anchor.device)
+    sizes = torch.tensor([(s.length, s.width, s.height) for s in SIZES], device=anchor.device)
+    size = sizes[anchor // len(TURNS)]
+    yaw = torch.tensor(TURNS, device=anchor.device)[anchor % len(TURNS)]
+    z = grid.bottom + GROUND_ABOVE_BOTTOM + size[:, 2] / 2
+    return torch.cat((torch.stack((x[column], y[row], z), dim=1), size, yaw[:, None]), dim=1)
+
+
+def encoded(boxes: Tensor, anchors: Tensor) -> Tensor:
+    """Return what anchors must predict to become boxes, all (m, 7)."""
+    diagonal = torch.hypot(anchors[:, 3], anchors[:, 4])[:, None]
+    return torch.cat(
+        (
+            (boxes[:, :2] - anchors[:, :2]) / diagonal,
+            (boxes[:, 2:3] - anchors[:, 2:3]) / anchors[:, 5:6],
+            torch.log(boxes[:, 3:6] / anchors[:, 3:6]),
+            (boxes[:, 6] - anchors[:, 6])[:, None],
+        ),
+        dim=1,
+    )
+
+
+def decoded(predicted: Tensor, anchors: Tensor) -> Tensor:
+    """Return the boxes (m, 7) that anchors have become by what they predict, (m, 9) with two for the direction."""
+    diagonal = torch.hypot(anchors[:, 3], anchors[:, 4])[:, None]
+    direction = predicted[:, 7:].argmax(dim=1)
+    yaw = torch.remainder(predicted[:, 6] + anchors[:, 6] - DIRECTION_FROM, math.pi)
+    yaw = yaw + DIRECTION_FROM + math.pi * direction
+    yaw = torch.remainder(yaw + math.pi, 2 * math.pi) - math.pi
+    return torch.cat(
+        (
+            predicted[:, :2] * diagonal + anchors[:, :2],
+            predicted[:, 2:3] * anchors[:, 5:6] + anchors[:, 2:3],
+            torch.exp(predicted[:, 3:6].clamp(-3.0, 3.0)) * anchors[:, 3:6],
+            yaw[:, None],
+        ),
+        dim=1,
+    )
+
+
+def direction_of(yaw: Tensor) -> Tensor:
+    """Return which half of the circle yaws (m,) are in: 0 from `DIRECTION_FROM` on, 1 after half a turn."""
+    return (torch.remainder(yaw - DIRECTION_FROM, 2 * math.pi) >= math.pi).long()
+
+
+def _overlaps(wanted: Targets, grid: PillarGrid) -> Tensor:
+    """Return the overlaps (boxes, anchors, rows, columns) of anchors set along the axes; 0 across classes."""
+    boxes = wanted.boxes
+    x, y = cell_middles(grid, OUTPUT_STRIDE, boxes.device)
+    across = torch.sin(boxes[:, 6]).abs() > math.sqrt(0.5)
+    wide = torch.where(across, boxes[:, 4], boxes[:, 3])
+    deep = torch.where(across, boxes[:, 3], boxes[:, 4])
+    category = _categories(boxes.device)
+    layers = []
+    for number, size in enumerate(SIZES):
+        for turn in range(len(TURNS)):
+            sides = (size.length, size.width) if turn == 0 else (size.width, size.length)
+            shared_x = _shared(x, sides[0], boxes[:, 0], wide)
+            shared_y = _shared(y, sides[1], boxes[:, 1], deep)
+            shared = shared_x[:, None, :] * shared_y[:, :, None]
+            whole = (wide * deep + size.length * size.width)[:, None, None] - shared
+            same = (wanted.category == category[len(TURNS) * number + turn])[:, None, None]
+            layers.append(shared / whole * same)
+    return torch.stack(layers, dim=1)
+
+
+def _shared(middles: Tensor, side: float, centre: Tensor, extent: Tensor) -> Tensor:
+    """Return the lengths (boxes, cells) that intervals about the cells' middles share with the boxes'."""
+    low = torch.maximum(middles - side / 2, (centre - extent / 2)[:, None])
+    high = torch.minimum(middles + side / 2, (centre + extent / 2)[:, None])
+    return (high - low).clamp(min=0)
+
+
+def _categories(device: torch.device) -> Tensor:
+    return torch.tensor([CLASSES.index(size.category) for size in SIZES for _ in TURNS], device=device)
+
+
+def _by_anchor(output: Tensor) -> Tensor:
+    """Return the output as (b, anchors, rows, columns, 10)."""
+    clouds, _, rows, columns = output.shape
+    return output.view(clouds, -1, CHANNELS, rows, columns).permute(0, 1, 3, 4, 2)

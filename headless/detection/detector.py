@@ -1,0 +1,168 @@
+"""A detector: the network with its weights and the grid that they were learnt on, and the file that holds them."""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+import torch
+from torch import Tensor, nn
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.storage import whole_file
+
+from .anchor_head import AnchorHead
+from .centre_head import CentreHead
+from .heads import DetectionHead
+from .network import FeatureMap
+from .pillars import PillarGrid, Pillars
+from .settings import NetworkSettings
+
+SCHEMA, VERSION = "seip.detector", 1
+
+
+class Detector(nn.Module):
+    """PointPillars on a grid.
+
+    Parameters
+    ----------
+    settings : NetworkSettings
+    grid : PillarGrid
+        That of the whole extent.
+    seed : int
+        Of the weights it begins with.
+    """
+
+    def __init__(self, settings: NetworkSettings, grid: PillarGrid, seed: int = 0) -> None:
+        super().__init__()
+        self.settings, self.grid = settings, grid
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.feature_map = FeatureMap(settings)
+            channels = self.feature_map.channels
+            self.head = CentreHead(channels, settings.width) if settings.head == "centre" else AnchorHead(channels)
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # torch types do not know it
+
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return next(self.parameters()).device
+
+    @property
+    def found_by(self) -> DetectionHead:
+        """The head as what it can do, rather than as a module."""
+        return cast("DetectionHead", self.head)
+
+    def forward(self, pillars: Pillars, shape: tuple[int, int, int]) -> Tensor:
+        """Return what the head says of some clouds; ``shape`` is their number and the rows and columns of a cloud."""
+        features = torch.from_numpy(pillars.features).to(self.device)
+        pillar = torch.from_numpy(pillars.pillar).to(self.device)
+        output: Tensor = self.head(self.feature_map(features, pillar, shape))
+        return output
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write settings, grid and weights; the same detector gives the same bytes."""
+        save_state(path, {**self.description(), "weights": self.state_dict()})
+
+    def description(self) -> dict[str, Any]:
+        """Return settings and grid as plain values."""
+        return {"settings": _plain(asdict(self.settings)), "grid": asdict(self.grid)}
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], device: str = "cpu") -> Detector:
+        """Read a detector, or that of a training that is under way.
+
+        Raises
+        ------
+        SeipError
+            The file is not there, damaged, something else, or of another version.
+        """
+        state = load_state(path)
+        with _fault_of(path):
+            settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
+            grid = PillarGrid(**state["grid"])
+            detector = cls(settings, grid)
+            detector.load_state_dict(state["weights"])
+        return detector.to(device).eval()
+
+
+def require_grid(detector: Detector, grid: PillarGrid, path: str | os.PathLike[str]) -> None:
+    """See that a detector was trained on a grid.
+
+    Raises
+    ------
+    SeipError
+        It was trained on another one.
+    """
+    if detector.grid != grid:
+        raise SeipError(
+            f"{path} was trained on {_in_words(detector.grid)}, but this site has {_in_words(grid)}: "
+            "use a detector of this site, or train one here"
+        )
+
+
+def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
+    """Write plain values and tensors."""
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        # To an open file: a name would go into the bytes.
+        torch.save(_shared_text({"schema": SCHEMA, "version": VERSION, **state}), file)
+
+
+def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read what `save_state` wrote, to the CPU.
+
+    Raises
+    ------
+    SeipError
+        The file is not there, damaged, something else, or of another version.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise SeipError(f"there is no detector {path}: train one, or name another file") from error
+    with _fault_of(path):
+        state: dict[str, Any] = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
+        known = (state["schema"], state["version"]) == (SCHEMA, VERSION)
+    if not known:
+        raise SeipError(f"{path} is no detector of this version; train it again")
+    return state
+
+
+@contextmanager
+def _fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Lay what goes wrong in the block at the door of the file."""
+    damage = (RuntimeError, ValueError, TypeError, LookupError, EOFError, pickle.UnpicklingError, zipfile.BadZipFile)
+    try:
+        yield
+    except damage as error:
+        raise SeipError(f"{path} is no detector, or is damaged; train it again") from error
+
+
+def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
+    """Return a value in which equal texts are one object, which pickle writes once: so equal values give equal bytes."""
+    if isinstance(value, str):
+        return sys.intern(value)
+    if isinstance(value, dict):
+        return {_shared_text(key): _shared_text(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_shared_text(part) for part in value]
+    return value
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def _in_words(grid: PillarGrid) -> str:
+    return (
+        f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m from ({grid.west:g}, {grid.south:g}, "
+        f"{grid.bottom:g}) up to {grid.top:g} m"
+    )

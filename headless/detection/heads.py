@@ -1,0 +1,83 @@
+"""What heads have in common: the boxes they learn, the boxes they find, and the cells of the feature map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from .pillars import PillarGrid
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """The road users in one cloud; k boxes.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float32 Tensor
+        As in `detections.Detections`.
+    category : (k,) int64 Tensor
+    learnt : (k,) bool Tensor
+        Whether it has points enough to be asked for; where it is, nothing counts otherwise.
+    """
+
+    boxes: Tensor
+    category: Tensor
+    learnt: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Boxes of one cloud before those that overlap better ones are removed; k boxes.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float32 Tensor
+    score : (k,) float32 Tensor
+    category : (k,) int64 Tensor
+    """
+
+    boxes: Tensor
+    score: Tensor
+    category: Tensor
+
+
+class DetectionHead(Protocol):
+    """What every head can do, beside being a module."""
+
+    def loss(self, output: Tensor, targets: list[Targets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+        """Return the parts of the loss, weighted, whose sum is learnt from.
+
+        Parameters
+        ----------
+        output : (b, channels, rows, columns) Tensor
+            What the head returns.
+        targets : list of b Targets
+            In the coordinates of the grid.
+        grid : PillarGrid
+        margin : float, metres
+            A border in which nothing is learnt: it shows parts of what stands beyond.
+        """
+
+    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[Candidates]:
+        """Return the boxes of each cloud whose score is not below ``least_score``."""
+
+
+def cell_middles(grid: PillarGrid, stride: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return x (columns,) and y (rows,) of the middles of the cells of a feature map, metres."""
+    side = grid.pillar * stride
+    x = grid.west + side * (torch.arange(grid.columns // stride, device=device) + 0.5)
+    y = grid.south + side * (torch.arange(grid.rows // stride, device=device) + 0.5)
+    return x, y
+
+
+def inner_cells(grid: PillarGrid, stride: int, margin: float, device: torch.device) -> Tensor:
+    """Return which cells (rows, columns) of a feature map are ``margin`` or more from the border."""
+    x, y = cell_middles(grid, stride, device)
+    wide, deep = grid.columns * grid.pillar, grid.rows * grid.pillar
+    across = (x - grid.west >= margin) & (x - grid.west <= wide - margin)
+    along = (y - grid.south >= margin) & (y - grid.south <= deep - margin)
+    return along[:, None] & across

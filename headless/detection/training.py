@@ -1,0 +1,370 @@
+"""Training of a detector on many configurations of sensors at once.
+
+Every step takes windows about road users, each from a configuration, a frame
+and a place drawn by the seed and the number of the step: a training that was
+stopped goes on as if it had not been.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress
+
+from .average_precision import evaluate
+from .detector import Detector, load_state, save_state
+from .frame_results import Detected, FrameResult, Truth
+from .frames import Recording, Sample, Samples, require_separate
+from .heads import Targets
+from .inference import detect
+from .matching import Rule
+from .pillars import PillarGrid, Pillars, fill_pillars, stacked
+from .settings import GROUPS, STRIDE, NetworkSettings, TrainingSettings
+
+VALIDATION_FRAMES = 18
+"""Frames, spread over the recordings set aside, that each validation looks at."""
+
+MARGIN = 1.6
+"""Metres at the border of a window in which nothing is learnt: much of what is there lies outside."""
+
+JITTER = 0.25
+"""Share of a window that it lies beside its road user at most."""
+
+TURN, STRETCH = math.radians(8.0), 0.05
+"""Largest turn beyond quarter turns, and largest stretch, of what is learnt from."""
+
+STEEPEST = 10.0
+"""Norm beyond which a gradient is cut, as published."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """How a training went.
+
+    Parameters
+    ----------
+    loss : list of float
+        Of each step.
+    validation : dict of int to float
+        Average precision on the frames set aside, at `matching.Rule`'s overlap, after so many steps.
+    """
+
+    loss: list[float] = field(default_factory=list)
+    validation: dict[int, float] = field(default_factory=dict)
+
+    @property
+    def best(self) -> int:
+        """Steps after which the average precision was highest for the first time."""
+        return max(self.validation, key=lambda step: (self.validation[step], -step))
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A detector and how it came about.
+
+    Parameters
+    ----------
+    detector : Detector
+        As it was when it did best on the frames set aside.
+    curve : Curve
+    """
+
+    detector: Detector
+    curve: Curve
+
+
+def train(  # noqa: PLR0913  # what is learnt from, what learns, how, and where
+    recordings: Sequence[Recording],
+    validation: Sequence[Recording],
+    grid: PillarGrid,
+    network: NetworkSettings,
+    settings: TrainingSettings,
+    *,
+    device: str = "cpu",
+    store: str | os.PathLike[str] | None = None,
+) -> Generator[Progress, None, Trained]:
+    """Train a detector.
+
+    Parameters
+    ----------
+    recordings, validation : sequence of Recording
+        To learn from, and to see by when it is enough; from separate runs of traffic.
+    grid : PillarGrid
+    network : NetworkSettings
+    settings : TrainingSettings
+    device : str
+        Of torch: ``cpu``, ``cuda``.
+    store : path, optional
+        Where the state is kept at each validation, and where an earlier one is taken up.
+
+    Yields
+    ------
+    Progress
+        Step by step, with the loss.
+
+    Returns
+    -------
+    Trained
+        The same bytes for the same arguments, on one kind of processor.
+
+    Raises
+    ------
+    SeipError
+        Runs overlap, there is no frame, or ``store`` holds another training.
+    """
+    require_separate({"training": recordings, "validation": validation})
+    run = _Run(recordings, validation, grid, network, settings, device)
+    if store is not None and Path(store).exists():
+        run.restore(store)
+    yield run.progress()
+    while not run.done:
+        with _deterministic(settings.threads):  # and no longer: whoever steps this may use torch in between
+            run.advance()
+            if run.step % settings.validate_every == 0 or run.step == settings.steps:
+                run.validate()
+                if store is not None:
+                    run.store(store)
+        yield run.progress()
+    return run.result()
+
+
+class _Run:
+    """A training that is under way."""
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        validation: Sequence[Recording],
+        grid: PillarGrid,
+        network: NetworkSettings,
+        settings: TrainingSettings,
+        device: str,
+    ) -> None:
+        self.settings = settings
+        self.samples = Samples(recordings, grid, network.most_points)
+        self.aside = Samples(validation, grid, network.most_points)
+        self.detector = Detector(network, grid, settings.seed).to(device)
+        self.optimiser = torch.optim.AdamW(
+            self.detector.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
+        )
+        self.schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self.optimiser, settings.learning_rate, total_steps=settings.steps + 1
+        )
+        self.window = STRIDE * math.ceil(settings.window / (network.pillar * STRIDE) - 1e-9)
+        self.step = 0
+        self.curve = Curve()
+        self.best = _copied(self.detector.state_dict())
+
+    @property
+    def done(self) -> bool:
+        """Whether there is nothing left to do."""
+        waited = sum(step > self.curve.best for step in self.curve.validation)
+        return self.step >= self.settings.steps or waited >= self.settings.patience
+
+    def advance(self) -> None:
+        """Do one step."""
+        self.detector.train()
+        random = np.random.default_rng([self.settings.seed, 1, self.step])
+        batch = self._batch([self.samples.drawn(random) for _ in range(self.settings.batch)], random)
+        loss = self._loss(batch)
+        self.optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.detector.parameters(), STEEPEST)
+        self.optimiser.step()
+        self.schedule.step()
+        self.curve.loss.append(float(loss.detach()))
+        self.step += 1
+
+    def validate(self) -> None:
+        """Take the average precision on the frames set aside, which are always the same."""
+        results = [judged(self.detector, sample) for sample in self.aside.spread(VALIDATION_FRAMES)]
+        rule = Rule(fewest_points=self.settings.least_points)
+        self.curve.validation[self.step] = evaluate(results, rule).average_precision
+        if self.curve.best == self.step:
+            self.best = _copied(self.detector.state_dict())
+
+    def progress(self) -> Progress:
+        """Return how far it is, with the loss."""
+        what = "train"
+        if self.curve.loss:
+            what += f", loss {np.mean(self.curve.loss[-20:]):.2f}"
+        if self.curve.validation:
+            what += f", validation AP {100 * next(reversed(self.curve.validation.values())):.1f} %"
+        return Progress(self.step, self.settings.steps, what)
+
+    def result(self) -> Trained:
+        """Return the best detector so far."""
+        self.detector.load_state_dict(self.best)
+        return Trained(self.detector.eval(), self.curve)
+
+    def store(self, path: str | os.PathLike[str]) -> None:
+        """Write all that is needed to go on, and the best weights so far as those of a detector."""
+        save_state(
+            path,
+            {
+                **self.detector.description(),
+                "weights": _copied(self.best),
+                "training": {
+                    "settings": asdict(self.settings),
+                    "recordings": self._sources(),
+                    "step": self.step,
+                    "curve": asdict(self.curve),
+                    "weights": _copied(self.detector.state_dict()),
+                    "optimiser": self.optimiser.state_dict(),
+                    "schedule": self.schedule.state_dict(),
+                },
+            },
+        )
+
+    def restore(self, path: str | os.PathLike[str]) -> None:
+        """Go on where an earlier training was when it was stored."""
+        state = load_state(path)
+        earlier = state.get("training", {})
+        same = (
+            {"settings": state["settings"], "grid": state["grid"]} == self.detector.description()
+            and earlier.get("settings") == asdict(self.settings)
+            and earlier.get("recordings") == self._sources()
+        )
+        if not same:
+            raise SeipError(
+                f"{path} is of a training with other settings, another grid or other recordings: "
+                "delete it, or choose another file"
+            )
+        self.step = int(earlier["step"])
+        self.curve = Curve(**earlier["curve"])
+        self.best = state["weights"]
+        self.detector.load_state_dict(earlier["weights"])
+        self.optimiser.load_state_dict(earlier["optimiser"])
+        self.schedule.load_state_dict(earlier["schedule"])
+
+    def _sources(self) -> list[list[str | int]]:
+        both = (*self.samples.recordings, *self.aside.recordings)
+        return [[recording.name, recording.traffic, len(recording.frames)] for recording in both]
+
+    def _batch(self, samples: Sequence[Sample], random: np.random.Generator) -> _Batch:
+        return _batch(samples, self.detector, self.window, self.settings.least_points, random)
+
+    def _loss(self, batch: _Batch) -> Tensor:
+        output = self.detector(batch.pillars, (len(batch.targets), batch.grid.rows, batch.grid.columns))
+        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, MARGIN)
+        return torch.stack(list(parts.values())).sum()
+
+
+@dataclass(frozen=True, eq=False)
+class _Batch:
+    """Windows moved onto one grid."""
+
+    pillars: Pillars
+    targets: list[Targets]
+    grid: PillarGrid
+
+
+def _batch(
+    samples: Sequence[Sample], detector: Detector, window: int, least_points: int, random: np.random.Generator
+) -> _Batch:
+    """Return a window of each sample, turned, mirrored and stretched."""
+    clouds, targets = [], []
+    grid = detector.grid.window(*detector.grid.centre, window)
+    for sample in samples:
+        varied = vary(sample, grid, random)
+        clouds.append(fill_pillars(varied.points, grid, detector.settings.most_points))
+        targets.append(_targets(varied, least_points, detector.device))
+    return _Batch(stacked(clouds, grid), targets, grid)
+
+
+def vary(sample: Sample, window: PillarGrid, random: np.random.Generator) -> Sample:
+    """Return what a window about a random road user shows, moved to the window and varied.
+
+    It is turned by quarters of a circle and a little more, mirrored and
+    stretched: streets may run anywhere, and vehicles are of all sizes.
+    """
+    size = window.columns * window.pillar
+    focus = np.array(window.centre)
+    if len(sample.boxes):
+        focus = sample.boxes[int(random.integers(len(sample.boxes))), :2]
+    focus = focus + random.uniform(-JITTER, JITTER, 2) * size
+    angle = random.integers(4) * math.pi / 2 + random.uniform(-TURN, TURN)
+    mirrored = bool(random.integers(2))
+    scale = float(random.uniform(1 - STRETCH, 1 + STRETCH))
+
+    matrix = scale * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    if mirrored:
+        matrix = matrix @ np.diag((1.0, -1.0))
+    reach = size * math.sqrt(0.5) / (1 - STRETCH)
+    near = (np.abs(sample.points[:, :2] - focus) <= reach).all(axis=1)
+    points = sample.points[near]
+    middle = np.array(window.centre)
+    points[:, :2] = (points[:, :2] - focus) @ matrix.T + middle
+    points[:, 2] = (points[:, 2] - window.bottom) * scale + window.bottom
+
+    boxes = sample.boxes.copy()
+    boxes[:, :2] = (boxes[:, :2] - focus) @ matrix.T + middle
+    boxes[:, 2] = (boxes[:, 2] - window.bottom) * scale + window.bottom
+    boxes[:, 3:6] *= scale
+    boxes[:, 6] = angle + (-boxes[:, 6] if mirrored else boxes[:, 6])
+    seen = (np.abs(boxes[:, :2] - middle) <= size / 2).all(axis=1)
+    return Sample(points, boxes[seen], sample.category[seen], sample.returns[seen])
+
+
+def judged(detector: Detector, sample: Sample) -> FrameResult:
+    """Return what a detector finds in a sample, all of which counts, beside what is there."""
+    found = detect(detector, sample.points[:, :3], sample.points[:, 3])
+    names = np.array([members[0] for members in GROUPS.values()], dtype=np.str_)
+    return FrameResult(
+        run="",
+        time=0.0,
+        truth=Truth(
+            boxes=sample.boxes,
+            category=names[sample.category],
+            points=sample.returns,
+            visibility=np.ones(len(sample.boxes)),
+            inside=np.ones(len(sample.boxes), dtype=np.bool_),
+            distance=np.zeros(len(sample.boxes)),
+        ),
+        detected=Detected(
+            boxes=found.boxes,
+            score=found.score,
+            category=names[found.category],
+            points=np.zeros(len(found), dtype=np.int64),
+            density=np.zeros(len(found)),
+            inside=np.ones(len(found), dtype=np.bool_),
+            distance=np.zeros(len(found)),
+        ),
+    )
+
+
+def _targets(sample: Sample, least_points: int, device: torch.device) -> Targets:
+    return Targets(
+        boxes=torch.from_numpy(sample.boxes.astype(np.float32)).to(device),
+        category=torch.from_numpy(sample.category).to(device),
+        learnt=torch.from_numpy(sample.returns >= least_points).to(device),
+    )
+
+
+def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
+    return {name: value.detach().clone() for name, value in state.items()}
+
+
+@contextmanager
+def _deterministic(threads: int) -> Iterator[None]:
+    """Have torch do every sum in the same order, every time."""
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA asks for to do so
+    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(mode=True)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before[0])
+        torch.use_deterministic_algorithms(before[1])

@@ -1,0 +1,260 @@
+"""What heads ask of a feature map, what they make of it, and what they learn from."""
+
+import math
+
+from headless.detection import anchor_head, centre_head
+from headless.detection.anchor_head import NOTHING, SIZES, UNCLEAR, AnchorHead, anchor_boxes, assignment
+from headless.detection.centre_head import CentreHead
+from headless.detection.heads import Targets
+from headless.detection.losses import focal_loss, heat_map_loss
+from headless.detection.pillars import PillarGrid
+from headless.detection.rotated_boxes import in_plan, paired_iou
+from headless.detection.settings import CLASSES
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+GRID = PillarGrid(west=-8.0, south=-6.4, bottom=-1.0, top=4.0, columns=40, rows=32, pillar=0.4)
+CAR, TRUCK, CYCLE, PEDESTRIAN = range(4)
+
+
+def targets(*rows, learnt=None):
+    """Targets from rows of class and box."""
+    boxes = torch.tensor([row[1:] for row in rows], dtype=torch.float32).reshape(-1, 7)
+    category = torch.tensor([row[0] for row in rows], dtype=torch.int64)
+    kept = torch.ones(len(rows), dtype=torch.bool) if learnt is None else torch.tensor(learnt)
+    return Targets(boxes, category, kept)
+
+
+def random_targets(seed, count=4):
+    random = np.random.default_rng(seed)
+    rows = []
+    for _ in range(count):
+        category = int(random.integers(4))
+        size = SIZES[[s.category for s in SIZES].index(CLASSES[category])]
+        shape = np.array([size.length, size.width, size.height]) * random.uniform(0.8, 1.25, 3)
+        place = random.uniform([-7.5, -6.0], [7.5, 6.0])
+        rows.append((category, *place, shape[2] / 2, *shape, random.uniform(-math.pi, math.pi)))
+    return targets(*rows)
+
+
+def standing(x, y, length, width):
+    return x - length / 2, y - width / 2, x + length / 2, y + width / 2
+
+
+def plain_iou(a, b):
+    wide = max(0.0, min(a[2], b[2]) - max(a[0], b[0]))
+    deep = max(0.0, min(a[3], b[3]) - max(a[1], b[1]))
+    areas = [(r[2] - r[0]) * (r[3] - r[1]) for r in (a, b)]
+    return wide * deep / (sum(areas) - wide * deep)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_anchors_are_assigned_as_a_slow_loop_does(seed):  # noqa: C901  # a loop for each thing to choose among
+    wanted = random_targets(seed)
+    got = assignment(wanted, GRID)
+    expected = torch.full_like(got, NOTHING)
+    best = dict.fromkeys(range(len(wanted.boxes)), (0.0, None))
+    for anchor in range(2 * len(SIZES)):
+        size = SIZES[anchor // 2]
+        sides = (size.length, size.width) if anchor % 2 == 0 else (size.width, size.length)
+        for row in range(16):
+            for column in range(20):
+                here = standing(-8 + 0.8 * (column + 0.5), -6.4 + 0.8 * (row + 0.5), *sides)
+                most, owner = 0.0, None
+                for box, (x, y, _, length, width, _, yaw) in enumerate(wanted.boxes.tolist()):
+                    if CLASSES[wanted.category[box]] != size.category:
+                        continue
+                    across = abs((yaw + math.pi / 4) % math.pi) > math.pi / 2
+                    iou = plain_iou(here, standing(x, y, *((width, length) if across else (length, width))))
+                    if iou > best[box][0] + 1e-6:
+                        best[box] = (iou, (anchor, row, column))
+                    if iou > most:
+                        most, owner = iou, box
+                if most >= size.positive:
+                    expected[anchor, row, column] = owner
+                elif most >= size.negative:
+                    expected[anchor, row, column] = UNCLEAR
+    for box, (_, place) in best.items():
+        if place is not None:
+            expected[place] = box
+    # A best anchor may tie with its mirror image: then either will do.
+    assert (got != expected).sum() <= 2
+    for box, (_, place) in best.items():
+        assert place is None or (got == box).any()
+
+
+def test_no_anchor_is_held_against_a_road_user_that_nobody_saw():
+    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), learnt=[False])
+    got = assignment(hidden, GRID)
+    assert (got != NOTHING).any()
+    assert (got[got != NOTHING] == UNCLEAR).all()
+
+
+@given(st.integers(0, 10_000))
+def test_anchors_become_the_boxes_they_are_told_to(seed):
+    random = np.random.default_rng(seed)
+    count = 5
+    places = [torch.from_numpy(random.integers(0, top, count)) for top in (2 * len(SIZES), 16, 20)]
+    anchors = anchor_boxes(GRID, *places)
+    boxes = anchors.clone()
+    boxes[:, :3] += torch.from_numpy(random.uniform(-2, 2, (count, 3)).astype(np.float32))
+    boxes[:, 3:6] *= torch.from_numpy(random.uniform(0.5, 2, (count, 3)).astype(np.float32))
+    boxes[:, 6] = torch.from_numpy(random.uniform(-3.1, 3.1, count).astype(np.float32))
+    direction = torch.nn.functional.one_hot(anchor_head.direction_of(boxes[:, 6]), 2).float()
+    told = torch.cat((anchor_head.encoded(boxes, anchors), direction), dim=1)
+    back = anchor_head.decoded(told, anchors)
+    torch.testing.assert_close(back[:, :6], boxes[:, :6], atol=1e-4, rtol=1e-4)
+    turn = torch.remainder(back[:, 6] - boxes[:, 6] + math.pi, 2 * math.pi) - math.pi
+    assert turn.abs().max() < 1e-4
+
+
+def test_a_heading_turned_by_half_a_circle_is_mended_by_the_direction_alone():
+    anchors = anchor_boxes(GRID, *(torch.tensor([value]) for value in (0, 5, 5)))
+    told = torch.zeros(1, 9)
+    told[0, 8] = 1.0
+    assert abs(abs(float(anchor_head.decoded(told, anchors)[0, 6])) - 0.0) < 1e-6
+    told[0, 7] = 2.0
+    assert abs(abs(float(anchor_head.decoded(told, anchors)[0, 6])) - math.pi) < 1e-6
+
+
+def perfect_output(wanted, grid):
+    """The output of a centre head that knows the road users."""
+    rows, columns = grid.rows // 2, grid.columns // 2
+    output = torch.zeros(1, len(CLASSES) + centre_head.BOX_CHANNELS, rows, columns)
+    output[:, : len(CLASSES)] = -10.0
+    for category, box in zip(wanted.category.tolist(), wanted.boxes, strict=True):
+        column, row = int((box[0] - grid.west) / 0.8), int((box[1] - grid.south) / 0.8)
+        middle = torch.tensor([grid.west + 0.8 * (column + 0.5), grid.south + 0.8 * (row + 0.5), grid.bottom])
+        output[0, category, row, column] = 10.0
+        size = torch.log(box[3:6] / torch.tensor(centre_head.TYPICAL_SIZE))
+        axis = torch.stack((torch.sin(2 * box[6]), torch.cos(2 * box[6])))
+        ahead = torch.stack((torch.cos(box[6]), torch.sin(box[6])))
+        told = torch.cat((box[:3] - middle, size, axis, ahead, torch.tensor([10.0])))
+        output[0, len(CLASSES) :, row, column] = told
+    return output
+
+
+@given(st.integers(0, 10_000))
+def test_a_centre_head_that_knows_the_boxes_says_them(seed):
+    wanted = random_targets(seed, count=1)
+    (found,) = CentreHead(4, 8).candidates(perfect_output(wanted, GRID), GRID, 0.1)
+    assert found.category.tolist() == wanted.category.tolist()
+    torch.testing.assert_close(found.boxes, wanted.boxes, atol=1e-4, rtol=1e-4)
+    assert found.score[0] > 0.99
+
+
+def test_what_is_known_costs_nothing():
+    wanted = targets((CAR, 0.1, 0.3, 0.8, 4.5, 1.8, 1.6, 0.4))
+    output = perfect_output(wanted, GRID)
+    row, column = torch.nonzero(output[0, CAR] > 0)[0].tolist()
+    told = output[:, len(CLASSES) :, row, column].clone()
+    middles = centre_head.cell_bottoms(GRID, torch.tensor([row]), torch.tensor([column]))
+    parts = centre_head.box_losses(told, wanted.boxes, middles, torch.ones(1))
+    for name in ("offset", "size", "axis"):
+        assert float(parts[name]) < 1e-5
+    turned = wanted.boxes.clone()
+    turned[:, 6] += math.pi
+    again = centre_head.box_losses(told, turned, middles, torch.ones(1))
+    assert float(again["axis"]) < 1e-5  # front and back are none of the axis's business
+    assert float(again["ahead"]) > float(parts["ahead"])
+
+
+def test_heat_lies_along_the_road_user():
+    box = torch.tensor([[0.4, 0.4, 1.5, 12.0, 2.5, 3.2, 0.5]])
+    heat, _ = centre_head.heat_of(box, GRID, torch.device("cpu"))
+    assert float(heat[8, 10]) == 1.0  # the cell of the centre
+    ahead = (int(8 + math.sin(0.5) * 2.4 / 0.8), int(10 + math.cos(0.5) * 2.4 / 0.8))
+    aside = (int(8 + math.cos(0.5) * 2.4 / 0.8), int(10 - math.sin(0.5) * 2.4 / 0.8))
+    assert float(heat[ahead]) > 0.4
+    assert float(heat[aside]) < 0.05
+
+
+@pytest.mark.parametrize("make", [lambda: CentreHead(6, 8), lambda: AnchorHead(6)])
+def test_losses_are_finite_and_lead_downhill(make):
+    torch.manual_seed(1)
+    head, features = make(), torch.randn(2, 6, 16, 20)
+    wanted = [random_targets(1), targets()]
+    optimiser = torch.optim.Adam(head.parameters(), lr=0.02)
+    values = []
+    for _ in range(40):
+        loss = torch.stack(list(head.loss(head(features), wanted, GRID, 0.8).values())).sum()
+        assert torch.isfinite(loss)
+        values.append(float(loss.detach()))
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+    assert values[-1] < 0.7 * values[0]
+
+
+@pytest.mark.parametrize("make", [lambda: CentreHead(3, 4), lambda: AnchorHead(3)])
+def test_gradients_of_the_losses_are_their_slopes(make):
+    torch.manual_seed(2)
+    head = make().double().eval()
+    wanted = Targets(
+        *(part.double() if part.is_floating_point() else part for part in vars(random_targets(3)).values())
+    )
+    output = head(torch.randn(1, 3, 16, 20, dtype=torch.float64)).detach().requires_grad_()
+
+    def parts(values):
+        return [part for name, part in head.loss(values, [wanted], GRID, 0.0).items() if name != "overlap"]
+
+    torch.stack(parts(output)).sum().backward()
+    step = 1e-6
+    random = np.random.default_rng(4)
+    steepest = output.grad.abs().flatten().topk(40).indices.tolist()
+    for index in [*steepest, *random.integers(0, output.numel(), 40).tolist()]:
+        moved = output.detach().clone()
+        moved.view(-1)[index] += step
+        higher = float(torch.stack(parts(moved)).sum())
+        moved.view(-1)[index] -= 2 * step
+        lower = float(torch.stack(parts(moved)).sum())
+        assert output.grad.view(-1)[index] == pytest.approx((higher - lower) / (2 * step), abs=1e-5, rel=1e-4)
+
+
+@pytest.mark.parametrize("make", [lambda: CentreHead(3, 4), lambda: AnchorHead(3)])
+def test_the_border_and_the_unseen_are_learnt_from_by_nobody(make):
+    torch.manual_seed(3)
+    head = make()
+    output = head(torch.randn(1, 3, 16, 20)).detach().requires_grad_()
+    hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), learnt=[False])
+    torch.stack(list(head.loss(output, [hidden], GRID, 1.6).values())).sum().backward()
+    slope = output.grad[0].abs().sum(dim=0)
+    assert (slope[:2] == 0).all()
+    assert (slope[:, -2:] == 0).all()
+    assert (slope[4] > 0).any()
+    scores = output.grad[0, : len(CLASSES)] if isinstance(head, CentreHead) else output.grad[0, :40:10]
+    assert (scores[0, 8, 10] == 0).all()
+
+
+def test_focal_losses_by_hand():
+    logits = torch.tensor([[0.0, math.log(3.0)]])  # shares of 1/2 and 3/4
+    everywhere = torch.ones(1, 2, dtype=torch.bool)
+    # hit: 0.25 · (1/2)² · ln 2; false: 0.75 · (3/4)² · ln 4; one positive
+    expected = 0.25 * 0.25 * math.log(2) + 0.75 * 0.5625 * math.log(4)
+    assert float(focal_loss(logits, torch.tensor([[True, False]]), everywhere)) == pytest.approx(expected)
+    # peak: (1/2)² · ln 2; beside it: (1 − 1/2)⁴ · (3/4)² · ln 4
+    expected = 0.25 * math.log(2) + 0.0625 * 0.5625 * math.log(4)
+    assert float(heat_map_loss(logits, torch.tensor([[1.0, 0.5]]), everywhere)) == pytest.approx(expected)
+
+
+def test_the_predicted_overlap_is_taught_the_true_one():
+    wanted = targets((CAR, 0.1, 0.3, 0.8, 4.5, 1.8, 1.6, 0.4))
+    shifted = wanted.boxes.clone()
+    shifted[:, 0] += 0.5
+    true = float(paired_iou(in_plan(shifted), in_plan(wanted.boxes)))
+    middle = torch.zeros(1, 3)
+    told = torch.zeros(1, centre_head.BOX_CHANNELS)
+    told[0, :3] = shifted[0, :3]
+    told[0, 3:6] = torch.log(shifted[0, 3:6] / torch.tensor(centre_head.TYPICAL_SIZE))
+    told[0, 6], told[0, 7] = math.sin(0.8), math.cos(0.8)
+    told[0, 8], told[0, 9] = math.cos(0.4), math.sin(0.4)
+    losses = []
+    for guess in (0.3, true, 0.95):
+        told[0, 10] = math.log(guess / (1 - guess))
+        losses.append(float(centre_head.box_losses(told, wanted.boxes, middle, torch.ones(1))["overlap"]))
+    assert losses[1] < losses[0]
+    assert losses[1] < losses[2]

@@ -1,0 +1,163 @@
+"""Pillars against a slow loop, and what must not matter to them."""
+
+import math
+
+from headless.detection.network import PillarEncoder
+from headless.detection.pillars import FEATURES, PillarGrid, fill_pillars, grid_over, stacked
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+
+GRID = PillarGrid(west=-3.0, south=-2.0, bottom=-1.0, top=4.0, columns=12, rows=8, pillar=0.5)
+
+
+def cloud(count, seed, spread=1.0):
+    random = np.random.default_rng(seed)
+    low, high = np.array([-4.0, -3.0, -2.0, 0.0]) * spread, np.array([4.0, 3.0, 5.0, 1.0]) * spread
+    return random.uniform(low, high, (count, 4)).astype(np.float32)
+
+
+def slow_features(points, grid, most):
+    """Features of every point of a cloud whose pillars hold no more than they keep, by the point's bytes."""
+    pillars = {}
+    for point in points:
+        column = math.floor((point[0] - np.float32(grid.west)) / np.float32(grid.pillar))
+        row = math.floor((point[1] - np.float32(grid.south)) / np.float32(grid.pillar))
+        if 0 <= column < grid.columns and 0 <= row < grid.rows and grid.bottom <= point[2] < grid.top:
+            pillars.setdefault((row, column), []).append(point)
+    found = {}
+    for (row, column), members in pillars.items():
+        assert len(members) <= most
+        x = grid.west + (column + 0.5) * grid.pillar
+        y = grid.south + (row + 0.5) * grid.pillar
+        mean = np.mean(np.array(members, dtype=float)[:, :3], axis=0)
+        for point in members:
+            found[point.tobytes()] = (
+                row * grid.columns + column,
+                [
+                    (point[2] - grid.bottom) / 2,
+                    point[3],
+                    (point[0] - mean[0]) / 0.25,
+                    (point[1] - mean[1]) / 0.25,
+                    (point[2] - mean[2]) / 0.5,
+                    (point[0] - x) / 0.25,
+                    (point[1] - y) / 0.25,
+                    math.log(len(members)) / 3,
+                ],
+            )
+    return found
+
+
+@given(st.integers(0, 300), st.integers(0, 1000))
+def test_features_are_those_of_a_slow_loop(count, seed):
+    points = cloud(count, seed)
+    pillars = fill_pillars(points, GRID, 32)
+    expected = slow_features(points, GRID, 32)
+    assert len(pillars.features) == len(expected)
+    for point, features, pillar in zip(points[pillars.chosen], pillars.features, pillars.pillar, strict=True):
+        number, wanted = expected[point.tobytes()]
+        assert pillar == number
+        np.testing.assert_allclose(features, wanted, atol=2e-5)
+
+
+@given(st.integers(1, 2000), st.integers(1, 9), st.integers(0, 100))
+def test_pillars_keep_the_same_points_in_any_order_and_no_more_than_they_may(count, most, seed):
+    points = cloud(count, seed)
+    order = np.random.default_rng(seed).permutation(count)
+    one, other = fill_pillars(points, GRID, most), fill_pillars(points[order], GRID, most)
+    np.testing.assert_array_equal(one.features, other.features)
+    np.testing.assert_array_equal(points[one.chosen], points[order][other.chosen])
+    assert np.bincount(one.pillar, minlength=1).max() <= most
+    everything = fill_pillars(points, GRID, 32 * count)
+    met = np.bincount(everything.pillar, minlength=len(GRID))
+    np.testing.assert_array_equal(np.bincount(one.pillar, minlength=len(GRID)), np.minimum(met, most))
+
+
+def test_choosing_among_those_chosen_changes_nothing():
+    points = cloud(4000, 5)
+    once = fill_pillars(points, GRID, 6)
+    twice = fill_pillars(points[np.sort(once.chosen)], GRID, 6)
+    np.testing.assert_array_equal(points[once.chosen], points[np.sort(once.chosen)][twice.chosen])
+
+
+def test_points_are_chosen_evenly():
+    """Of 20,000 points side by side in one pillar the 1,000 kept are from all over it: no corner is preferred."""
+    points = cloud(20_000, 6) * np.array([0, 0, 0, 1], dtype=np.float32)
+    points[:, 0] = np.linspace(0.001, 0.499, len(points))
+    kept = points[fill_pillars(points, GRID, 1000).chosen, 0]
+    share = np.histogram(kept, bins=5, range=(0, 0.5))[0] / 1000
+    assert (np.abs(share - 0.2) < 0.05).all()
+
+
+def test_an_empty_cloud_has_no_pillars():
+    pillars = fill_pillars(np.zeros((0, 4), dtype=np.float32), GRID, 8)
+    assert pillars.features.shape == (0, FEATURES)
+    far = fill_pillars(np.full((5, 4), 99.0, dtype=np.float32), GRID, 8)
+    assert len(far.pillar) == 0
+
+
+def encoder(seed=0, width=8):
+    torch.manual_seed(seed)
+    module = PillarEncoder(width)
+    torch.nn.init.normal_(module.normalisation.weight)  # of both signs, and away from where layers begin
+    torch.nn.init.normal_(module.normalisation.bias)
+    module.normalisation.running_mean.normal_()
+    return module.eval()
+
+
+def encoded(module, pillars, count):
+    with torch.no_grad():
+        return module(torch.from_numpy(pillars.features), torch.from_numpy(pillars.pillar), count)
+
+
+def test_the_encoder_takes_the_maximum_of_each_pillar():
+    module, pillars = encoder(), fill_pillars(cloud(400, 7), GRID, 8)
+    got = encoded(module, pillars, len(GRID))
+    normal = module.normalisation
+    for number in range(len(GRID)):
+        mine = torch.from_numpy(pillars.features[pillars.pillar == number])
+        if len(mine) == 0:
+            assert (got[number] == 0).all()
+            continue
+        linear = mine @ module.linear.weight.T
+        scaled = (linear - normal.running_mean) / torch.sqrt(normal.running_var + normal.eps)
+        expected = (scaled * normal.weight + normal.bias).clamp(min=0).max(dim=0).values
+        torch.testing.assert_close(got[number], expected, atol=1e-5, rtol=1e-5)
+
+
+def test_a_cloud_looks_the_same_beside_a_fuller_one():
+    """There is no padding that could show: neither in the features nor in what training normalises over."""
+    few, many = fill_pillars(cloud(60, 8), GRID, 8), fill_pillars(cloud(2000, 9), GRID, 8)
+    both = stacked([few, many], GRID)
+    module = encoder()
+    together = encoded(module, both, 2 * len(GRID))
+    torch.testing.assert_close(together[: len(GRID)], encoded(module, few, len(GRID)), atol=0, rtol=0)
+    module.train()
+    encoded(module, both, 2 * len(GRID))
+    linear = torch.from_numpy(both.features) @ module.linear.weight.T
+    module.normalisation.reset_running_stats()
+    module.normalisation.momentum = 1.0
+    encoded(module, both, 2 * len(GRID))
+    torch.testing.assert_close(module.normalisation.running_mean, linear.mean(dim=0), atol=1e-5, rtol=1e-4)
+
+
+def test_grids_cover_the_region_and_fit_the_network():
+    grid = grid_over((-95.0, -95.0, 95.0, 94.887), (-1.0, 6.0), 0.4)
+    assert (grid.columns, grid.rows) == (480, 480)
+    assert max(grid.west, grid.south) <= -95
+    assert min(grid.east, grid.north) >= 95
+    exact = grid_over((0.0, 0.0, 12.8, 6.4), (0.0, 3.0), 0.4)
+    assert (exact.columns, exact.rows) == (32, 16)
+    assert grid.centre == pytest.approx((0.0, -0.0565))
+
+
+def test_what_no_grid_can_be_laid_over_is_refused():
+    with pytest.raises(SeipError, match="extent of the detector is empty"):
+        grid_over((5.0, 0.0, 5.0, 9.0), (0.0, 3.0), 0.4)
+    with pytest.raises(SeipError, match="too many"):
+        grid_over((0.0, 0.0, 9000.0, 9000.0), (0.0, 3.0), 0.4)
