@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import overload
 
@@ -100,51 +100,54 @@ def sample_of(frame: Frame, grid: PillarGrid, most_points: int) -> Sample:
     )
 
 
-class Samples:
-    """The samples of some recordings, each made when it is first asked for and kept: a few megabytes at most.
+class SampledRecording:
+    """A recording's samples, each made when it is first asked for and kept: a few megabytes at most.
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    recording : Recording
     grid : PillarGrid
     most_points : int
+        That a pillar keeps.
     """
 
-    def __init__(self, recordings: Sequence[Recording], grid: PillarGrid, most_points: int) -> None:
-        self.recordings = [recording for recording in recordings if len(recording.frames)]
-        self.grid, self.most_points = grid, most_points
-        self._made: dict[tuple[int, int], Sample] = {}
-        if not self.recordings:
-            raise SeipError("there is no frame to learn from: simulate some first")
+    def __init__(self, recording: Recording, grid: PillarGrid, most_points: int) -> None:
+        self.recording, self.grid, self.most_points = recording, grid, most_points
+        self._made: dict[int, Sample] = {}
 
-    def drawn(self, random: np.random.Generator) -> Sample:
-        """Return a random one: every recording is as likely, however many frames it has."""
-        recording = int(random.integers(len(self.recordings)))
-        return self.get(recording, int(random.integers(len(self.recordings[recording].frames))))
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.recording.frames)
 
-    def spread(self, most: int) -> list[Sample]:
-        """Return so many at most, of all recordings in turn and from all over each."""
-        each = max(1, most // len(self.recordings))
-        chosen = []
-        for number, recording in enumerate(self.recordings[:most]):
-            count = min(each, len(recording.frames))
-            chosen += [self.get(number, (2 * part + 1) * len(recording.frames) // (2 * count)) for part in range(count)]
-        return chosen
-
-    def get(self, recording: int, frame: int) -> Sample:
-        """Return the sample of a frame of a recording."""
-        key = (recording, frame)
-        if key not in self._made:
-            self._made[key] = sample_of(self.recordings[recording].frames[frame], self.grid, self.most_points)
-        return self._made[key]
+    def get(self, frame: int) -> Sample:
+        """Return the sample of a frame."""
+        if frame not in self._made:
+            self._made[frame] = sample_of(self.recording.frames[frame], self.grid, self.most_points)
+        return self._made[frame]
 
 
-def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
+def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -> Sample:
+    """Return a random sample: every recording is as likely, however many frames it has."""
+    recording = recordings[int(random.integers(len(recordings)))]
+    return recording.get(int(random.integers(len(recording))))
+
+
+def spread(recordings: Sequence[SampledRecording], most: int) -> list[Sample]:
+    """Return so many samples at most, of all recordings in turn and from all over each."""
+    each = max(1, most // len(recordings))
+    chosen = []
+    for recording in recordings[:most]:
+        count = min(each, len(recording))
+        chosen += [recording.get((2 * part + 1) * len(recording) // (2 * count)) for part in range(count)]
+    return chosen
+
+
+def require_separate(splits: Mapping[str, Sequence[SampledRecording]]) -> None:
     """See that no run of traffic is in two splits: neighbouring frames show the same vehicles in the same places.
 
     Parameters
     ----------
-    splits : mapping of str to sequence of Recording
+    splits : mapping of str to sequence of SampledRecording
         What the splits are for, and their recordings.
 
     Raises
@@ -153,13 +156,9 @@ def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
         One is.
     """
     for (one, these), (other, those) in combinations(splits.items(), 2):
-        for a, b in _pairs(these, those):
+        for a, b in product([each.recording for each in these], [each.recording for each in those]):
             if a.traffic == b.traffic:
                 raise SeipError(
                     f"{a.name} ({one}) and {b.name} ({other}) show the same run of traffic: "
                     "a detector must be tested on traffic that it has not seen, so simulate another run for one of them"
                 )
-
-
-def _pairs(these: Sequence[Recording], those: Sequence[Recording]) -> Iterator[tuple[Recording, Recording]]:
-    return ((a, b) for a in these for b in those)

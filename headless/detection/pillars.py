@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
+from seip_addon.core.scene_geometry import SceneGeometry, joined
 
-from .settings import STRIDE
+from .settings import GROUND_ABOVE_BOTTOM, HEADROOM, STRIDE
 
 FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
@@ -115,6 +116,21 @@ def grid_over(
     )
 
 
+def extent_grid(geometry: SceneGeometry, pillar: float) -> PillarGrid:
+    """Return the grid over a scene's region of interest, from below its lowest road to above its highest.
+
+    Raises
+    ------
+    SeipError
+        There is no region, or no road.
+    """
+    road = joined(geometry.roads)
+    if geometry.region.is_empty or not len(road):
+        raise SeipError("a detector needs a region of interest and a road: put meshes into SEIP Region and SEIP Roads")
+    lowest, highest = float(road[..., 2].min()), float(road[..., 2].max())
+    return grid_over(geometry.region.bounds, (lowest - GROUND_ABOVE_BOTTOM, highest + HEADROOM), pillar)
+
+
 @dataclass(frozen=True, eq=False)
 class Pillars:
     """The pillars of one cloud or of several that have points in them; m points.
@@ -123,8 +139,8 @@ class Pillars:
     ----------
     features : (m, 8) float32
         Of each point: its height above the bottom of the grid, its intensity, x, y, z from the mean of those kept in
-        its pillar, x, y from the middle of the pillar, and the logarithm of how many points the pillar had. Each in
-        a unit that makes it about one.
+        its pillar, x, y from the middle of the pillar, and the logarithm of how many points are kept. Each in a unit
+        that makes it about one.
     pillar : (m,) int64
         Number of each point's pillar, ascending; those of the second cloud follow those of the first.
     chosen : (m,) int64
@@ -155,7 +171,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     -------
     Pillars
     """
-    chosen, pillar, met = _choose(points, grid, most)
+    chosen, pillar = _choose(points, grid, most)
     kept = points[chosen]
     row, column = np.divmod(pillar, grid.columns)
     # Sums of small numbers lose nothing: from here on, relative to the middle of the pillar.
@@ -172,7 +188,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     features[:, 1] = kept[:, 3]
     features[:, 2:5] = (offset - np.repeat(mean, counts, axis=0)) / np.array((half, half, 0.5))
     features[:, 5:7] = offset[:, :2] / half
-    features[:, 7] = np.log(met) / 3.0
+    features[:, 7] = np.repeat(np.log(counts) / 3.0, counts)
     return Pillars(features, pillar, chosen)
 
 
@@ -185,8 +201,8 @@ def stacked(clouds: Sequence[Pillars], grid: PillarGrid) -> Pillars:
     )
 
 
-def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[Integer, Integer, Integer]:
-    """Return the points kept, sorted by pillar and then by hash, their pillars, and how many points those had.
+def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[Integer, Integer]:
+    """Return the points kept, sorted by pillar and then by hash, and their pillars.
 
     One sort of one array of integers does it: pillar, hash and index share a key.
     """
@@ -208,7 +224,7 @@ def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[I
     rank = np.arange(len(pillar)) - np.repeat(first, met)
     kept = rank < most
     order = key[kept] & ((1 << index_bits) - 1)
-    return inside[order], pillar[kept], np.repeat(met, np.minimum(met, most))
+    return inside[order], pillar[kept]
 
 
 def _hashed(points: NDArray[np.float32]) -> NDArray[np.uint32]:

@@ -60,6 +60,9 @@ class NetworkSettings:
     head : str
         ``centre``: a heat map of centres for each class and one box in each cell (Yin, Zhou, Krähenbühl 2021).
         ``anchor``: boxes of given sizes at 0 and 90 degrees in each cell (Lang et al. 2019).
+    padded : bool
+        Whether the empty places of pillars count as points of nothing but zeros, as where padding is not masked:
+        to see what harm that does.
     """
 
     pillar: float = 0.4
@@ -67,6 +70,7 @@ class NetworkSettings:
     width: int = 32
     blocks: tuple[int, int, int] = (2, 3, 3)
     head: Head = "centre"
+    padded: bool = False
 
     def __post_init__(self) -> None:
         checks = {

@@ -25,7 +25,7 @@ from seip_addon.core.progress import Progress
 from .average_precision import evaluate
 from .detector import Detector, load_state, save_state
 from .frame_results import Detected, FrameResult, Truth
-from .frames import Recording, Sample, Samples, require_separate
+from .frames import Sample, SampledRecording, drawn, require_separate, spread
 from .heads import Targets
 from .inference import detect
 from .matching import Rule
@@ -84,10 +84,9 @@ class Trained:
     curve: Curve
 
 
-def train(  # noqa: PLR0913  # what is learnt from, what learns, how, and where
-    recordings: Sequence[Recording],
-    validation: Sequence[Recording],
-    grid: PillarGrid,
+def train(
+    recordings: Sequence[SampledRecording],
+    validation: Sequence[SampledRecording],
     network: NetworkSettings,
     settings: TrainingSettings,
     *,
@@ -98,9 +97,8 @@ def train(  # noqa: PLR0913  # what is learnt from, what learns, how, and where
 
     Parameters
     ----------
-    recordings, validation : sequence of Recording
-        To learn from, and to see by when it is enough; from separate runs of traffic.
-    grid : PillarGrid
+    recordings, validation : sequence of SampledRecording
+        To learn from, and to see by when it is enough; on one grid and from separate runs of traffic.
     network : NetworkSettings
     settings : TrainingSettings
     device : str
@@ -124,7 +122,7 @@ def train(  # noqa: PLR0913  # what is learnt from, what learns, how, and where
         Runs overlap, there is no frame, or ``store`` holds another training.
     """
     require_separate({"training": recordings, "validation": validation})
-    run = _Run(recordings, validation, grid, network, settings, device)
+    run = _Run(recordings, validation, network, settings, device)
     if store is not None and Path(store).exists():
         run.restore(store)
     yield run.progress()
@@ -144,17 +142,15 @@ class _Run:
 
     def __init__(
         self,
-        recordings: Sequence[Recording],
-        validation: Sequence[Recording],
-        grid: PillarGrid,
+        recordings: Sequence[SampledRecording],
+        validation: Sequence[SampledRecording],
         network: NetworkSettings,
         settings: TrainingSettings,
         device: str,
     ) -> None:
         self.settings = settings
-        self.samples = Samples(recordings, grid, network.most_points)
-        self.aside = Samples(validation, grid, network.most_points)
-        self.detector = Detector(network, grid, settings.seed).to(device)
+        self.lessons, self.aside = _with_frames(recordings), _with_frames(validation)
+        self.detector = Detector(network, self.lessons[0].grid, settings.seed).to(device)
         self.optimiser = torch.optim.AdamW(
             self.detector.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
@@ -176,7 +172,7 @@ class _Run:
         """Do one step."""
         self.detector.train()
         random = np.random.default_rng([self.settings.seed, 1, self.step])
-        batch = self._batch([self.samples.drawn(random) for _ in range(self.settings.batch)], random)
+        batch = self._batch([drawn(self.lessons, random) for _ in range(self.settings.batch)], random)
         loss = self._loss(batch)
         self.optimiser.zero_grad()
         loss.backward()
@@ -188,7 +184,7 @@ class _Run:
 
     def validate(self) -> None:
         """Take the average precision on the frames set aside, which are always the same."""
-        results = [judged(self.detector, sample) for sample in self.aside.spread(VALIDATION_FRAMES)]
+        results = [judged(self.detector, sample) for sample in spread(self.aside, VALIDATION_FRAMES)]
         rule = Rule(fewest_points=self.settings.least_points)
         self.curve.validation[self.step] = evaluate(results, rule).average_precision
         if self.curve.best == self.step:
@@ -249,8 +245,8 @@ class _Run:
         self.schedule.load_state_dict(earlier["schedule"])
 
     def _sources(self) -> list[list[str | int]]:
-        both = (*self.samples.recordings, *self.aside.recordings)
-        return [[recording.name, recording.traffic, len(recording.frames)] for recording in both]
+        both = (*self.lessons, *self.aside)
+        return [[sampled.recording.name, sampled.recording.traffic, len(sampled)] for sampled in both]
 
     def _batch(self, samples: Sequence[Sample], random: np.random.Generator) -> _Batch:
         return _batch(samples, self.detector, self.window, self.settings.least_points, random)
@@ -259,6 +255,13 @@ class _Run:
         output = self.detector(batch.pillars, (len(batch.targets), batch.grid.rows, batch.grid.columns))
         parts = self.detector.found_by.loss(output, batch.targets, batch.grid, MARGIN)
         return torch.stack(list(parts.values())).sum()
+
+
+def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:
+    filled = [recording for recording in recordings if len(recording)]
+    if not filled:
+        raise SeipError("there is no frame to learn from: simulate some first")
+    return filled
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """Pillars against a slow loop, and what must not matter to them."""
 
 import math
+from dataclasses import replace
 
 from headless.detection.network import PillarEncoder
 from headless.detection.pillars import FEATURES, PillarGrid, fill_pillars, grid_over, stacked
@@ -161,3 +162,31 @@ def test_what_no_grid_can_be_laid_over_is_refused():
         grid_over((5.0, 0.0, 5.0, 9.0), (0.0, 3.0), 0.4)
     with pytest.raises(SeipError, match="too many"):
         grid_over((0.0, 0.0, 9000.0, 9000.0), (0.0, 3.0), 0.4)
+
+
+def test_a_detector_meets_in_whole_clouds_what_it_learnt_from_chosen_points():
+    points = cloud(3000, 4)
+    whole = fill_pillars(points, GRID, 3)
+    again = fill_pillars(points[np.sort(whole.chosen)], GRID, 3)
+    np.testing.assert_array_equal(whole.features, again.features)
+    np.testing.assert_array_equal(whole.pillar, again.pillar)
+
+
+def test_padding_is_points_of_nothing_but_zeros():
+    most = 4
+    pillars = fill_pillars(cloud(700, 5), GRID, most)
+    module = PillarEncoder(16, most).eval()
+    plain = PillarEncoder(16).eval()
+    plain.load_state_dict(module.state_dict())
+    with torch.no_grad():
+        module.normalisation.bias += 0.7
+        plain.normalisation.bias += 0.7
+    padded, masked = (encoded(one, pillars, len(GRID)) for one in (module, plain))
+    phantom = encoded(plain, replace(pillars, features=np.zeros_like(pillars.features)), len(GRID)).max(dim=0).values
+    places = np.bincount(pillars.pillar, minlength=len(GRID))
+    full, some = places == most, (places > 0) & (places < most)
+    assert full.any()
+    assert some.any()
+    torch.testing.assert_close(padded[full], masked[full])
+    torch.testing.assert_close(padded[some], torch.maximum(masked[some], phantom))
+    assert (padded[places == 0] == 0).all()

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from headless.detection.average_precision import evaluate
 from headless.detection.detector import Detector, require_grid
-from headless.detection.frames import FrameFiles, Recording, Samples, require_separate, sample_of
+from headless.detection.frames import FrameFiles, Recording, SampledRecording, require_separate, sample_of, spread
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import fill_pillars, grid_over
@@ -26,8 +26,12 @@ BRIEF = TrainingSettings(steps=6, batch=2, window=12.8, validate_every=3, thread
 GRID = grid_over((-16.0, -16.0, 16.0, 16.0), (-1.0, 4.5), SMALL.pillar)
 
 
+def sampled(name, traffic, frames, network=SMALL):
+    return SampledRecording(Recording(name, traffic, frames), GRID, network.most_points)
+
+
 def recording(name, traffic, *seeds):
-    return Recording(name, traffic, [street_frame(seed) for seed in seeds])
+    return sampled(name, traffic, [street_frame(seed) for seed in seeds])
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +45,7 @@ def aside():
 
 
 def trained(learning, aside, settings=BRIEF, network=SMALL, store=None):
-    return finish(train(learning, aside, GRID, network, settings, store=store))
+    return finish(train(learning, aside, network, settings, store=store))
 
 
 def bytes_of(path):
@@ -51,7 +55,7 @@ def bytes_of(path):
 @pytest.mark.parametrize(("head", "learning_rate"), [("centre", 8e-3), ("anchor", 6e-3)])
 def test_a_frame_can_be_learnt_by_heart(head, learning_rate):
     frame = street_frame(11, users=6, kinds=("car",))
-    same, again = (Recording("frame", traffic, [frame]) for traffic in ("run 1", "run 1 by another name"))
+    same, again = (sampled("frame", traffic, [frame]) for traffic in ("run 1", "run 1 by another name"))
     network = replace(SMALL, head=head, width=24)
     settings = replace(BRIEF, steps=250, batch=4, window=19.2, learning_rate=learning_rate, validate_every=50)
     result = trained([same], [again], settings, network)
@@ -72,16 +76,16 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path, learning, aside):
 def test_a_training_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, learning, aside):
     whole, broken = tmp_path / "whole.pt", tmp_path / "broken.pt"
     trained(learning, aside, store=whole)
-    steps = train(learning, aside, GRID, SMALL, BRIEF, store=broken)
+    steps = train(learning, aside, SMALL, BRIEF, store=broken)
     for progress in steps:
         if progress.done == 4:
             break
     steps.close()
     assert broken.exists()
-    resumed = list(train(learning, aside, GRID, SMALL, BRIEF, store=broken))
+    resumed = list(train(learning, aside, SMALL, BRIEF, store=broken))
     assert resumed[0].done == 3
     assert bytes_of(whole) == bytes_of(broken)
-    assert len(list(train(learning, aside, GRID, SMALL, BRIEF, store=broken))) == 1  # nothing left to do
+    assert len(list(train(learning, aside, SMALL, BRIEF, store=broken))) == 1  # nothing left to do
 
 
 def test_another_training_is_not_continued(tmp_path, learning, aside):
@@ -102,7 +106,7 @@ def test_training_ends_when_it_no_longer_helps(learning, aside):
 
 def test_training_leaves_torch_as_it_was(learning, aside):
     before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), torch.random.get_rng_state()
-    for _ in train(learning, aside, GRID, SMALL, replace(BRIEF, steps=1)):
+    for _ in train(learning, aside, SMALL, replace(BRIEF, steps=1)):
         assert not torch.are_deterministic_algorithms_enabled()
     assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before[:2]
     assert (torch.random.get_rng_state() == before[2]).all()
@@ -112,12 +116,12 @@ def test_runs_of_traffic_are_in_one_split_alone(learning, aside):
     with pytest.raises(SeipError, match=r"two sensors \(training\) and leak \(test\) show the same run of traffic"):
         require_separate({"training": learning, "validation": aside, "test": [recording("leak", "run 1", 7)]})
     with pytest.raises(SeipError, match="same run of traffic"):
-        next(train(learning, learning, GRID, SMALL, BRIEF))
+        next(train(learning, learning, SMALL, BRIEF))
 
 
 def test_there_must_be_something_to_learn_from(aside):
     with pytest.raises(SeipError, match="no frame to learn from"):
-        next(train([Recording("empty", "run 1", [])], aside, GRID, SMALL, BRIEF))
+        next(train([sampled("empty", "run 1", [])], aside, SMALL, BRIEF))
 
 
 def test_frames_without_road_users_and_without_points_are_learnt_from_too(aside):
@@ -125,7 +129,7 @@ def test_frames_without_road_users_and_without_points_are_learnt_from_too(aside)
     blind = replace(empty, **{name: getattr(empty, name)[:0] for name in ("points", "intensity", "instance")})
     blind = replace(blind, sensor=blind.sensor[:0], delay=blind.delay[:0])
     assert len(empty.labels) == 0
-    result = trained([Recording("quiet", "run 1", [empty, blind])], aside)
+    result = trained([sampled("quiet", "run 1", [empty, blind])], aside)
     assert all(np.isfinite(result.curve.loss))
 
 
@@ -151,10 +155,10 @@ def test_detections_do_not_depend_on_the_order_of_points(learning, aside):
 def test_samples_lose_nothing_that_a_detector_would_see(learning, aside):
     detector = trained(learning, aside).detector
     frame = street_frame(6)
-    sample = sample_of(frame, GRID, SMALL.most_points)
+    sample = sample_of(frame, SMALL.most_points)
     assert len(sample.points) < len(frame)
-    whole = fill_pillars(np.column_stack((frame.points, frame.intensity)), GRID, SMALL.most_points)
-    thinned = fill_pillars(sample.points, GRID, SMALL.most_points)
+    whole = fill_pillars(np.column_stack((frame.points, frame.intensity)), SMALL.most_points)
+    thinned = fill_pillars(sample.points, SMALL.most_points)
     # All but how full the pillars were.
     np.testing.assert_array_equal(whole.features[:, :7], thinned.features[:, :7])
     assert detector.grid == GRID
@@ -230,6 +234,6 @@ def test_frames_in_files_are_read_when_they_are_asked_for(tmp_path):
     paths[0].unlink()
     assert [frame.time for frame in files[1:]] == [1.0, 2.0]
     assert isinstance(files[1], Frame)
-    samples = Samples([Recording("files", "run 1", files[1:])], GRID, 8)
-    assert len(samples.spread(1)) == 1
-    assert samples.get(0, 1) is samples.get(0, 1)
+    recorded = sampled("files", "run 1", files[1:])
+    assert len(spread([recorded], 1)) == 1
+    assert recorded.get(1) is recorded.get(1)

@@ -1,0 +1,281 @@
+"""The case study: whether more or better sensors detect more, at what price, and whether coverage foretells it.
+
+Placements come from the integer program, clouds from simulated traffic. One
+detector learns from all placements at once (or one from each), several times
+with other seeds, and is judged with each placement on traffic that none has
+seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from seip_addon.core.coverage_study import NUMBERS, Case, Cell, solve_cell
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.scans import Frame
+from seip_addon.core.site import Site
+from seip_addon.core.visibility.grid import VisibilityGrid
+
+from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
+from .breakdown import false_positives
+from .claims import Trial
+from .detector import Detector
+from .frame_results import FrameResult, frame_result
+from .frames import SampledRecording
+from .inference import detect
+from .intervals import Interval
+from .kitti import kitti
+from .matching import Rule
+from .pillars import PillarGrid
+from .recordings import Configuration, Studio, TrafficRun
+from .settings import GROUPS, NetworkSettings, TrainingSettings
+from .training import Trained, train
+
+RULES = {
+    "bev_0.7": Rule(),
+    "bev_0.5": Rule(iou=0.5),
+    "3d_0.7": Rule(in_space=True),
+    "bev_0.7_from_5_points": Rule(fewest_points=5),
+}
+"""How average precision is taken; the first is the study's own."""
+
+MAIN = next(iter(RULES.values()))
+
+
+@dataclass(frozen=True, eq=False)
+class Traffic:
+    """Runs of traffic by what they are for; no run may be for two things."""
+
+    training: tuple[TrafficRun, ...]
+    validation: tuple[TrafficRun, ...]
+    test: tuple[TrafficRun, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Pupil:
+    """A detector that is to be trained.
+
+    Parameters
+    ----------
+    name : str
+        Also of its file.
+    configurations : tuple of Configuration
+        Whose clouds it learns from, and is judged with.
+    network : NetworkSettings
+    training : TrainingSettings
+    """
+
+    name: str
+    configurations: tuple[Configuration, ...]
+    network: NetworkSettings
+    training: TrainingSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What one detector made of one configuration's test frames.
+
+    Parameters
+    ----------
+    pupil : Pupil
+    configuration : Configuration
+    frames : tuple of FrameResult
+    evaluation : Evaluation
+        By the study's rule.
+    score : float
+        From which on false positives are counted: the best balance of precision and recall on validation frames.
+    """
+
+    pupil: Pupil
+    configuration: Configuration
+    frames: tuple[FrameResult, ...]
+    evaluation: Evaluation
+    score: float
+
+    @property
+    def trial(self) -> Trial:
+        """Its figures, as the claims need them."""
+        case, false = self.configuration.case, false_positives(self.evaluation, self.score)
+        return Trial(
+            sensor=case.sensor,
+            count=case.count,
+            seed=self.pupil.training.seed,
+            average_precision=self.evaluation.average_precision,
+            price=case.deployment.price,
+            coverage=case.deployment.coverage,
+            false_positives=false.per_frame,
+            sparse=false.sparse,
+            padded=self.pupil.network.padded,
+        )
+
+    @property
+    def precisions(self) -> dict[str, float]:
+        """Average precision by every rule, and KITTI's figures for the study's own."""
+        by_rule = {name: evaluate(self.frames, rule).average_precision for name, rule in RULES.items()}
+        figures = kitti(self.frames, MAIN)
+        return by_rule | {"kitti_ap40": figures.ap40, "kitti_ap11": figures.ap11}
+
+    @property
+    def interval(self) -> Interval | None:
+        """95 % interval of the average precision over other traffic like this."""
+        return average_precision_interval(self.evaluation, seed=0)
+
+
+def pupils(
+    configurations: Sequence[Configuration],
+    network: NetworkSettings,
+    training: TrainingSettings,
+    *,
+    seeds: int,
+    separate: bool,
+) -> list[Pupil]:
+    """Return who is to be trained: one detector for all configurations, or one for each, with every seed."""
+    groups = (
+        {one.name.replace(" × ", "x"): (one,) for one in configurations} if separate else {"": tuple(configurations)}
+    )
+    return [
+        Pupil(f"detector{name and '-'}{name}-{seed}", group, network, replace(training, seed=seed))
+        for name, group in groups.items()
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def padded(some: Sequence[Pupil]) -> list[Pupil]:
+    """Return the same with pillars that are padded with zeros: the ablation of claim 9."""
+    return [replace(pupil, name=f"{pupil.name}-padded", network=replace(pupil.network, padded=True)) for pupil in some]
+
+
+def place_all(
+    site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, *, solver: str, time_limit: float
+) -> Generator[Progress, None, tuple[Configuration, ...]]:
+    """Place 1, 2 and 4 sensors of each type where they cover most.
+
+    Raises
+    ------
+    SeipError
+        There are fewer positions than sensors, or a type sees nothing.
+    """
+    visible = grid.visible
+    cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in NUMBERS]
+    placed: list[Case] = []
+    for done, cell in enumerate(cells):
+        progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
+        yield progress
+        steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit)
+        placed.append((yield from within(progress, steps)))
+    yield Progress(len(cells), len(cells), "placed")
+    return tuple(Configuration(case) for case in placed)
+
+
+def simulate_all(
+    studio: Studio,
+    configurations: Sequence[Configuration],
+    runs: Sequence[TrafficRun],
+    grid: PillarGrid,
+    most_points: int,
+) -> Generator[Progress, None, dict[str, list[SampledRecording]]]:
+    """Simulate what the configurations measure of some runs and keep what a detector learns from it, by their names."""
+    made: dict[str, list[SampledRecording]] = {}
+    total = sum(len(run.times) for run in runs) * len(configurations)
+    done = 0
+    for configuration in configurations:
+        of_runs = [SampledRecording(studio.record(configuration, run), grid, most_points) for run in runs]
+        for sampled in of_runs:
+            for number in range(len(sampled)):
+                yield Progress(done, total, f"simulate {configuration.name}")
+                sampled.get(number)
+                done += 1
+        made[configuration.name] = of_runs
+    yield Progress(total, total, "simulated")
+    return made
+
+
+def train_all(
+    pupils: Sequence[Pupil],
+    lessons: Mapping[str, list[SampledRecording]],
+    tests: Mapping[str, list[SampledRecording]],
+    folder: Path,
+    *,
+    device: str,
+) -> Generator[Progress, None, list[Trained]]:
+    """Train detectors one after the other; what was trained before an interruption is not trained again.
+
+    Parameters
+    ----------
+    pupils : sequence of Pupil
+    lessons, tests : mapping of str to list of SampledRecording
+        By configuration: to learn from, and to see by when it is enough.
+    folder : path
+        Of the detectors' files.
+    device : str
+        Of torch.
+    """
+    trained = []
+    for pupil in pupils:
+        names = [configuration.name for configuration in pupil.configurations]
+        steps = train(
+            [recording for name in names for recording in lessons[name]],
+            [recording for name in names for recording in tests[name]],
+            pupil.network,
+            pupil.training,
+            device=device,
+            store=folder / f"{pupil.name}.pt",
+        )
+        trained.append((yield from steps))
+    return trained
+
+
+def judge_all(
+    studio: Studio, pupils: Sequence[Pupil], detectors: Sequence[Detector], traffic: Traffic
+) -> Generator[Progress, None, list[Judgement]]:
+    """Judge every detector with each of its configurations; a frame is simulated once for all of them."""
+    configurations = {one.name: one for pupil in pupils for one in pupil.configurations}.values()
+    total = len(configurations) * sum(len(run.times) for run in (*traffic.validation, *traffic.test))
+    done = 0
+    tried: dict[tuple[str, str], list[FrameResult]] = {}
+    judged: dict[tuple[str, str], list[FrameResult]] = {}
+    for configuration in configurations:
+        asked = [
+            (pupil.name, detector)
+            for pupil, detector in zip(pupils, detectors, strict=True)
+            if configuration in pupil.configurations
+        ]
+        for results, runs in ((tried, traffic.validation), (judged, traffic.test)):
+            for run in runs:
+                for number in range(len(run.times)):
+                    yield Progress(done, total, f"detect with {configuration.name}")
+                    done += 1
+                    frame = studio.frame(configuration, run, number)
+                    for name, detector in asked:
+                        result = _result(studio, configuration, run, frame, detector)
+                        results.setdefault((name, configuration.name), []).append(result)
+    yield Progress(total, total, "judged")
+    return [judgement for pupil in pupils for judgement in _judgements(pupil, tried, judged)]
+
+
+def _judgements(
+    pupil: Pupil,
+    tried: Mapping[tuple[str, str], list[FrameResult]],
+    judged: Mapping[tuple[str, str], list[FrameResult]],
+) -> Iterator[Judgement]:
+    names = [configuration.name for configuration in pupil.configurations]
+    score = balanced_score(evaluate([frame for name in names for frame in tried[pupil.name, name]], MAIN))
+    for configuration in pupil.configurations:
+        frames = tuple(judged[pupil.name, configuration.name])
+        yield Judgement(pupil, configuration, frames, evaluate(frames, MAIN), score)
+
+
+def _result(
+    studio: Studio, configuration: Configuration, run: TrafficRun, frame: Frame, detector: Detector
+) -> FrameResult:
+    return frame_result(
+        frame,
+        detect(detector, frame.points, frame.intensity),
+        classes=tuple(GROUPS.values()),
+        region=studio.static.region,
+        sensors=configuration.places,
+        run=run.name,
+    )

@@ -1,0 +1,126 @@
+"""Frames of traffic as placements of sensors measure them, simulated when they are asked for."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.coverage_study import Case
+from seip_addon.core.progress import finish
+from seip_addon.core.scans import (
+    Frame,
+    MountedSensor,
+    ScanSettings,
+    Simulation,
+    StaticScene,
+    level_orientation,
+    prepare,
+)
+from seip_addon.core.storage import digest
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.bodies import fitted_body
+
+from .frames import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficRun:
+    """One run of traffic and the instants at which it is looked at.
+
+    Parameters
+    ----------
+    name : str
+    trajectories : Trajectories
+        In the scene's local axes.
+    times : (n,) float64, seconds
+    """
+
+    name: str
+    trajectories: Trajectories
+    times: Float
+
+    @property
+    def key(self) -> str:
+        """What tells this run of traffic from all others, whatever its file is called."""
+        return digest(self.trajectories.first, self.trajectories.time, self.trajectories.position)
+
+
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """A number of sensors of one type, placed where they cover most.
+
+    Parameters
+    ----------
+    case : Case
+    """
+
+    case: Case
+
+    @property
+    def name(self) -> str:
+        """For people: ``2 × type1``."""
+        return f"{self.case.count} × {self.case.sensor}"
+
+    @property
+    def sensors(self) -> tuple[MountedSensor, ...]:
+        """The sensors where they hang."""
+        return tuple(
+            MountedSensor(sensor.label, sensor.model, sensor.xyz, level_orientation(sensor.yaw))
+            for sensor in self.case.deployment.sensors
+        )
+
+    @property
+    def places(self) -> Float:
+        """Where the sensors are, (s, 3) in metres."""
+        return np.array([sensor.xyz for sensor in self.sensors])
+
+
+class Studio:
+    """A scene in which runs of traffic are recorded.
+
+    What stands still is cast against once for a configuration and a run, and
+    kept until another is asked for: ask for the frames of one after the other.
+
+    Parameters
+    ----------
+    static : StaticScene
+    settings : ScanSettings
+    """
+
+    def __init__(self, static: StaticScene, settings: ScanSettings) -> None:
+        self.static, self.settings = static, settings
+        self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
+
+    def record(self, configuration: Configuration, run: TrafficRun) -> Recording:
+        """Return the frames of a run, to be simulated when they are asked for."""
+        return Recording(f"{configuration.name} in {run.name}", run.key, _Frames(self, configuration, run))
+
+    def frame(self, configuration: Configuration, run: TrafficRun, number: int) -> Frame:
+        """Simulate a frame of a run."""
+        return self._simulation(configuration, run).frame(number, float(run.times[number]))
+
+    def _prepared(self, configuration: Configuration, run: TrafficRun) -> Simulation:
+        bodies = [fitted_body(user) for user in run.trajectories.users]
+        return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))
+
+
+class _Frames(Sequence[Frame]):
+    def __init__(self, studio: Studio, configuration: Configuration, run: TrafficRun) -> None:
+        self._studio, self._configuration, self._run = studio, configuration, run
+
+    def __len__(self) -> int:
+        return len(self._run.times)
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | Sequence[Frame]:
+        if isinstance(index, slice):
+            return [self[number] for number in range(len(self))[index]]
+        return self._studio.frame(self._configuration, self._run, range(len(self))[index])

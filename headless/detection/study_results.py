@@ -1,0 +1,244 @@
+"""What the case study found, as charts, as a table and as a record."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seip_addon.core.coverage_study import Claim
+from seip_addon.core.pictures.detection_charts import (
+    Parts,
+    save_count_chart,
+    save_coverage_chart,
+    save_parts_chart,
+    save_precision_recall_chart,
+    save_price_chart,
+    save_training_chart,
+)
+from seip_addon.core.pictures.error_view import save_error_view
+from seip_addon.core.storage import save_json, whole_file
+
+from .breakdown import (
+    ALONG_DENSITY,
+    ALONG_DISTANCE,
+    ALONG_POINTS,
+    ALONG_VISIBILITY,
+    Bin,
+    average_precision_by,
+    false_by,
+    recall_by,
+)
+from .case_study import MAIN, Judgement, Pupil, Traffic
+from .chart_data import cells, curve, error_view, parts
+from .intervals import Interval, rank_correlation, rank_correlation_interval
+from .recordings import Studio
+from .training import Trained
+
+SCHEMA = "seip-evaluation/1"
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResults:
+    """All that was found on one site.
+
+    Parameters
+    ----------
+    name : str
+        Of the site.
+    studio : Studio
+        To draw frames with.
+    traffic : Traffic
+    pupils : tuple of Pupil
+    judgements : tuple of Judgement
+    """
+
+    name: str
+    studio: Studio
+    traffic: Traffic
+    pupils: tuple[Pupil, ...]
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def masked(self) -> list[Judgement]:
+        """Those without the ablation."""
+        return [judgement for judgement in self.judgements if not judgement.pupil.network.padded]
+
+    @property
+    def first(self) -> list[Judgement]:
+        """Those of one training for each configuration, to be shown where only one can be."""
+        found: dict[str, Judgement] = {}
+        for judgement in self.masked:
+            found.setdefault(judgement.configuration.name, judgement)
+        return list(found.values())
+
+    @property
+    def correlation(self) -> tuple[float, Interval | None]:
+        """Rank correlation of coverage and average precision over the configurations, with its interval."""
+        points = cells([judgement.trial for judgement in self.masked])
+        coverage, precision = [cell.coverage for cell in points], [cell.mean for cell in points]
+        return rank_correlation(coverage, precision), rank_correlation_interval(coverage, precision, seed=0)
+
+
+def save_charts(folder: Path, results: StudyResults, trained: Sequence[Trained]) -> None:
+    """Draw every chart of the study into a folder."""
+    points = cells([judgement.trial for judgement in results.masked])
+    save_count_chart(folder / "ap_by_count.png", points, results.name)
+    save_price_chart(folder / "ap_by_price.png", points, results.name)
+    save_coverage_chart(folder / "ap_by_coverage.png", points, *results.correlation, results.name)
+    curves = [
+        curve(one.configuration.case.sensor, one.configuration.case.count, one.evaluation) for one in results.first
+    ]
+    save_precision_recall_chart(folder / "precision_recall.png", curves, results.name)
+    for sensor in dict.fromkeys(one.configuration.case.sensor for one in results.first):
+        own = [one for one in results.first if one.configuration.case.sensor == sensor]
+        save_parts_chart(folder / f"where_{sensor}.png", _parts(own), f"{results.name}, {sensor}")
+        _save_errors(folder / f"errors_{sensor}.png", results, own)
+    for pupil, one in zip(results.pupils, trained, strict=True):
+        save_training_chart(folder / f"{pupil.name}.png", one.curve.loss, one.curve.validation, pupil.name)
+
+
+def _parts(judgements: Sequence[Judgement]) -> list[Parts]:
+    """Return the panels of where road users are found and where detections are false."""
+
+    def panel(what: str, figure: str, bins: Callable[[Judgement], Sequence[Bin]]) -> Parts:
+        return parts(what, figure, {one.configuration.name: bins(one) for one in judgements})
+
+    return [
+        panel(
+            "distance to the nearest sensor (m)",
+            "average precision",
+            lambda one: average_precision_by(one.evaluation, "distance", ALONG_DISTANCE),
+        ),
+        panel(
+            "returns from the road user",
+            "average precision",
+            lambda one: average_precision_by(one.evaluation, "points", ALONG_POINTS),
+        ),
+        panel(
+            "share of the road user that is not hidden",
+            "recall",
+            lambda one: recall_by(one.evaluation, "visibility", ALONG_VISIBILITY, one.score),
+        ),
+        panel(
+            "returns per square metre around it",
+            "false positives per frame",
+            lambda one: false_by(one.evaluation, "density", ALONG_DENSITY, one.score),
+        ),
+    ]
+
+
+def _save_errors(path: Path, results: StudyResults, judgements: Sequence[Judgement]) -> None:
+    """Draw the test frame with the most road users as each of some configurations sees it."""
+    run = results.traffic.test[0]
+    inside = [int(frame.truth.inside.sum()) for frame in judgements[0].frames[: len(run.times)]]
+    number = int(np.argmax(inside))
+    views = [
+        error_view(
+            f"{one.configuration.name}: AP {one.evaluation.average_precision:.2f} over all frames",
+            one.frames[number],
+            MAIN,
+            score=one.score,
+            cloud=results.studio.frame(one.configuration, run, number).points,
+            region=results.studio.static.region,
+            sensors=one.configuration.places,
+        )
+        for one in judgements
+    ]
+    save_error_view(path, views, f"{results.name}, {run.name} at {run.times[number]:.1f} s")
+
+
+def save_table(path: Path, results: StudyResults) -> None:
+    """Write one row for each detector and configuration as CSV."""
+    rows = [_row(judgement) for judgement in results.judgements]
+    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _row(judgement: Judgement) -> dict[str, str]:
+    trial, interval = judgement.trial, judgement.interval
+    low, high = ("", "") if interval is None else (f"{end:.4f}" for end in interval)
+    return {
+        "detector": judgement.pupil.name,
+        "sensor": trial.sensor,
+        "count": f"{trial.count}",
+        "seed": f"{trial.seed}",
+        "padded": f"{trial.padded}".lower(),
+        "price_usd": f"{trial.price:.2f}",
+        "coverage": f"{trial.coverage:.4f}",
+        **{f"ap_{name}": f"{value:.4f}" for name, value in judgement.precisions.items()},
+        "ap_low": low,
+        "ap_high": high,
+        "score": f"{judgement.score:.4f}",
+        "false_positives_per_frame": f"{trial.false_positives:.4f}",
+        "false_positives_in_sparse_places": "" if np.isnan(trial.sparse) else f"{trial.sparse:.4f}",
+        "frames": f"{len(judgement.frames)}",
+        "vehicles": f"{len(judgement.evaluation.wanted)}",
+    }
+
+
+def save_record(
+    path: Path,
+    results: StudyResults,
+    claims: Sequence[Claim],
+    settings: Mapping[str, Any],
+    versions: Mapping[str, str],
+) -> None:
+    """Write settings, sensors, figures and claims as JSON."""
+    correlation, interval = results.correlation
+    configurations = {one.configuration.name: one.configuration for one in results.judgements}
+    save_json(
+        path,
+        {
+            "schema": SCHEMA,
+            "settings": settings,
+            "versions": dict(versions),
+            "traffic": {
+                what: [{"name": run.name, "key": run.key, "frames": len(run.times)} for run in runs]
+                for what, runs in vars(results.traffic).items()
+            },
+            "detectors": [
+                {"name": one.name, "network": asdict(one.network), "training": asdict(one.training)}
+                for one in results.pupils
+            ],
+            "configurations": [
+                {
+                    "name": name,
+                    "coverage": one.case.deployment.coverage,
+                    "status": one.case.placement.status,
+                    "gap": one.case.placement.gap,
+                    "price_usd": one.case.deployment.price,
+                    "sensors": [
+                        {"model": sensor.model.key, "xyz": sensor.xyz.tolist(), "position": sensor.position_name}
+                        for sensor in one.case.deployment.sensors
+                    ],
+                }
+                for name, one in configurations.items()
+            ],
+            "figures": [_row(judgement) for judgement in results.judgements],
+            "coverage_and_ap": {
+                "rank_correlation": None if np.isnan(correlation) else correlation,
+                "interval": interval,
+            },
+            "claims": [asdict(claim) for claim in claims],
+        },
+    )
+
+
+def in_words(results: StudyResults) -> Iterator[str]:
+    """Yield a line for each configuration, and one on whether coverage foretells detection."""
+    for cell in cells([judgement.trial for judgement in results.masked]):
+        between = "" if cell.interval is None else f" ({cell.interval[0]:.1%} to {cell.interval[1]:.1%})"
+        yield (
+            f"{cell.name}: AP {cell.mean:.1%}{between} of vehicles at an overlap of 0.7 in plan, "
+            f"coverage {cell.coverage:.1%}, ${cell.price:,.0f}"
+        )
+    correlation, interval = results.correlation
+    between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
+    yield f"rank correlation of coverage and AP: {correlation:.2f}{between}"

@@ -1,0 +1,143 @@
+"""Find out what a placement's sensors detect: coverage, price and average precision of types × numbers, on any scene.
+
+python -m headless.evaluate scenes/junction.blend -o out/evaluation
+blender -b --python-exit-code 1 site.blend -P headless/evaluate.py -- --traffic run-*.npz -o out/evaluation
+
+Needs torch (pip install --group detection). An evaluation that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session, survey
+
+import bpy
+import numpy as np
+
+from seip_addon.core.coverage_study import NUMBERS
+from seip_addon.core.errors import SeipError
+from seip_addon.core.goal import Goal, check_goal
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.results.study_tables import save_claims
+from seip_addon.core.scans import ScanSettings, static_scene
+from seip_addon.core.traffic import Trajectories
+
+try:
+    from headless.detection import case_study, study_results
+    from headless.detection.claims import judge
+    from headless.detection.pillars import extent_grid
+    from headless.detection.recordings import Studio, TrafficRun
+    from headless.detection.settings import NetworkSettings, TrainingSettings
+except ModuleNotFoundError as error:
+    if error.name != "torch":
+        raise
+    sys.exit("error: the detector needs torch: pip install --group detection")
+
+WARM_UP = 2.0
+"""Seconds from the first sample of a run to its first frame."""
+
+
+def main(argv: list[str]) -> None:
+    """Place, simulate, train, judge, and write charts and tables to a folder."""
+    options = _parser().parse_args(argv)
+    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
+    watch, folder = surveyed.stopwatch, options.output
+    traffic = _traffic(options, surveyed)
+    steps = case_study.place_all(
+        surveyed.site, surveyed.models, surveyed.grid, solver=options.solver, time_limit=options.time_limit
+    )
+    configurations = watch.run("placements", steps)
+    network, training = NetworkSettings(), TrainingSettings()
+    grid = extent_grid(surveyed.geometry, network.pillar)
+    studio = Studio(static_scene(surveyed.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
+    lessons, tests = (
+        watch.run(what, case_study.simulate_all(studio, configurations, runs, grid, network.most_points))
+        for what, runs in (("simulation", traffic.training), ("simulation for validation", traffic.validation))
+    )
+    pupils = case_study.pupils(configurations, network, training, seeds=options.seeds, separate=options.separate)
+    if options.ablation:
+        pupils += case_study.padded(pupils)
+    trained = watch.run("training", case_study.train_all(pupils, lessons, tests, folder, device=options.device))
+    detectors = [one.detector for one in trained]
+    judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, traffic))
+    claims = judge([judgement.trial for judgement in judgements])
+
+    with session.writing(folder):
+        results = study_results.StudyResults(surveyed.site.name, studio, traffic, tuple(pupils), tuple(judgements))
+        study_results.save_charts(folder, results, trained)
+        study_results.save_table(folder / "detection.csv", results)
+        settings = surveyed.settings | {"seeds": options.seeds, "frames_every_s": options.every}
+        study_results.save_record(
+            folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
+        )
+        save_claims(folder / "claims_5_to_9.md", claims, surveyed.site.name)
+    for line in study_results.in_words(results):
+        session.say(line)
+    for claim in claims:
+        session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")
+    session.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    session.say(f"written to {folder}/")
+
+
+def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study.Traffic:
+    """Read the runs: the last two are for tests, the one before for validation, the others to learn from."""
+    paths = options.traffic or _beside(options.scene)
+    if len(paths) < FEWEST_RUNS:
+        raise SeipError(
+            f"{len(paths)} runs of traffic are too few: name {FEWEST_RUNS} or more with --traffic, made by "
+            "headless/traffic.py with a seed each; the last two are for tests, the one before for validation"
+        )
+    runs = []
+    for path in paths:
+        trajectories = Trajectories.load(path).moved_to(surveyed.geometry.origin)
+        begin, end = trajectories.span
+        times = np.arange(begin + WARM_UP, end, options.every)
+        if not len(times):
+            raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
+        runs.append(TrafficRun(path.stem, trajectories, times))
+    return case_study.Traffic(tuple(runs[:-3]), tuple(runs[-3:-2]), tuple(runs[-2:]))
+
+
+FEWEST_RUNS = 4
+
+
+def _beside(scene: Path | None) -> list[Path]:
+    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``."""
+    path = Path(bpy.data.filepath) if scene is None else scene
+    return sorted((path.parent / f"{path.stem}_traffic").glob("*.npz"))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="evaluate",
+        description="Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best.",
+        formatter_class=survey.HelpWithDefaults,
+    )
+    survey.add_options(parser)
+    detection = parser.add_argument_group("detection")
+    detection.add_argument(
+        "--traffic",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="NPZ",
+        help="runs of traffic: the last two for tests, the one before for validation, the others to learn from "
+        "(those in the folder SCENE_traffic beside the scene)",
+    )
+    detection.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    detection.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
+    detection.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
+    detection.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
+    detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
+    detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+    return parser
+
+
+if __name__ == "__main__":
+    session.run(main)
