@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
+from seip_addon.core.scene_geometry import SceneGeometry, joined
 
-from .settings import STRIDE
+from .settings import GROUND_ABOVE_BOTTOM, HEADROOM, STRIDE
 
 FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
@@ -113,6 +114,24 @@ def grid_over(
         rows=rows,
         pillar=pillar,
     )
+
+
+def grid_of(geometry: SceneGeometry, pillar: float) -> PillarGrid:
+    """Return the grid over a scene's region of interest, from below its lowest road to above lorries on its highest.
+
+    Raises
+    ------
+    SeipError
+        There is no region or no road in it.
+    """
+    west, south, east, north = geometry.region.bounds
+    corners = joined(geometry.roads).reshape(-1, 3)
+    x, y, z = corners.T
+    heights = z[(x >= west) & (x <= east) & (y >= south) & (y <= north)]
+    if len(heights) == 0:
+        raise SeipError("no road begins or ends in the region of interest: put the carriageway into SEIP Roads")
+    bounds = (float(west), float(south), float(east), float(north))
+    return grid_over(bounds, (float(heights.min()) - GROUND_ABOVE_BOTTOM, float(heights.max()) + HEADROOM), pillar)
 
 
 @dataclass(frozen=True, eq=False)
