@@ -31,7 +31,7 @@ from seip_addon.core.traffic import Trajectories
 try:
     from headless.detection import case_study, study_results
     from headless.detection.claims import judge
-    from headless.detection.pillars import extent_grid
+    from headless.detection.pillars import grid_of
     from headless.detection.recordings import Studio, TrafficRun
     from headless.detection.settings import NetworkSettings, TrainingSettings
 except ModuleNotFoundError as error:
@@ -54,7 +54,7 @@ def main(argv: list[str]) -> None:
     )
     configurations = watch.run("placements", steps)
     network, training = NetworkSettings(), TrainingSettings()
-    grid = extent_grid(surveyed.geometry, network.pillar)
+    grid = grid_of(surveyed.geometry, network.pillar)
     studio = Studio(static_scene(surveyed.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
     lessons, tests = (
         watch.run(what, case_study.simulate_all(studio, configurations, runs, grid, network.most_points))

@@ -147,7 +147,7 @@ def _fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
-    """Return a value in which equal texts are one object, which pickle writes once: equal bytes for equal values."""
+    """Return a value in which equal texts are one object, which pickle writes once: equal values give equal bytes."""
     if isinstance(value, str):
         return sys.intern(value)
     if isinstance(value, dict):

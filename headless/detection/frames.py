@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
 from seip_addon.core.scans.frame import Frame
+from seip_addon.core.scans.run_folder import frame_path, load_manifest
 
 from .pillars import PillarGrid, fill_pillars
 from .settings import CLASS_OF
@@ -28,7 +29,7 @@ class Recording:
     name : str
         For messages.
     traffic : str
-        What tells the run of traffic from all others, such as the digest of its trajectories.
+        What tells the run of traffic from all others: the source of its trajectories, with its seed.
     frames : sequence of Frame
         In memory, or read when they are asked for.
     """
@@ -36,6 +37,21 @@ class Recording:
     name: str
     traffic: str
     frames: Sequence[Frame]
+
+
+def recording_of(folder: Path) -> Recording:
+    """Return what a folder of scans holds; its frames are read when they are asked for.
+
+    Raises
+    ------
+    SeipError
+        There is no run of scans in it, or one that was not finished.
+    """
+    record = load_manifest(folder)
+    if not record["complete"]:
+        raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
+    frames = FrameFiles([frame_path(folder, number) for number in range(len(record["frames"]))])
+    return Recording(name=str(folder), traffic=str(record["trajectories"]["source"]), frames=frames)
 
 
 class FrameFiles(Sequence[Frame]):
@@ -142,12 +158,12 @@ def spread(recordings: Sequence[SampledRecording], most: int) -> list[Sample]:
     return chosen
 
 
-def require_separate(splits: Mapping[str, Sequence[SampledRecording]]) -> None:
+def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
     """See that no run of traffic is in two splits: neighbouring frames show the same vehicles in the same places.
 
     Parameters
     ----------
-    splits : mapping of str to sequence of SampledRecording
+    splits : mapping of str to sequence of Recording
         What the splits are for, and their recordings.
 
     Raises
@@ -156,7 +172,7 @@ def require_separate(splits: Mapping[str, Sequence[SampledRecording]]) -> None:
         One is.
     """
     for (one, these), (other, those) in combinations(splits.items(), 2):
-        for a, b in product([each.recording for each in these], [each.recording for each in those]):
+        for a, b in product(these, those):
             if a.traffic == b.traffic:
                 raise SeipError(
                     f"{a.name} ({one}) and {b.name} ({other}) show the same run of traffic: "

@@ -116,19 +116,22 @@ def grid_over(
     )
 
 
-def extent_grid(geometry: SceneGeometry, pillar: float) -> PillarGrid:
-    """Return the grid over a scene's region of interest, from below its lowest road to above its highest.
+def grid_of(geometry: SceneGeometry, pillar: float) -> PillarGrid:
+    """Return the grid over a scene's region of interest, from below its lowest road to above lorries on its highest.
 
     Raises
     ------
     SeipError
-        There is no region, or no road.
+        There is no region or no road in it.
     """
-    road = joined(geometry.roads)
-    if geometry.region.is_empty or not len(road):
-        raise SeipError("a detector needs a region of interest and a road: put meshes into SEIP Region and SEIP Roads")
-    lowest, highest = float(road[..., 2].min()), float(road[..., 2].max())
-    return grid_over(geometry.region.bounds, (lowest - GROUND_ABOVE_BOTTOM, highest + HEADROOM), pillar)
+    west, south, east, north = geometry.region.bounds
+    corners = joined(geometry.roads).reshape(-1, 3)
+    x, y, z = corners.T
+    heights = z[(x >= west) & (x <= east) & (y >= south) & (y <= north)]
+    if len(heights) == 0:
+        raise SeipError("no road begins or ends in the region of interest: put the carriageway into SEIP Roads")
+    bounds = (float(west), float(south), float(east), float(north))
+    return grid_over(bounds, (float(heights.min()) - GROUND_ABOVE_BOTTOM, float(heights.max()) + HEADROOM), pillar)
 
 
 @dataclass(frozen=True, eq=False)

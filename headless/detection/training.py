@@ -121,7 +121,8 @@ def train(
     SeipError
         Runs overlap, there is no frame, or ``store`` holds another training.
     """
-    require_separate({"training": recordings, "validation": validation})
+    splits = {"training": recordings, "validation": validation}
+    require_separate({what: [sampled.recording for sampled in some] for what, some in splits.items()})
     run = _Run(recordings, validation, network, settings, device)
     if store is not None and Path(store).exists():
         run.restore(store)

@@ -1,0 +1,152 @@
+"""Train a detector on simulated scans of a site, and say how well it does on traffic that it has not seen.
+
+python -m headless.train site.blend --train out/run-1 out/run-2 --validation out/run-3 --test out/run-4 -o out/detector
+
+The runs are folders of `headless/simulate.py`, each with sensors and traffic of its own: a detector that is trained
+on several configurations of sensors works with all of them. A training that was stopped goes on where it was when it
+is started again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session, survey
+
+import bpy
+import numpy as np
+
+try:
+    import torch
+except ModuleNotFoundError:
+    sys.exit(f"error: {sys.executable} has no package 'torch': pip install --group detection")
+
+from headless.detection.average_precision import evaluate
+from headless.detection.detector import Detector
+from headless.detection.frame_results import FrameResult, frame_result
+from headless.detection.frames import SampledRecording, recording_of, require_separate
+from headless.detection.inference import detect
+from headless.detection.matching import Rule
+from headless.detection.pillars import grid_of
+from headless.detection.settings import GROUPS, NetworkSettings, TrainingSettings
+from headless.detection.training import train
+
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.pictures.detection_charts import save_training_chart
+from seip_addon.core.progress import finish
+from seip_addon.core.scans.run_folder import load_manifest
+from seip_addon.core.storage import save_json
+from seip_addon.scene.read import read_scene
+
+RULES = {"ap_iou_0.7": Rule(iou=0.7), "ap_iou_0.5": Rule(iou=0.5), "ap_3d_iou_0.7": Rule(iou=0.7, in_space=True)}
+
+
+def main(argv: list[str]) -> None:
+    """Train a detector, write it to a folder and evaluate it on the test runs."""
+    options = _parser().parse_args(argv)
+    network = NetworkSettings(options.pillar, options.points, options.width, tuple(options.blocks), options.head)
+    training = TrainingSettings(steps=options.steps, batch=options.batch, seed=options.seed, threads=options.threads)
+    splits = {
+        name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
+    }
+    require_separate(splits)
+    _check_device(options.device)
+    session.check_folder(options.output)
+    session.open_scene(options.scene)
+    geometry = read_scene(bpy.context.scene).geometry
+    grid = grid_of(geometry, network.pillar)
+    session.say(
+        f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m, from {grid.bottom:.1f} to {grid.top:.1f} m"
+    )
+
+    path = options.output / "detector.pt"
+    learning, aside = (
+        [SampledRecording(recording, grid, network.most_points) for recording in splits[name]]
+        for name in ("train", "validation")
+    )
+    steps = train(learning, aside, network, training, device=options.device, store=path)
+    with session.progress_bar() as report:
+        trained = finish(steps, report)
+    best = trained.curve.best
+    session.say(
+        f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} on validation frames"
+    )
+    save_training_chart(
+        options.output / "training.png", trained.curve.loss, trained.curve.validation, f"{geometry.name}: training"
+    )
+    if options.test:
+        figures = _evaluated(trained.detector, options.test, geometry.region)
+        save_json(options.output / "evaluation.json", figures)
+    session.say(f"written to {options.output}/")
+
+
+def _evaluated(detector: Detector, runs: Sequence[Path], region: BaseGeometry) -> dict[str, dict[str, float]]:
+    """Return the figures of each run, and say them."""
+    figures = {}
+    for folder in runs:
+        results = _results(detector, folder, region)
+        figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
+        words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
+        session.say(f"{folder}: {words}")
+    return figures
+
+
+def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[FrameResult]:
+    """Return what is there and what is detected in each frame of a run."""
+    recording = recording_of(folder)
+    sensors = np.array([sensor["local_m"] for sensor in load_manifest(folder)["sensors"]])
+    common: dict[str, Any] = {"classes": tuple(GROUPS.values()), "region": region, "sensors": sensors}
+    return [
+        frame_result(frame, detect(detector, frame.points, frame.intensity), run=recording.traffic, **common)
+        for frame in recording.frames
+    ]
+
+
+def _check_device(device: str) -> None:
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        raise SeipError(f"torch cannot use the device {device!r} here: name cpu, or mend its driver") from error
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="train",
+        description="Train a detector of road users on simulated scans of a site.",
+        formatter_class=survey.HelpWithDefaults,
+    )
+    network, training = NetworkSettings(), TrainingSettings()
+    parser.add_argument("scene", nargs="?", type=Path, help="the site's .blend; in Blender the open scene")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
+    runs = parser.add_argument_group("folders of scans, by runs of traffic")
+    runs.add_argument("--train", nargs="+", type=Path, required=True, metavar="RUN", help="to learn from")
+    runs.add_argument("--validation", nargs="+", type=Path, required=True, metavar="RUN", help="to see when to stop")
+    runs.add_argument("--test", nargs="+", type=Path, default=[], metavar="RUN", help="to evaluate on")
+    net = parser.add_argument_group("network")
+    net.add_argument(
+        "--head", choices=("centre", "anchor"), default=network.head, help="centres, or anchors as published"
+    )
+    net.add_argument("--pillar", type=float, default=network.pillar, metavar="M", help="side of a pillar in metres")
+    net.add_argument("--points", type=int, default=network.most_points, help="that a pillar keeps")
+    net.add_argument("--width", type=int, default=network.width, help="channels of the first block")
+    net.add_argument("--blocks", type=int, nargs=3, default=network.blocks, metavar="N", help="convolutions in each")
+    work = parser.add_argument_group("training")
+    work.add_argument("--steps", type=int, default=training.steps, help="updates of the weights")
+    work.add_argument("--batch", type=int, default=training.batch, help="windows in a step")
+    work.add_argument("--seed", type=int, default=training.seed, help="of weights and order")
+    work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
+    work.add_argument("--threads", type=int, default=training.threads, help="of torch on the CPU")
+    return parser
+
+
+if __name__ == "__main__":
+    session.run(main)
