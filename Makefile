@@ -2,7 +2,8 @@
 # make test        set up, and run the tests (the slow ones: make test-slow)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
-# make study       redo the coverage study on the shipped junction
+# make detection   install PyTorch, for the detector; make test-detection tests it
+# make study       redo the study on the shipped junction: coverage, then detection (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
@@ -17,7 +18,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes traffic study benchmark extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes traffic detection test-detection study benchmark extension clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -54,8 +55,17 @@ traffic: environment
 	  $(PY) -m headless.traffic scenes/corridor.blend --simulate scenes/corridor.xodr --flow 450 --pedestrians 100 \
 	    --duration 75 --seed $$seed -o scenes/corridor_traffic/run-$$seed.npz || exit; done
 
-study: environment
+# PyTorch: 200 MB for the CPU alone, several GB where pip finds builds for graphics cards first.
+detection: environment
+	$(PY) -m pip install --quiet --only-binary :all: --group detection
+
+test-detection: detection
+	$(PY) -m pip install --quiet --no-deps --only-binary :all: --group second-opinion
+	$(PY) -m pytest tests/detection
+
+study: detection
 	$(PY) -m headless.study scenes/junction.blend -o out/study
+	$(PY) -m headless.evaluate scenes/junction.blend -o out/study
 
 benchmark: environment
 	$(PY) -m pip install --quiet --group benchmark

@@ -16,6 +16,12 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.detection import case_study, study_results
+from headless.detection.claims import judge
+from headless.detection.detector import check_device
+from headless.detection.pillars import grid_of
+from headless.detection.recordings import Studio, TrafficRun
+from headless.detection.settings import NetworkSettings, TrainingSettings
 
 import bpy
 import numpy as np
@@ -28,16 +34,8 @@ from seip_addon.core.results.study_tables import save_claims
 from seip_addon.core.scans import ScanSettings, static_scene
 from seip_addon.core.traffic import Trajectories
 
-try:
-    from headless.detection import case_study, study_results
-    from headless.detection.claims import judge
-    from headless.detection.pillars import grid_of
-    from headless.detection.recordings import Studio, TrafficRun
-    from headless.detection.settings import NetworkSettings, TrainingSettings
-except ModuleNotFoundError as error:
-    if error.name != "torch":
-        raise
-    sys.exit("error: the detector needs torch: pip install --group detection")
+FEWEST_RUNS = 4
+"""One to learn from, one for validation, two for tests."""
 
 WARM_UP = 2.0
 """Seconds from the first sample of a run to its first frame."""
@@ -46,6 +44,7 @@ WARM_UP = 2.0
 def main(argv: list[str]) -> None:
     """Place, simulate, train, judge, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
+    check_device(options.device)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
     watch, folder = surveyed.stopwatch, options.output
     traffic = _traffic(options, surveyed)
@@ -102,9 +101,6 @@ def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study
             raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
         runs.append(TrafficRun(path.stem, trajectories, times))
     return case_study.Traffic(tuple(runs[:-3]), tuple(runs[-3:-2]), tuple(runs[-2:]))
-
-
-FEWEST_RUNS = 4
 
 
 def _beside(scene: Path | None) -> list[Path]:

@@ -19,17 +19,8 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
-
-import bpy
-import numpy as np
-
-try:
-    import torch
-except ModuleNotFoundError:
-    sys.exit(f"error: {sys.executable} has no package 'torch': pip install --group detection")
-
 from headless.detection.average_precision import evaluate
-from headless.detection.detector import Detector
+from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.frames import SampledRecording, recording_of, require_separate
 from headless.detection.inference import detect
@@ -38,9 +29,10 @@ from headless.detection.pillars import grid_of
 from headless.detection.settings import GROUPS, NetworkSettings, TrainingSettings
 from headless.detection.training import train
 
+import bpy
+import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.pictures.detection_charts import save_training_chart
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.run_folder import load_manifest
@@ -59,7 +51,7 @@ def main(argv: list[str]) -> None:
         name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
     }
     require_separate(splits)
-    _check_device(options.device)
+    check_device(options.device)
     session.check_folder(options.output)
     session.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
@@ -109,13 +101,6 @@ def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[Fra
         frame_result(frame, detect(detector, frame.points, frame.intensity), run=recording.traffic, **common)
         for frame in recording.frames
     ]
-
-
-def _check_device(device: str) -> None:
-    try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        raise SeipError(f"torch cannot use the device {device!r} here: name cpu, or mend its driver") from error
 
 
 def _parser() -> argparse.ArgumentParser:

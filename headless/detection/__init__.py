@@ -1,1 +1,7 @@
-"""Detection of road users in merged clouds, and how well it is done."""
+"""PointPillars and how well it detects; torch is imported here and nowhere else."""
+
+import sys
+from importlib.util import find_spec
+
+if find_spec("torch") is None:
+    sys.exit(f"error: {sys.executable} has no package 'torch', which detection needs: pip install --group detection")

@@ -94,6 +94,20 @@ class Detector(nn.Module):
         return detector.to(device).eval()
 
 
+def check_device(device: str) -> None:
+    """See that torch can use a device, before the work rather than after.
+
+    Raises
+    ------
+    SeipError
+        It cannot.
+    """
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        raise SeipError(f"torch cannot use the device {device!r} here: name cpu, or mend its driver") from error
+
+
 def require_grid(detector: Detector, grid: PillarGrid, path: str | os.PathLike[str]) -> None:
     """See that a detector was trained on a grid.
 
