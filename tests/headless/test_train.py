@@ -1,0 +1,104 @@
+"""The command from folders of scans to a detector, its curve and its figures."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: pip install --group detection")
+
+from headless import simulate, train
+from headless.detection.detector import Detector
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from scene_by_hand import make_scene
+from small_junction import ORIGIN, make_example
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.traffic import RoadUser, Trajectories
+from seip_addon.scene.blend_file import save_blend
+from seip_addon.scene.write import write_result
+
+SMALL = ["--steps", "4", "--batch", "2", "--width", "8", "--blocks", "1", "1", "1", "--threads", "1"]
+
+
+def make_traffic(source, start) -> Trajectories:
+    """Return a car that drives along +x from ``start``."""
+    times = np.arange(4) / 5
+    return Trajectories(
+        users=(RoadUser("car", "car", 4.5, 1.8, 1.5),),
+        origin=np.zeros(3),
+        first=np.array([0, 4]),
+        time=times,
+        position=np.column_stack([start + 10 * times, np.full(4, -3.5), np.zeros(4)]) + ORIGIN,
+        yaw=np.zeros(4),
+        pitch=np.zeros(4),
+        speed=np.full(4, 10.0),
+        source=source,
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A placed scene and three runs of scans in it."""
+    folder = tmp_path_factory.mktemp("train")
+    example = make_example()
+    write_result(make_scene(example.geometry), example.site, example.deployment)
+    save_blend(folder / "placed.blend")
+    for name, start in (("first", -20.0), ("second", -5.0), ("third", 8.0)):
+        make_traffic(f"simulated, {name}", start).save(folder / f"{name}.npz")
+        arguments = [str(folder / "placed.blend"), "--traffic", str(folder / f"{name}.npz"), "--engine", "bvh"]
+        simulate.main([*arguments, "--duration", "0.2", "-o", str(folder / name)])
+    return folder
+
+
+def arguments(folder, output, *, training="first", validation="second", test="third", more=()):
+    runs = ["--train", str(folder / training), "--validation", str(folder / validation), "--test", str(folder / test)]
+    return [str(folder / "placed.blend"), *runs, "-o", str(folder / output), *SMALL, *more]
+
+
+def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
+    train.main(arguments(folder, "detector"))
+    detector = Detector.load(folder / "detector" / "detector.pt")
+    assert detector.settings.width == 8
+    assert detector.grid.columns % 8 == 0
+    assert (folder / "detector" / "training.png").read_bytes().startswith(b"\x89PNG")
+    figures = json.loads((folder / "detector" / "evaluation.json").read_text(encoding="utf-8"))
+    assert list(figures) == [str(folder / "third")]
+    assert all(0 <= value <= 1 and math.isfinite(value) for value in figures[str(folder / "third")].values())
+    assert "pillars of 0.4 m" in capsys.readouterr().out
+
+
+def test_a_finished_training_is_not_done_again(folder):
+    train.main(arguments(folder, "again"))
+    before = (folder / "again" / "detector.pt").stat().st_mtime_ns
+    train.main(arguments(folder, "again"))
+    assert (folder / "again" / "detector.pt").stat().st_mtime_ns == before
+    with pytest.raises(SeipError, match="other settings"):
+        train.main(arguments(folder, "again", more=("--seed", "7")))
+
+
+def test_the_same_traffic_in_two_splits_is_refused(folder):
+    with pytest.raises(SeipError, match=r"first \(train\) and .*first \(test\) show the same run of traffic"):
+        train.main(arguments(folder, "leak", test="first"))
+    assert not (folder / "leak").exists()
+
+
+def test_what_is_no_run_and_no_device_is_refused(folder):
+    with pytest.raises(SeipError, match="holds no run of scans"):
+        train.main(arguments(folder, "none", test="nowhere"))
+    with pytest.raises(SeipError, match="torch cannot use the device 'abacus'"):
+        train.main(arguments(folder, "none", more=("--device", "abacus")))
+
+
+def test_a_run_that_was_not_finished_is_refused(folder):
+    half = folder / "half"
+    (half / "frames").mkdir(parents=True)
+    record = json.loads((folder / "third" / "manifest.json").read_text(encoding="utf-8"))
+    (half / "manifest.json").write_text(json.dumps({**record, "complete": False}), encoding="utf-8")
+    with pytest.raises(SeipError, match="stopped half-way"):
+        train.main(arguments(folder, "none", training="half"))
