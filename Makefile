@@ -18,7 +18,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes traffic detection test-detection study benchmark extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study benchmark extension clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -45,9 +45,14 @@ scenes: environment
 	$(PY) -m headless.build_scene scenes/junction.toml -o scenes/junction.blend
 	$(PY) -m headless.build_scene scenes/corridor.toml -o scenes/corridor.blend
 
-# Runs of one scene differ by their seed alone.
-traffic: environment
+sumo: environment
 	$(PY) -m pip install --quiet --only-binary :all: --group traffic
+
+test-traffic: sumo
+	$(PY) -m pytest tests/core/test_shipped_maps.py tests/core/test_traffic_simulation.py tests/headless/test_traffic.py
+
+# Runs of one scene differ by their seed alone.
+traffic: sumo
 	for seed in 1 2 3 4 5 6; do \
 	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 550 --pedestrians 120 \
 	    --duration 75 --seed $$seed -o scenes/junction_traffic/run-$$seed.npz || exit; done

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import tomllib
 from collections import Counter, defaultdict
@@ -15,6 +14,7 @@ import pytest
 import shapely
 from defusedxml.ElementTree import parse
 from opendrive_text import map_lanes
+from sumo_here import needs_sumo
 
 from scenes.author_maps import MAPS
 from scenes.opendrive_writer import opendrive
@@ -27,6 +27,7 @@ from seip_addon.core.opendrive import (
     placed_signals,
     read_map,
 )
+from seip_addon.core.traffic.sumo import find_sumo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -270,10 +271,17 @@ def test_every_traffic_light_belongs_to_one_group_of_its_junction(shipped: Shipp
     assert sorted(groups) == sorted(controller.get("id") for controller in shipped.root.iterfind("controller"))
 
 
-@pytest.mark.skipif(shutil.which("netconvert") is None, reason="SUMO's netconvert is not installed")
+@needs_sumo
 def test_sumo_imports_the_map(shipped: Shipped, tmp_path: Path) -> None:
     net = tmp_path / "map.net.xml"
-    command = ["netconvert", "--opendrive-files", str(shipped.path), "-o", str(net), "--offset.disable-normalization"]
+    command = [
+        str(find_sumo().netconvert),
+        "--opendrive-files",
+        str(shipped.path),
+        "-o",
+        str(net),
+        "--offset.disable-normalization",
+    ]
     subprocess.run(command, check=True, capture_output=True, timeout=60)  # noqa: S603  # the command is our own
     root = parse(net).getroot()
     assert {logic.get("id") for logic in root.iter("tlLogic")} == {item.id for item in shipped.road_map.junctions}

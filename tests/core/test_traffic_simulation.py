@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -21,17 +22,6 @@ MAPS = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive"))
 
 LANE = '<lane id="{edge}_{index}" index="{index}" {who} length="{length}" shape="0,0 {length},0"/>'
 ROAD, PAVEMENT, BAYS = 'disallow="pedestrian"', 'allow="pedestrian"', 'allow="custom1"'
-
-
-def installed():
-    try:
-        sumo.find_sumo()
-    except SeipError:
-        return False
-    return True
-
-
-needs_sumo = pytest.mark.skipif(not installed(), reason="SUMO is not installed: pip install --group traffic")
 
 
 def edge(name, end, *lanes, length=120):

@@ -9,6 +9,7 @@ from headless import traffic
 
 import numpy as np
 import pytest
+from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import Trajectories, sumo
@@ -17,17 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 JUNCTION = ROOT / "scenes" / "junction.blend"
 TOWN = Path(os.environ.get("SEIP_MAPS", ROOT.parent / "shared" / "opendrive")) / "Town05.xodr"
 PAPERS = TOWN.parent.parent / "traffic"
-
-
-def installed():
-    try:
-        sumo.find_sumo()
-    except SeipError:
-        return False
-    return True
-
-
-needs_sumo = pytest.mark.skipif(not installed(), reason="SUMO is not installed: pip install --group traffic")
 
 
 def fcd(folder, y=-5.25, angle=90.0, count=30):

@@ -1,0 +1,17 @@
+"""A mark for tests that need Eclipse SUMO."""
+
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.traffic.sumo import find_sumo
+
+
+def _is_installed():
+    try:
+        find_sumo()
+    except SeipError:
+        return False
+    return True
+
+
+needs_sumo = pytest.mark.skipif(not _is_installed(), reason="SUMO is not installed: make sumo")
