@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -179,7 +179,16 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     -------
     Proof
     """
-    bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
+    keep, bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
+    proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock)
+    ties = None if proof.ties is None else tuple(keep[choice] for choice in proof.ties)
+    return replace(proof, chosen=keep[proof.chosen], ties=ties)
+
+
+def _prove_among(
+    instance: Instance, chosen: Integer, bound: Bound, solver: str, clock: Clock
+) -> Generator[Progress, None, Proof]:
+    """Improve an incumbent among the candidates that a bound leaves, none better being among the others."""
     relaxed = yield from _from_relaxation(instance, bound, chosen)
     chosen = max(chosen, relaxed, key=instance.covered)
     as_good = np.union1d(can_reach(instance, bound, instance.covered(chosen)), chosen)

@@ -130,10 +130,13 @@ class Instance:
     def part(self, keep: Integer) -> Instance:
         """Return the same instance with only the candidates ``keep``, targets merged anew."""
         visible, weight = merge_targets(self.visible[keep], self.weight)
+        return replace(self.of(keep), visible=visible, weight=weight)
+
+    def of(self, keep: Integer) -> Instance:
+        """Return the same instance with only the candidates ``keep``, and all targets."""
         return replace(
             self,
-            visible=visible,
-            weight=weight,
+            visible=self.visible[keep],
             price=self.price[keep],
             conflict=self.conflict[np.ix_(keep, keep)],
             clique=self.clique[keep],
