@@ -24,7 +24,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
-from .bounds import lagrangian_bound
+from .bounds import lagrangian_bound, select
 from .clock import Clock
 from .instance import Instance, Numbers
 from .problem import TIE
@@ -225,7 +225,7 @@ class _Search:
                 return []
             rest = self._rest(node, left)
         later, gains_after = _after_each(rest, node.gains, children)
-        best = _largest(np.where(later, gains_after, 0.0), left - 1).sum(axis=1, dtype=np.float64)
+        best = _best_completions(rest, node.gains, np.where(later, gains_after, 0.0), left - 1)
         values = node.value + node.gains[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
@@ -309,6 +309,17 @@ def _after_each(rest: Instance, gains: Numbers, children: int) -> tuple[Boolean,
     later &= ~rest.conflict[:children]
     later &= rest.price[:children, None] + rest.price <= rest.budget
     return later, np.maximum(gains - overlap, 0.0)
+
+
+def _best_completions(rest: Instance, gains: Numbers, gains_after: Numbers, left: int) -> Float:
+    """Return what so many sensors more add to each child at most, within what it leaves of the budget, (children,)."""
+    best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
+    multiplier = select(rest, gains.astype(np.float64)).multiplier
+    if multiplier > 0:
+        net = np.maximum(gains_after - multiplier * rest.price, 0.0)
+        spent = multiplier * (rest.budget - rest.price[: len(net)])
+        best = np.minimum(best, _largest(net, left).sum(axis=1, dtype=np.float64) + spent)
+    return best
 
 
 def _sorted_node(

@@ -7,14 +7,21 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ..arrays import Boolean, Integer
+from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import select
+from .clock import Clock
 from .instance import Instance
 from .problem import TIE
 
 STARTS = 8
 """Candidates to begin a greedy choice with, before exchanges."""
+
+STEPS = 3
+"""Exchanges of a tabu search for each candidate."""
+
+HOLD, RETURN = 4, 12
+"""Who came stays for fewer steps than the first of these, and who went stays away for once or twice the second."""
 
 
 def greedy(
@@ -85,10 +92,43 @@ def exchange(instance: Instance, chosen: Integer) -> Generator[Progress, None, I
         if covered == instance.total:
             return chosen
         yield Progress(0, 0, "exchanging sensors")
-        swapped = _best_swap(instance, chosen)
-        if instance.covered(swapped) <= covered + instance.slack:
+        gain = _swap_gains(instance, chosen)
+        if gain.max(initial=0.0) <= instance.slack:
             return chosen
-        chosen = swapped
+        chosen, _, _ = _swapped(gain, chosen)
+
+
+def tabu_search(
+    instance: Instance, chosen: Integer, clock: Clock, seconds: float
+) -> Generator[Progress, None, Integer]:
+    """Make the best exchange again and again, even for the worse, and return the best choice met (Glover 1989).
+
+    Who went cannot come back for a while, and who came cannot go, unless that
+    leads to a choice better than any before.
+    """
+    best, end = chosen, clock.elapsed + seconds
+    covered = most = instance.covered(chosen)
+    locked = np.zeros(len(instance), np.int64)
+    random = np.random.default_rng(0)
+    steps = STEPS * len(instance)
+    for step in range(steps):
+        if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
+            break
+        yield Progress(step, steps, "searching exchanges")
+        gain = _swap_gains(instance, chosen)
+        held = (locked[:, None] > step) | (locked[chosen] > step)
+        gain[held & (covered + gain <= most + instance.slack)] = -np.inf
+        if not np.isfinite(gain).any():
+            continue
+        chosen, came, gone = _swapped(gain, chosen)
+        locked[came] = step + random.integers(1, HOLD)
+        locked[gone] = step + random.integers(RETURN, 2 * RETURN)
+        if len(chosen) < instance.count:
+            chosen, _ = greedy(instance, chosen)
+        covered = instance.covered(chosen)
+        if covered > most:
+            best, most = chosen, covered
+    return best
 
 
 def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
@@ -117,16 +157,19 @@ def addable(instance: Instance, chosen: Integer) -> Boolean:
     return room
 
 
-def _best_swap(instance: Instance, chosen: Integer) -> Integer:
-    """Return the choice after the one exchange that covers most."""
+def _swap_gains(instance: Instance, chosen: Integer) -> Float:
+    """Return what each exchange of a chosen candidate (column) for another (row) adds, (c, k); -inf where forbidden."""
     times = instance.visible[chosen].sum(axis=0)
-    rests = [chosen[chosen != candidate] for candidate in chosen]
-    uncovered = np.array([(times - instance.visible[candidate]) == 0 for candidate in chosen])
-    gain = instance.gains((uncovered * instance.weight).T)
-    gain -= (uncovered * instance.weight).sum(axis=1)
-    for column, rest in zip(gain.T, rests, strict=True):
-        column[~addable(instance, rest)] = -np.inf
+    uncovered = np.array([(times - instance.visible[candidate]) == 0 for candidate in chosen]) * instance.weight
+    gain: Float = instance.gains(uncovered.T) - uncovered.sum(axis=1) + instance.uncovered(chosen).sum()
+    for column, candidate in zip(gain.T, chosen, strict=True):
+        column[~addable(instance, chosen[chosen != candidate])] = -np.inf
+    gain[chosen] = -np.inf
+    return gain
+
+
+def _swapped(gain: Float, chosen: Integer) -> tuple[Integer, int, int]:
+    """Return the choice after the exchange that adds most, who came and who went."""
     new, gone = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    if not np.isfinite(gain[new, gone]):
-        return chosen
-    return np.sort(np.append(rests[int(gone)], int(new)))
+    out = int(chosen[gone])
+    return np.sort(np.append(chosen[chosen != out], new)), int(new), out
