@@ -17,7 +17,7 @@ from .problem import TIE
 STARTS = 8
 """Candidates to begin a greedy choice with, before exchanges."""
 
-STEPS = 3
+STEPS = 2
 """Exchanges of a tabu search for each candidate."""
 
 HOLD, RETURN = 4, 12
@@ -92,10 +92,12 @@ def exchange(instance: Instance, chosen: Integer) -> Generator[Progress, None, I
         if covered == instance.total:
             return chosen
         yield Progress(0, 0, "exchanging sensors")
-        gain = _swap_gains(instance, chosen)
+        rests = _rests(instance, chosen)
+        gain = _swap_gains(instance, chosen, rests, instance.gains(rests.T).T)
         if gain.max(initial=0.0) <= instance.slack:
             return chosen
-        chosen, _, _ = _swapped(gain, chosen)
+        gone, new = np.unravel_index(int(np.argmax(gain)), gain.shape)
+        chosen = np.sort(np.append(np.delete(chosen, gone), new))
 
 
 def tabu_search(
@@ -110,24 +112,33 @@ def tabu_search(
     covered = most = instance.covered(chosen)
     locked = np.zeros(len(instance), np.int64)
     random = np.random.default_rng(0)
+    columns = np.ascontiguousarray(instance.matrix.T)
+    rests, seen = np.zeros((0, len(instance.weight))), np.zeros((0, len(instance)))
     steps = STEPS * len(instance)
     for step in range(steps):
         if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
             break
         yield Progress(step, steps, "searching exchanges")
-        gain = _swap_gains(instance, chosen)
-        held = (locked[:, None] > step) | (locked[chosen] > step)
+        before, rests = rests, _rests(instance, chosen)
+        if len(rests) == len(before):
+            changed = np.flatnonzero((rests != before).any(axis=0))
+            seen += (rests - before)[:, changed].astype(columns.dtype) @ columns[changed]
+        else:
+            seen = instance.gains(rests.T).T
+        gain = _swap_gains(instance, chosen, rests, seen)
+        held = (locked > step) | (locked[chosen, None] > step)
         gain[held & (covered + gain <= most + instance.slack)] = -np.inf
         if not np.isfinite(gain).any():
             continue
-        chosen, came, gone = _swapped(gain, chosen)
+        gone, came = np.unravel_index(int(np.argmax(gain)), gain.shape)
         locked[came] = step + random.integers(1, HOLD)
-        locked[gone] = step + random.integers(RETURN, 2 * RETURN)
+        locked[chosen[gone]] = step + random.integers(RETURN, 2 * RETURN)
+        chosen = np.where(np.arange(len(chosen)) == gone, came, chosen)
         if len(chosen) < instance.count:
             chosen, _ = greedy(instance, chosen)
         covered = instance.covered(chosen)
         if covered > most:
-            best, most = chosen, covered
+            best, most = np.sort(chosen), covered
     return best
 
 
@@ -157,19 +168,20 @@ def addable(instance: Instance, chosen: Integer) -> Boolean:
     return room
 
 
-def _swap_gains(instance: Instance, chosen: Integer) -> Float:
-    """Return what each exchange of a chosen candidate (column) for another (row) adds, (c, k); -inf where forbidden."""
-    times = instance.visible[chosen].sum(axis=0)
-    uncovered = np.array([(times - instance.visible[candidate]) == 0 for candidate in chosen]) * instance.weight
-    gain: Float = instance.gains(uncovered.T) - uncovered.sum(axis=1) + instance.uncovered(chosen).sum()
-    for column, candidate in zip(gain.T, chosen, strict=True):
-        column[~addable(instance, chosen[chosen != candidate])] = -np.inf
-    gain[chosen] = -np.inf
+def _rests(instance: Instance, chosen: Integer) -> Float:
+    """Return the weights that are not covered without each of the chosen candidates, (k, t) float64."""
+    visible = instance.visible[chosen]
+    rests: Float = (visible.sum(axis=0) - visible == 0) * instance.weight
+    return rests
+
+
+def _swap_gains(instance: Instance, chosen: Integer, rests: Float, seen: Float) -> Float:
+    """Return what it adds to exchange each chosen candidate for any other, (k, c); -inf where that is forbidden.
+
+    ``seen`` is what each candidate sees of the ``rests`` that the chosen ones leave.
+    """
+    gain: Float = seen + (instance.total - instance.covered(chosen) - rests.sum(axis=1))[:, None]
+    for row, candidate in zip(gain, chosen, strict=True):
+        row[~addable(instance, chosen[chosen != candidate])] = -np.inf
+    gain[:, chosen] = -np.inf
     return gain
-
-
-def _swapped(gain: Float, chosen: Integer) -> tuple[Integer, int, int]:
-    """Return the choice after the exchange that adds most, who came and who went."""
-    new, gone = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    out = int(chosen[gone])
-    return np.sort(np.append(chosen[chosen != out], new)), int(new), out
