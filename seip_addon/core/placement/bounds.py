@@ -33,6 +33,12 @@ SHRINK = 0.7
 DEFLECTION = 0.85
 SMALLEST_STEP = 1e-3
 
+REVIEW, WORTHWHILE = 25, 0.8
+"""Every so many steps candidates are ruled out, where no more than such a share of them would be left."""
+
+FEW = 10_000
+"""The search ends when no more choices than these are left."""
+
 NEAR = (0.8, 0.95, 1.0, 1.05, 1.25)
 """Factors by which the budget's multiplier may change in a step."""
 
@@ -120,14 +126,18 @@ def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool
     else:
         score = instance.gains(targets)
     selection = select(instance, score + groups @ instance.mandatory, near)
-    value = math.fsum(instance.weight - targets) - math.fsum(groups) + selection.value
+    total = math.fsum if exact else np.sum
+    value = float(total(instance.weight - targets)) - math.fsum(groups) + selection.value
     return Bound(value, targets, groups, selection)
 
 
 def lagrangian_bound(
     instance: Instance, goal: float, clock: Clock, start: Float | None = None, iterations: int = ITERATIONS
-) -> Generator[Progress, None, Bound]:
+) -> Generator[Progress, None, tuple[Integer, Bound]]:
     """Search for multipliers with a small bound by deflected subgradients.
+
+    Candidates that the bound rules out are left out of the steps that follow,
+    which makes these shorter and the bound smaller.
 
     Parameters
     ----------
@@ -147,9 +157,13 @@ def lagrangian_bound(
 
     Returns
     -------
+    (k,) int64
+        Candidates that some placement covering ``goal`` may contain.
     Bound
-        The best one found, evaluated in double precision.
+        The best one found for placements of these, evaluated in double
+        precision; where none is left, of those that were left last.
     """
+    keep = np.arange(len(instance))
     targets = instance.weight / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5 if start is None else start
     groups = np.zeros(len(instance.mandatory))
     # group multipliers live on the scale of scores, those of targets on that of weights
@@ -161,6 +175,14 @@ def lagrangian_bound(
     for iteration in range(iterations):
         if best.value < goal - instance.slack or step < SMALLEST_STEP or clock.left <= 0:
             break
+        if iteration % REVIEW == REVIEW - 1 and len(can_reach(instance, best, goal)) <= WORTHWHILE * len(keep):
+            within = can_reach(instance, bound_from(instance, best.targets, best.groups, exact=True), goal)
+            if _few(instance, within):
+                break
+            keep, instance = keep[within], instance.of(within)
+            targets, groups = best.targets, best.groups
+            current = best = bound_from(instance, targets, groups, exact=False)
+            direction[:], group_direction[:] = 0.0, 0.0
         yield Progress(iteration, iterations, "bounding what any placement can cover")
         picked = current.selection.picked
         seen = instance.visible[picked].sum(axis=0)
@@ -182,7 +204,11 @@ def lagrangian_bound(
                 step, stale = step * SHRINK, 0
                 targets, groups, current = best.targets, best.groups, best
                 direction[:], group_direction[:] = 0.0, 0.0
-    return bound_from(instance, best.targets, best.groups, exact=True)
+    best = bound_from(instance, best.targets, best.groups, exact=True)
+    within = can_reach(instance, best, goal)
+    if len(within):
+        best = bound_from(instance.of(within), best.targets, best.groups, exact=True)
+    return keep[within], best
 
 
 def least_price(instance: Instance, bound: Bound, goal: float) -> float:
@@ -218,6 +244,10 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     in_clique[instance.clique[picked]] = net[picked]
     forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
     return np.flatnonzero(forced >= goal - instance.slack)
+
+
+def _few(instance: Instance, candidates: Integer) -> bool:
+    return math.comb(len(candidates), min(instance.count, len(candidates) // 2)) <= FEW
 
 
 def _select(instance: Instance, score: Float, multiplier: float) -> Selection:

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
-from .bounds import can_reach, lagrangian_bound
+from .bounds import lagrangian_bound, select
 from .clock import Clock
 from .instance import Instance, Numbers
 from .problem import TIE
@@ -225,7 +225,7 @@ class _Search:
                 return []
             rest = self._rest(node, left)
         later, gains_after = _after_each(rest, node.gains, children)
-        best = _largest(np.where(later, gains_after, 0.0), left - 1).sum(axis=1, dtype=np.float64)
+        best = _best_completions(rest, node.gains, np.where(later, gains_after, 0.0), left - 1)
         values = node.value + node.gains[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
@@ -259,7 +259,7 @@ class _Search:
     def _rest(self, node: _Node, left: int) -> Instance:
         """Return what is left to decide at a node: its followers, the targets that are not seen yet."""
         instance, followers = self.instance, node.followers
-        unseen = np.flatnonzero(~instance.visible[list(node.chosen)].any(axis=0))
+        unseen = self._unseen(node)
         spent = math.fsum(instance.price[list(node.chosen)])
         return replace(
             instance,
@@ -269,21 +269,24 @@ class _Search:
             conflict=instance.conflict[np.ix_(followers, followers)],
             clique=instance.clique[followers],
             mandatory=np.zeros((0, len(followers)), bool),
-            original=unseen,
+            original=instance.original[followers],
             count=left,
             budget=max(instance.budget * (1 + TIE) - spent, 0.0),
         )
+
+    def _unseen(self, node: _Node) -> Integer:
+        return np.flatnonzero(~self.instance.visible[list(node.chosen)].any(axis=0))
 
     def _relaxed(
         self, node: _Node, rest: Instance, left: int, goal: float
     ) -> Generator[Progress, None, tuple[_Node, int]]:
         """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
-        start = None if node.multipliers is None else node.multipliers[rest.original]
+        unseen = self._unseen(node)
+        start = None if node.multipliers is None else node.multipliers[unseen]
         steps = FIRST_STEPS if start is None else LATER_STEPS
-        bound = yield from lagrangian_bound(rest, goal - node.value, self._clock, start, steps)
-        keep = can_reach(rest, bound, goal - node.value)
+        keep, bound = yield from lagrangian_bound(rest, goal - node.value, self._clock, start, steps)
         multipliers = np.zeros(len(self.weight))
-        multipliers[rest.original] = bound.targets
+        multipliers[unseen] = bound.targets
         node = replace(node, followers=node.followers[keep], gains=node.gains[keep], multipliers=multipliers)
         return _within_reach(node, left, goal)
 
@@ -306,6 +309,17 @@ def _after_each(rest: Instance, gains: Numbers, children: int) -> tuple[Boolean,
     later &= ~rest.conflict[:children]
     later &= rest.price[:children, None] + rest.price <= rest.budget
     return later, np.maximum(gains - overlap, 0.0)
+
+
+def _best_completions(rest: Instance, gains: Numbers, gains_after: Numbers, left: int) -> Float:
+    """Return what so many sensors more add to each child at most, within what it leaves of the budget, (children,)."""
+    best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
+    multiplier = select(rest, gains.astype(np.float64)).multiplier
+    if multiplier > 0:
+        net = np.maximum(gains_after - multiplier * rest.price, 0.0)
+        spent = multiplier * (rest.budget - rest.price[: len(net)])
+        best = np.minimum(best, _largest(net, left).sum(axis=1, dtype=np.float64) + spent)
+    return best
 
 
 def _sorted_node(

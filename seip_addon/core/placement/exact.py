@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,21 +13,22 @@ from ..progress import Progress, finish
 from .bounds import Bound, can_reach, lagrangian_bound
 from .branch_and_bound import best_placements, is_worthwhile
 from .clock import Clock
+from .districts import district_bound
 from .feasibility import starting_choice
-from .greedy import exchange, greedy_and_exchange, greedy_choices, without_idle
+from .greedy import exchange, greedy_and_exchange, greedy_choices, tabu_search, without_idle
 from .instance import Instance, make_instance
 from .integer_program import check_solver, reaching
 from .problem import Placement, PlacementProblem, record_choice
 from .ties import MANY, canonical_optimum
-
-KERNELS = ((6, 0.15), (12, 0.3))
-"""Small programs over the candidates of best scores: how many per sensor, and what share of the time left."""
 
 BRANCHING = 0.6
 """Share of the time for branch and bound, where that is worthwhile, before programs are tried."""
 
 BRANCHING_ALONE = 0.9
 """The same where the whole program is too large for a solver."""
+
+SEARCHING, BOUNDING = 0.15, 0.5
+"""Shares of the time left for a search of exchanges and for a bound by districts, where branching does not decide."""
 
 LARGEST = 1_000_000
 """Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
@@ -66,7 +67,8 @@ def solve(
     Reductions that lose nothing come first; a greedy choice improved by
     exchanges gives an incumbent, a Lagrangian relaxation a bound; candidates
     that the bound rules out are dropped. Among the rest branch and bound
-    decides for few sensors, an integer program for many.
+    decides for few sensors. For many a tabu search improves the incumbent,
+    districts the bound, and an integer program has what time is left.
 
     Parameters
     ----------
@@ -179,7 +181,16 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     -------
     Proof
     """
-    bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
+    keep, bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
+    proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock)
+    ties = None if proof.ties is None else tuple(keep[choice] for choice in proof.ties)
+    return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound), ties=ties)
+
+
+def _prove_among(
+    instance: Instance, chosen: Integer, bound: Bound, solver: str, clock: Clock
+) -> Generator[Progress, None, Proof]:
+    """Improve an incumbent among the candidates that a bound leaves, none better being among the others."""
     relaxed = yield from _from_relaxation(instance, bound, chosen)
     chosen = max(chosen, relaxed, key=instance.covered)
     as_good = np.union1d(can_reach(instance, bound, instance.covered(chosen)), chosen)
@@ -192,20 +203,20 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
         if found.finished:
             ties = (chosen, *equal) if found.complete else None
             return Proof(chosen, instance.covered(chosen), optimal=True, ties=ties)
+    least = min(bound.value, instance.total)
+    if least >= _better(instance, chosen) - instance.slack:
+        for beginning in (chosen, relaxed):
+            searched = yield from tabu_search(instance, beginning, clock, SEARCHING * clock.left)
+            chosen = max(chosen, searched, key=instance.covered)
+        by_districts = yield from district_bound(instance, _better(instance, chosen), clock, BOUNDING * clock.left)
+        least = min(least, by_districts)
     keep = can_reach(instance, bound, _better(instance, chosen))
-    for factor, share in KERNELS:
-        size = factor * max(len(chosen), 1)
-        if len(keep) <= size or clock.left <= 0:
-            break
-        yield Progress(0, 0, f"improving the placement among the {size} best candidates")
-        chosen = yield from _within_kernel(instance, bound, size, chosen, solver, share * clock.left)
-        keep = can_reach(instance, bound, _better(instance, chosen))
-    if bound.value < _better(instance, chosen) - instance.slack or len(keep) == 0:
+    if least < _better(instance, chosen) - instance.slack or len(keep) == 0:
         return Proof(chosen, instance.covered(chosen), optimal=True)
     if clock.left <= 0 or np.count_nonzero(instance.visible[keep]) > LARGEST:
-        return Proof(chosen, bound.value, optimal=False)
+        return Proof(chosen, least, optimal=False)
     yield Progress(0, 0, f"proving with {len(keep)} of {len(instance)} candidates")
-    return (yield from _decide(instance, keep, bound.value, chosen, solver, clock.left))
+    return (yield from _decide(instance, keep, least, chosen, solver, clock))
 
 
 def _better(instance: Instance, chosen: Integer) -> float:
@@ -221,22 +232,12 @@ def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Gener
     return (yield from exchange(instance, picked))
 
 
-def _within_kernel(
-    instance: Instance, bound: Bound, size: int, chosen: Integer, solver: str, seconds: float
-) -> Generator[Progress, None, Integer]:
-    """Return the best placement among the candidates of best scores, at least as good as the one given."""
-    keep = np.sort(np.argsort(-bound.selection.net, kind="stable")[:size])
-    outcome = yield from reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
-    if outcome.chosen is None:
-        return chosen
-    return (yield from exchange(instance, keep[outcome.chosen]))
-
-
 def _decide(
-    instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, seconds: float
+    instance: Instance, keep: Integer, bound: float, chosen: Integer, solver: str, clock: Clock
 ) -> Generator[Progress, None, Proof]:
     """Look for a better placement among the candidates that one may contain; that there is none is the proof."""
-    outcome = yield from reaching(instance.part(keep), _better(instance, chosen)).maximise_coverage(solver, seconds)
+    program = reaching(instance.part(keep), _better(instance, chosen))
+    outcome = yield from program.maximise_coverage(solver, clock.left)
     chosen = chosen if outcome.chosen is None else keep[outcome.chosen]
     value = instance.covered(chosen)
     bound = value if outcome.finished else max(value, min(bound, outcome.bound))

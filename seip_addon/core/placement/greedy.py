@@ -7,14 +7,21 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ..arrays import Boolean, Integer
+from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import select
+from .clock import Clock
 from .instance import Instance
 from .problem import TIE
 
 STARTS = 8
 """Candidates to begin a greedy choice with, before exchanges."""
+
+STEPS = 2
+"""Exchanges of a tabu search for each candidate."""
+
+HOLD, RETURN = 4, 12
+"""Who came stays for fewer steps than the first of these, and who went stays away for once or twice the second."""
 
 
 def greedy(
@@ -85,10 +92,54 @@ def exchange(instance: Instance, chosen: Integer) -> Generator[Progress, None, I
         if covered == instance.total:
             return chosen
         yield Progress(0, 0, "exchanging sensors")
-        swapped = _best_swap(instance, chosen)
-        if instance.covered(swapped) <= covered + instance.slack:
+        rests = _rests(instance, chosen)
+        gain = _swap_gains(instance, chosen, rests, instance.gains(rests.T).T)
+        if gain.max(initial=0.0) <= instance.slack:
             return chosen
-        chosen = swapped
+        gone, new = np.unravel_index(int(np.argmax(gain)), gain.shape)
+        chosen = np.sort(np.append(np.delete(chosen, gone), new))
+
+
+def tabu_search(
+    instance: Instance, chosen: Integer, clock: Clock, seconds: float
+) -> Generator[Progress, None, Integer]:
+    """Make the best exchange again and again, even for the worse, and return the best choice met (Glover 1989).
+
+    Who went cannot come back for a while, and who came cannot go, unless that
+    leads to a choice better than any before.
+    """
+    best, end = chosen, clock.elapsed + seconds
+    covered = most = instance.covered(chosen)
+    locked = np.zeros(len(instance), np.int64)
+    random = np.random.default_rng(0)
+    columns = np.ascontiguousarray(instance.matrix.T)
+    rests, seen = np.zeros((0, len(instance.weight))), np.zeros((0, len(instance)))
+    steps = STEPS * len(instance)
+    for step in range(steps):
+        if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
+            break
+        yield Progress(step, steps, "searching exchanges")
+        before, rests = rests, _rests(instance, chosen)
+        if len(rests) == len(before):
+            changed = np.flatnonzero((rests != before).any(axis=0))
+            seen += (rests - before)[:, changed].astype(columns.dtype) @ columns[changed]
+        else:
+            seen = instance.gains(rests.T).T
+        gain = _swap_gains(instance, chosen, rests, seen)
+        held = (locked > step) | (locked[chosen, None] > step)
+        gain[held & (covered + gain <= most + instance.slack)] = -np.inf
+        if not np.isfinite(gain).any():
+            continue
+        gone, came = np.unravel_index(int(np.argmax(gain)), gain.shape)
+        locked[came] = step + random.integers(1, HOLD)
+        locked[chosen[gone]] = step + random.integers(RETURN, 2 * RETURN)
+        chosen = np.where(np.arange(len(chosen)) == gone, came, chosen)
+        if len(chosen) < instance.count:
+            chosen, _ = greedy(instance, chosen)
+        covered = instance.covered(chosen)
+        if covered > most:
+            best, most = np.sort(chosen), covered
+    return best
 
 
 def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
@@ -117,16 +168,20 @@ def addable(instance: Instance, chosen: Integer) -> Boolean:
     return room
 
 
-def _best_swap(instance: Instance, chosen: Integer) -> Integer:
-    """Return the choice after the one exchange that covers most."""
-    times = instance.visible[chosen].sum(axis=0)
-    rests = [chosen[chosen != candidate] for candidate in chosen]
-    uncovered = np.array([(times - instance.visible[candidate]) == 0 for candidate in chosen])
-    gain = instance.gains((uncovered * instance.weight).T)
-    gain -= (uncovered * instance.weight).sum(axis=1)
-    for column, rest in zip(gain.T, rests, strict=True):
-        column[~addable(instance, rest)] = -np.inf
-    new, gone = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    if not np.isfinite(gain[new, gone]):
-        return chosen
-    return np.sort(np.append(rests[int(gone)], int(new)))
+def _rests(instance: Instance, chosen: Integer) -> Float:
+    """Return the weights that are not covered without each of the chosen candidates, (k, t) float64."""
+    visible = instance.visible[chosen]
+    rests: Float = (visible.sum(axis=0) - visible == 0) * instance.weight
+    return rests
+
+
+def _swap_gains(instance: Instance, chosen: Integer, rests: Float, seen: Float) -> Float:
+    """Return what it adds to exchange each chosen candidate for any other, (k, c); -inf where that is forbidden.
+
+    ``seen`` is what each candidate sees of the ``rests`` that the chosen ones leave.
+    """
+    gain: Float = seen + (instance.total - instance.covered(chosen) - rests.sum(axis=1))[:, None]
+    for row, candidate in zip(gain, chosen, strict=True):
+        row[~addable(instance, chosen[chosen != candidate])] = -np.inf
+    gain[:, chosen] = -np.inf
+    return gain

@@ -90,6 +90,10 @@ class Instance:
         """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
         return math.ceil(goal - self.slack) if self.step == 1 else goal
 
+    def attained(self, bound: float) -> float:
+        """Return the largest covered weight up to ``bound`` that a placement can have at all."""
+        return math.floor(bound + self.slack) if self.step == 1 else bound
+
     def uncovered(self, chosen: Integer) -> Float:
         """Return the weights of the targets, zero where the chosen candidates see them, (t,) float64."""
         rest: Float = self.weight * ~self.visible[chosen].any(axis=0)
@@ -130,10 +134,13 @@ class Instance:
     def part(self, keep: Integer) -> Instance:
         """Return the same instance with only the candidates ``keep``, targets merged anew."""
         visible, weight = merge_targets(self.visible[keep], self.weight)
+        return replace(self.of(keep), visible=visible, weight=weight)
+
+    def of(self, keep: Integer) -> Instance:
+        """Return the same instance with only the candidates ``keep``, and all targets."""
         return replace(
             self,
-            visible=visible,
-            weight=weight,
+            visible=self.visible[keep],
             price=self.price[keep],
             conflict=self.conflict[np.ix_(keep, keep)],
             clique=self.clique[keep],

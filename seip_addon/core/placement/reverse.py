@@ -104,19 +104,21 @@ def _cheapest(
     price = math.fsum(instance.price[chosen])
     if price == 0:
         return chosen, price
-    bound = yield from lagrangian_bound(replace(instance, budget=min(price, instance.budget)), goal, clock)
-    least = min(price, max(least_price(instance, bound, goal), float(instance.price.min())))
+    no_dearer = replace(instance, budget=min(price, instance.budget))
+    keep, bound = yield from lagrangian_bound(no_dearer, goal, clock)
+    least = min(price, max(least_price(instance.of(keep), bound, goal), float(instance.price.min())))
     if np.ptp(instance.price) == 0:
         chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
         price = math.fsum(instance.price[chosen])
         single = float(instance.price[0])
         return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
-    cheaper = replace(instance, budget=_below(price, instance.price))
-    keep = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
+    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    keep, cheaper = keep[within], cheaper.part(within)
     if len(keep) == 0:
         return chosen, price
     yield Progress(0, 0, f"looking for a cheaper placement among {len(keep)} candidates")
-    program = reaching(cheaper.part(keep), goal)
+    program = reaching(cheaper, goal)
     outcome = yield from program.maximise(-1 * program.price, solver, clock.left)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Integer
 from ..progress import Progress
-from .bounds import can_reach, lagrangian_bound
+from .bounds import lagrangian_bound
 from .branch_and_bound import best_placements, first_in_order, is_worthwhile, merit
 from .clock import Clock
 from .greedy import exchange, without_idle, without_weakest
@@ -66,8 +66,8 @@ def canonical_optimum(
     if not settled:
         return chosen, False
     same_number = replace(instance, count=len(chosen))
-    bound = yield from lagrangian_bound(same_number, goal, clock)
-    keep = np.union1d(can_reach(same_number, bound, goal), chosen)
+    keep, _ = yield from lagrangian_bound(same_number, goal, clock)
+    keep = np.union1d(keep, chosen)
     yield Progress(0, 0, f"breaking ties among {len(keep)} candidates")
     part, within = same_number.part(keep), np.searchsorted(keep, chosen)
     if is_worthwhile(same_number, keep):
@@ -92,8 +92,7 @@ def fewest(
         if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - instance.slack:
             chosen = without_idle(fewer, exchanged, goal)
             continue
-        bound = yield from lagrangian_bound(fewer, goal, clock)
-        keep = can_reach(fewer, bound, goal)
+        keep, bound = yield from lagrangian_bound(fewer, goal, clock)
         if bound.value < goal - instance.slack or len(keep) == 0:
             break
         yield Progress(0, 0, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")

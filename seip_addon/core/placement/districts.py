@@ -1,0 +1,170 @@
+r"""Upper bounds by districts, for many sensors: where shares of sensors would cover all, whole ones do not.
+
+The linear relaxation counts a target twice that two sensors see. Here the
+candidates are parted into districts, and only a target that several districts
+see is relaxed: with multipliers :math:`0 \le \lambda_j \le w_j`,
+
+.. math::
+    L(\lambda) = \sum_j (w_j - \lambda_j) + \max_{\sum_d m_d \le N} \sum_d F_d(m_d),
+
+where :math:`F_d(m)` bounds what m sensors of district d cover together of the
+weights :math:`\lambda`: for one and two it is the best choice itself, for more
+the smaller of :math:`m/2` times the best two (coverage is submodular) and all
+that the district sees. This is Lagrangian decomposition (Guignard and Kim 1987) with
+overlaps kept within the parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
+from ..progress import Progress
+from .bounds import DEFLECTION, PATIENCE, SHRINK, SMALLEST_STEP
+from .clock import Clock
+from .greedy import greedy
+from .instance import Instance, Numbers
+
+ITERATIONS = 2000
+
+SENSORS = 1.8
+"""So many sensors there are for each district: of two their overlap is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class _District:
+    """Candidates near each other.
+
+    Parameters
+    ----------
+    targets : (s,) int64
+        Those that any of them sees.
+    matrix : (n, s) float
+    excluded : (n, n) bool
+        Pairs that cannot be chosen together, everyone with itself included.
+    """
+
+    targets: Integer
+    matrix: Numbers
+    excluded: Boolean
+
+    def values(self, multipliers: Float, count: int) -> tuple[Float, list[Float]]:
+        """Return F for no sensor up to ``count``, and how often each target counts in it for 1, 2 and all."""
+        weight = multipliers[self.targets].astype(self.matrix.dtype)
+        score = self.matrix @ weight
+        first = int(np.argmax(score))
+        on_top = np.where(self.excluded[first], 0.0, score - self.matrix @ (weight * self.matrix[first]))
+        # with a partner of a smaller score no pair is better than the best with the first
+        rows = np.flatnonzero(score >= on_top.max())
+        pairs = score[rows, None] + score[rows] - (self.matrix[rows] * weight) @ self.matrix[rows].T
+        pairs[self.excluded[np.ix_(rows, rows)]] = 0.0
+        one, other = np.unravel_index(int(np.argmax(pairs)), pairs.shape)
+        best_two = max(float(pairs[one, other]), float(score[first]))
+        seen_by_two = np.maximum(self.matrix[rows[one]], self.matrix[rows[other]])
+        if best_two == score[first]:
+            seen_by_two = self.matrix[first]
+        number = np.arange(count + 1)
+        value = np.minimum(best_two * np.maximum(number, 2) / 2, float(weight.sum(dtype=np.float64)))
+        value[:2] = 0.0, score[first]
+        return value, [self.matrix[first], seen_by_two, np.ones(len(self.targets))]
+
+
+def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float) -> Generator[Progress, None, float]:
+    """Return a weight that no placement exceeds, the budget and the mandatory groups aside.
+
+    Parameters
+    ----------
+    instance : Instance
+    goal : float
+        The search ends when the bound falls below.
+    clock : Clock
+    seconds : float
+        Longest time to search.
+
+    Yields
+    ------
+    Progress
+    """
+    districts = _districts(instance)
+    end = clock.elapsed + min(seconds, clock.left)
+    shared = np.zeros(len(instance.weight))
+    for district in districts:
+        shared[district.targets] += 1
+    multipliers = instance.weight / np.maximum(shared, 1)
+    value, seen = _bound(instance, districts, multipliers)
+    best, best_at, seen_at_best = value, multipliers, seen
+    direction, step, stale = np.zeros(len(multipliers)), 1.0, 0
+    for iteration in range(ITERATIONS):
+        if best < goal - instance.slack or step < SMALLEST_STEP or clock.elapsed > end:
+            break
+        yield Progress(iteration, ITERATIONS, "bounding by districts")
+        slope = np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
+        direction = slope + DEFLECTION * direction
+        size = float(direction @ direction)
+        if size == 0:
+            break
+        length = step * max(value - goal, 1e-6 * instance.total) / size
+        multipliers = np.clip(multipliers - length * direction, 0.0, instance.weight)
+        value, seen = _bound(instance, districts, multipliers)
+        stale += 1
+        if value < best - 1e-7 * instance.total:
+            best, best_at, seen_at_best, stale = value, multipliers, seen, 0
+        elif stale == PATIENCE:
+            step, stale = step * SHRINK, 0
+            value, multipliers, seen = best, best_at, seen_at_best
+            direction[:] = 0.0
+    precise = [replace(district, matrix=district.matrix.astype(np.float64)) for district in districts]
+    return _bound(instance, precise, best_at)[0]
+
+
+def _districts(instance: Instance) -> list[_District]:
+    """Part the candidates around the first of a greedy choice, each clique where it overlaps most."""
+    number = max(1, round(instance.count / SENSORS))
+    free = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
+    centres, _ = greedy(free, np.zeros(0, np.int64))
+    overlap = instance.gains((instance.visible[centres] * instance.weight).T)
+    shared = np.zeros((int(instance.clique.max()) + 1, len(centres)))
+    np.add.at(shared, instance.clique, overlap)
+    nearest = shared.argmax(axis=1)[instance.clique]
+    return [_district(instance, np.flatnonzero(nearest == index)) for index in np.unique(nearest)]
+
+
+def _district(instance: Instance, members: Integer) -> _District:
+    targets = np.flatnonzero(instance.visible[members].any(axis=0))
+    excluded = instance.conflict[np.ix_(members, members)] | np.eye(len(members), dtype=bool)
+    return _District(targets, instance.matrix[np.ix_(members, targets)], excluded)
+
+
+def _bound(instance: Instance, districts: list[_District], multipliers: Float) -> tuple[float, Float]:
+    """Return L and how often each target counts in it."""
+    found = [district.values(multipliers, instance.count) for district in districts]
+    value, numbers = _share_out(np.array([values for values, _ in found]))
+    seen = np.zeros(len(multipliers))
+    for district, (values, counted), number in zip(districts, found, numbers, strict=True):
+        if number == 1:
+            seen[district.targets] += counted[0]
+        elif number > 1 and values[number] == values[2] * number / 2:
+            seen[district.targets] += counted[1] * number / 2
+        elif number > 1:
+            seen[district.targets] += counted[2]
+    return math.fsum(instance.weight - multipliers) + value, seen
+
+
+def _share_out(values: Float) -> tuple[float, list[int]]:
+    """Return the largest sum of one value of each row, the columns adding up to the last at most, and the columns."""
+    best, taken = np.zeros(values.shape[1]), []
+    for row in values:
+        sums = np.full((len(row), len(row)), -np.inf)
+        for number, value in enumerate(row):
+            sums[number:, number] = best[: len(row) - number] + value
+        taken.append(sums.argmax(axis=1))
+        best = sums.max(axis=1)
+    left, numbers = len(best) - 1, []
+    for choice in reversed(taken):
+        numbers.append(int(choice[left]))
+        left -= numbers[-1]
+    return float(best[-1]), numbers[::-1]

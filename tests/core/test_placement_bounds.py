@@ -1,0 +1,85 @@
+"""Bounds and searches that do not decide by themselves, against exhaustive search on the reduced problem."""
+
+import math
+from itertools import combinations
+
+from headless.street_visibility import street_problem
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from placement_oracle import small_problems
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement import bounds
+from seip_addon.core.placement.bounds import lagrangian_bound
+from seip_addon.core.placement.clock import Clock
+from seip_addon.core.placement.districts import district_bound
+from seip_addon.core.placement.greedy import greedy, tabu_search
+from seip_addon.core.placement.instance import make_instance
+from seip_addon.core.progress import finish
+
+
+def forever():
+    return Clock(math.inf)
+
+
+def reduced(problem):
+    try:
+        return make_instance(problem)[0]
+    except SeipError:
+        return None
+
+
+def feasible(instance):
+    sizes = range(1, min(instance.count, len(instance)) + 1)
+    choices = [np.array(choice) for size in sizes for choice in combinations(range(len(instance)), size)]
+    return [choice for choice in choices if instance.feasible(choice)]
+
+
+@settings(max_examples=150, deadline=None)
+@given(small_problems(), st.floats(0.0, 1.0))
+def test_no_placement_covers_more_than_the_districts_allow(problem, share):
+    instance = reduced(problem)
+    assume(instance is not None)
+    best = max(map(instance.covered, feasible(instance)), default=0.0)
+    assert finish(district_bound(instance, share * best, forever(), math.inf)) >= best - instance.slack
+
+
+@settings(max_examples=150, deadline=None)
+@given(small_problems(), st.floats(0.0, 1.0))
+def test_every_placement_that_reaches_the_goal_is_left(problem, share):
+    instance = reduced(problem)
+    assume(instance is not None)
+    reaching = [choice for choice in feasible(instance) if instance.covered(choice) >= share * instance.total]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, "REVIEW", 2)
+        patch.setattr(bounds, "WORTHWHILE", 1.0)
+        patch.setattr(bounds, "FEW", 1)
+        keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
+    assert all(np.isin(choice, keep).all() for choice in reaching)
+    assert all(instance.covered(choice) <= bound.value + instance.slack for choice in reaching)
+
+
+@settings(max_examples=100, deadline=None)
+@given(small_problems())
+def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
+    instance = reduced(problem)
+    assume(instance is not None)
+    choices = feasible(instance)
+    assume(choices)
+    found = finish(tabu_search(instance, choices[0], forever(), math.inf))
+    assert instance.feasible(found)
+    assert instance.covered(found) >= instance.covered(choices[0])
+
+
+def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
+    instance, _ = make_instance(street_problem(60, 800, blocks=2, count=7))
+    chosen, _ = greedy(instance, np.zeros(0, np.int64))
+    searched = finish(tabu_search(instance, chosen, forever(), math.inf))
+    _, bound = finish(lagrangian_bound(instance, instance.covered(searched), forever()))
+    by_districts = finish(district_bound(instance, instance.covered(searched), forever(), math.inf))
+    assert instance.covered(chosen) < instance.covered(searched) <= by_districts < bound.value
+    again = finish(tabu_search(instance, chosen, forever(), math.inf))
+    np.testing.assert_array_equal(searched, again)
