@@ -66,7 +66,7 @@ detection: environment
 
 test-detection: detection
 	$(PY) -m pip install --quiet --no-deps --only-binary :all: --group second-opinion
-	$(PY) -m pytest tests/detection
+	$(PY) -m pytest tests/detection tests/headless/test_train.py tests/headless/test_evaluate.py
 
 study: detection
 	$(PY) -m headless.study scenes/junction.blend -o out/study

@@ -45,6 +45,10 @@ def main(argv: list[str]) -> None:
     """Place, simulate, train, judge, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
     check_device(options.device)
+    if options.every <= 0:
+        raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
+    if options.seeds < 1:
+        raise SeipError(f"ask for one training or more, not {options.seeds}")
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
     watch, folder = surveyed.stopwatch, options.output
     traffic = _traffic(options, surveyed)
@@ -52,7 +56,7 @@ def main(argv: list[str]) -> None:
         surveyed.site, surveyed.models, surveyed.grid, solver=options.solver, time_limit=options.time_limit
     )
     configurations = watch.run("placements", steps)
-    network, training = NetworkSettings(), TrainingSettings()
+    network, training = NetworkSettings(), TrainingSettings(steps=options.steps)
     grid = grid_of(surveyed.geometry, network.pillar)
     studio = Studio(static_scene(surveyed.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
     lessons, tests = (
@@ -127,6 +131,7 @@ def _parser() -> argparse.ArgumentParser:
         "(those in the folder SCENE_traffic beside the scene)",
     )
     detection.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    detection.add_argument("--steps", type=int, default=TrainingSettings().steps, help="of each training")
     detection.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
     detection.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
     detection.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 from seip_addon.core.coverage_study import NUMBERS, Case, Cell, solve_cell
+from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.scans import Frame
@@ -47,11 +49,29 @@ MAIN = next(iter(RULES.values()))
 
 @dataclass(frozen=True, eq=False)
 class Traffic:
-    """Runs of traffic by what they are for; no run may be for two things."""
+    """Runs of traffic by what they are for.
+
+    Parameters
+    ----------
+    training, validation, test : tuple of TrafficRun
+        To learn from, to see by when that is enough, and to judge with.
+
+    Raises
+    ------
+    SeipError
+        A run is for two things: neighbouring frames show the same vehicles in the same places.
+    """
 
     training: tuple[TrafficRun, ...]
     validation: tuple[TrafficRun, ...]
     test: tuple[TrafficRun, ...]
+
+    def __post_init__(self) -> None:
+        for one, other in combinations((*self.training, *self.validation, *self.test), 2):
+            if one.key == other.key:
+                raise SeipError(
+                    f"{one.name} and {other.name} are the same traffic: name runs that were simulated with other seeds"
+                )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,84 @@
+"""The command from a scene and its traffic to what each placement detects."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless import evaluate
+
+from matplotlib.image import imread
+
+from seip_addon.core.errors import SeipError
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+RUNS = [SCENES / "junction_traffic" / f"run-{number}.npz" for number in (1, 2, 3, 4)]
+COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25"]
+BRIEF = ["--every", "74", "--steps", "2", "--seeds", "2"]
+
+
+def run(folder, *options, runs=RUNS):
+    traffic = ["--traffic", *map(str, runs)]
+    evaluate.main([str(SCENES / "junction.blend"), "-o", str(folder), *COARSE, *BRIEF, *traffic, *options])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("evaluation")
+    run(folder, "--ablation")
+    return folder
+
+
+def test_charts_show_what_was_found(folder):
+    for name in ("ap_by_count", "ap_by_price", "ap_by_coverage", "precision_recall", "where_type1", "errors_type1"):
+        assert imread(folder / f"{name}.png").shape[1] > 600
+    assert (folder / "detector-2-padded.png").exists()
+
+
+def test_the_table_has_a_row_for_each_detector_and_placement(folder):
+    rows = list(csv.DictReader((folder / "detection.csv").read_text(encoding="utf-8").splitlines()))
+    cells = {(row["detector"], row["count"], row["padded"]) for row in rows}
+    assert cells == {
+        (f"detector-{seed}{'-padded' if padded else ''}", str(count), str(padded).lower())
+        for seed in (1, 2)
+        for padded in (False, True)
+        for count in (1, 2, 4)
+    }
+    coverage = [float(row["coverage"]) for row in rows[:3]]
+    assert coverage == sorted(coverage)
+    assert all(0 <= float(row["ap_bev_0.7"]) <= float(row["ap_bev_0.5"]) + 1e-9 <= 1 for row in rows)
+    assert {row["frames"] for row in rows} == {"2"}
+
+
+def test_the_record_says_what_was_for_what(folder):
+    record = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+    names = {what: [run["name"] for run in runs] for what, runs in record["traffic"].items()}
+    assert names == {"training": ["run-1"], "validation": ["run-2"], "test": ["run-3", "run-4"]}
+    assert [claim["number"] for claim in record["claims"]] == [5, 8, 9]
+    assert [one["name"] for one in record["configurations"]] == ["1 × type1", "2 × type1", "4 × type1"]
+
+
+def test_an_evaluation_goes_on_and_ends_the_same(folder, tmp_path):
+    for name in ("visibility.npz", "detector-1.pt"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    run(tmp_path, "--ablation")
+    for path in folder.iterdir():
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+
+
+@pytest.mark.parametrize(
+    ("options", "runs", "sentence"),
+    [
+        ((), RUNS[:3], "3 runs of traffic are too few"),
+        ((), [*RUNS[:3], RUNS[0]], "run-1 and run-1 are the same traffic"),
+        (("--every", "0"), RUNS, "time between frames"),
+        (("--seeds", "0"), RUNS, "one training or more"),
+        (("--device", "abacus"), RUNS, "torch cannot use the device 'abacus'"),
+    ],
+)
+def test_what_cannot_be_evaluated_gets_a_sentence(tmp_path, options, runs, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path, *options, runs=runs)
