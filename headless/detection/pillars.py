@@ -142,8 +142,8 @@ class Pillars:
     ----------
     features : (m, 8) float32
         Of each point: its height above the bottom of the grid, its intensity, x, y, z from the mean of those kept in
-        its pillar, x, y from the middle of the pillar, and the logarithm of how many points the pillar had. Each in
-        a unit that makes it about one.
+        its pillar, x, y from the middle of the pillar, and the logarithm of how many it keeps. Each in a
+        unit that makes it about one.
     pillar : (m,) int64
         Number of each point's pillar, ascending; those of the second cloud follow those of the first.
     chosen : (m,) int64
@@ -174,7 +174,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     -------
     Pillars
     """
-    chosen, pillar, met = _choose(points, grid, most)
+    chosen, pillar = _choose(points, grid, most)
     kept = points[chosen]
     row, column = np.divmod(pillar, grid.columns)
     # Sums of small numbers lose nothing: from here on, relative to the middle of the pillar.
@@ -191,7 +191,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     features[:, 1] = kept[:, 3]
     features[:, 2:5] = (offset - np.repeat(mean, counts, axis=0)) / np.array((half, half, 0.5))
     features[:, 5:7] = offset[:, :2] / half
-    features[:, 7] = np.log(met) / 3.0
+    features[:, 7] = np.log(np.repeat(counts, counts)) / 3.0
     return Pillars(features, pillar, chosen)
 
 
@@ -204,8 +204,8 @@ def stacked(clouds: Sequence[Pillars], grid: PillarGrid) -> Pillars:
     )
 
 
-def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[Integer, Integer, Integer]:
-    """Return the points kept, sorted by pillar and then by hash, their pillars, and how many points those had.
+def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[Integer, Integer]:
+    """Return the points kept, sorted by pillar and then by hash, and their pillars.
 
     One sort of one array of integers does it: pillar, hash and index share a key.
     """
@@ -223,11 +223,10 @@ def _choose(points: NDArray[np.float32], grid: PillarGrid, most: int) -> tuple[I
     key.sort()
     pillar = key >> (index_bits + hash_bits)
     first = np.flatnonzero(np.diff(pillar, prepend=-1))
-    met = np.diff(first, append=len(pillar))
-    rank = np.arange(len(pillar)) - np.repeat(first, met)
+    rank = np.arange(len(pillar)) - np.repeat(first, np.diff(first, append=len(pillar)))
     kept = rank < most
     order = key[kept] & ((1 << index_bits) - 1)
-    return inside[order], pillar[kept], np.repeat(met, np.minimum(met, most))
+    return inside[order], pillar[kept]
 
 
 def _hashed(points: NDArray[np.float32]) -> NDArray[np.uint32]:
