@@ -63,16 +63,12 @@ class CentreHead(nn.Module):
 
     def __init__(self, channels: int, width: int) -> None:
         super().__init__()
-        self.shared = convolution(channels, width)
-        self.heat = nn.Conv2d(width, len(CLASSES), 1)
-        self.box = nn.Conv2d(width, BOX_CHANNELS, 1)
-        _start_at(self.heat, math.log(RARE / (1 - RARE)))
-        _start_at(self.box, 0.0)
+        self.heat = _branch(channels, width, len(CLASSES), math.log(RARE / (1 - RARE)))
+        self.box = _branch(channels, width, BOX_CHANNELS, 0.0)
 
     def forward(self, features: Tensor) -> Tensor:
         """Return the channels of heat, one for each class, and of boxes: (b, classes + 11, rows, columns)."""
-        shared = self.shared(features)
-        return torch.cat((self.heat(shared), self.box(shared)), dim=1)
+        return torch.cat((self.heat(features), self.box(features)), dim=1)
 
     def loss(self, output: Tensor, targets: list[Targets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
         """Return the parts of the loss; see `heads.DetectionHead`."""
@@ -107,9 +103,11 @@ class CentreHead(nn.Module):
         return found
 
 
-def _start_at(layer: nn.Conv2d, value: float) -> None:
-    if layer.bias is not None:
-        nn.init.constant_(layer.bias, value)
+def _branch(channels: int, width: int, outputs: int, start: float) -> nn.Sequential:
+    """Return a hidden layer and one that begins near ``start``."""
+    last = nn.Conv2d(width, outputs, 1)
+    last.bias = nn.Parameter(torch.full((outputs,), start))
+    return nn.Sequential(convolution(channels, width), last)
 
 
 def box_losses(predicted: Tensor, target: Tensor, middle: Tensor, weight: Tensor) -> dict[str, Tensor]:

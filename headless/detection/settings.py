@@ -100,7 +100,8 @@ class TrainingSettings:
     batch : int
         Windows in each step, each from a configuration, a frame and a place of its own.
     window : float, metres
-        Side of a window. Training on windows about road users wastes no time on the empty parts of the extent.
+        Side of a window. Training on windows about road users wastes no time on the empty parts of the extent, and
+        many small ones are more different from each other than few large ones.
     learning_rate : float
         Largest of the cycle: one warm-up over 30 % of the steps, then a cosine to nothing (Smith 2018).
     weight_decay : float
@@ -115,14 +116,14 @@ class TrainingSettings:
         Of torch on the CPU. Sums depend on how they are split: the same number gives the same bytes.
     """
 
-    steps: int = 1500
-    batch: int = 8
-    window: float = 51.2
-    learning_rate: float = 3e-3
+    steps: int = 1800
+    batch: int = 16
+    window: float = 25.6
+    learning_rate: float = 6e-3
     weight_decay: float = 0.01
     least_points: int = 3
-    validate_every: int = 150
-    patience: int = 5
+    validate_every: int = 300
+    patience: int = 3
     seed: int = 1
     threads: int = 2
 
