@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -20,7 +21,7 @@ from headless.detection import case_study, study_results
 from headless.detection.claims import judge
 from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
-from headless.detection.recordings import Studio, TrafficRun
+from headless.detection.recordings import Configuration, Studio, TrafficRun
 from headless.detection.settings import NetworkSettings, TrainingSettings
 
 import bpy
@@ -44,48 +45,83 @@ WARM_UP = 2.0
 def main(argv: list[str]) -> None:
     """Place, simulate, train, judge, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
-    check_device(options.device)
-    if options.every <= 0:
-        raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
     if options.seeds < 1:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
-    watch, folder = surveyed.stopwatch, options.output
-    traffic = _traffic(options, surveyed)
-    steps = case_study.place_all(
-        surveyed.site, surveyed.models, surveyed.grid, solver=options.solver, time_limit=options.time_limit
+    stage = set_stage(options)
+    watch, studio, folder = stage.surveyed.stopwatch, stage.studio, options.output
+    network = NetworkSettings()
+    lessons = learn_from(stage, network)
+    pupils = case_study.pupils(
+        stage.configurations,
+        network,
+        TrainingSettings(steps=options.steps),
+        seeds=options.seeds,
+        separate=options.separate,
     )
-    configurations = watch.run("placements", steps)
-    network, training = NetworkSettings(), TrainingSettings(steps=options.steps)
-    grid = grid_of(surveyed.geometry, network.pillar)
-    studio = Studio(static_scene(surveyed.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
-    lessons, tests = (
-        watch.run(what, case_study.simulate_all(studio, configurations, runs, grid, network.most_points))
-        for what, runs in (("simulation", traffic.training), ("simulation for validation", traffic.validation))
-    )
-    pupils = case_study.pupils(configurations, network, training, seeds=options.seeds, separate=options.separate)
     if options.ablation:
         pupils += case_study.padded(pupils)
-    trained = watch.run("training", case_study.train_all(pupils, lessons, tests, folder, device=options.device))
+    trained = watch.run("training", case_study.train_all(pupils, lessons, folder, device=options.device))
     detectors = [one.detector for one in trained]
-    judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, traffic))
+    judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, stage.traffic))
     claims = judge([judgement.trial for judgement in judgements])
 
+    site = stage.surveyed.site
     with session.writing(folder):
-        results = study_results.StudyResults(surveyed.site.name, studio, traffic, tuple(pupils), tuple(judgements))
+        results = study_results.StudyResults(site.name, studio, stage.traffic, tuple(pupils), tuple(judgements))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = surveyed.settings | {"seeds": options.seeds, "frames_every_s": options.every}
+        settings = stage.surveyed.settings | {"seeds": options.seeds, "frames_every_s": options.every}
         study_results.save_record(
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )
-        save_claims(folder / "claims_5_to_9.md", claims, surveyed.site.name)
+        save_claims(folder / "claims_5_to_9.md", claims, site.name)
     for line in study_results.in_words(results):
         session.say(line)
     for claim in claims:
         session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")
     session.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
     session.say(f"written to {folder}/")
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A scene with its placements and its traffic, ready for detectors.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    traffic : Traffic
+    configurations : tuple of Configuration
+        1, 2 and 4 sensors of each type.
+    studio : Studio
+    """
+
+    surveyed: survey.Survey
+    traffic: case_study.Traffic
+    configurations: tuple[Configuration, ...]
+    studio: Studio
+
+
+def set_stage(options: argparse.Namespace) -> Stage:
+    """Survey the scene, read its traffic and place the sensors; the options are those of `add_options`."""
+    check_device(options.device)
+    if options.every <= 0:
+        raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
+    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
+    traffic = _traffic(options, surveyed)
+    steps = case_study.place_all(
+        surveyed.site, surveyed.models, surveyed.grid, solver=options.solver, time_limit=options.time_limit
+    )
+    configurations = surveyed.stopwatch.run("placements", steps)
+    studio = Studio(static_scene(surveyed.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
+    return Stage(surveyed, traffic, configurations, studio)
+
+
+def learn_from(stage: Stage, network: NetworkSettings) -> case_study.Lessons:
+    """Simulate what a network learns from, on its own pillars."""
+    grid = grid_of(stage.surveyed.geometry, network.pillar)
+    steps = case_study.simulate_lessons(stage.studio, stage.configurations, stage.traffic, grid, network.most_points)
+    return stage.surveyed.stopwatch.run("simulation", steps)
 
 
 def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study.Traffic:
@@ -113,12 +149,8 @@ def _beside(scene: Path | None) -> list[Path]:
     return sorted((path.parent / f"{path.stem}_traffic").glob("*.npz"))
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="evaluate",
-        description="Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a survey and of what detectors learn from to a command."""
     survey.add_options(parser)
     detection = parser.add_argument_group("detection")
     detection.add_argument(
@@ -132,11 +164,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     detection.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
     detection.add_argument("--steps", type=int, default=TrainingSettings().steps, help="of each training")
-    detection.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
-    detection.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
-    detection.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
     detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="evaluate",
+        description="Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best.",
+        formatter_class=survey.HelpWithDefaults,
+    )
+    add_options(parser)
+    parser.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
+    parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")
+    parser.add_argument("--ablation", action="store_true", help="claim 9: also train with zero-padded pillars")
     return parser
 
 

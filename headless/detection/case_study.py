@@ -24,6 +24,7 @@ from seip_addon.core.visibility.grid import VisibilityGrid
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
 from .breakdown import false_positives
 from .claims import Trial
+from .detections import Detections
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
@@ -34,7 +35,7 @@ from .matching import Rule
 from .pillars import PillarGrid
 from .recordings import Configuration, Studio, TrafficRun
 from .settings import GROUPS, NetworkSettings, TrainingSettings
-from .training import Trained, train
+from .training import Trained, deterministic, train
 
 RULES = {
     "bev_0.7": Rule(),
@@ -190,44 +191,48 @@ def place_all(
     return tuple(Configuration(case) for case in placed)
 
 
-def simulate_all(
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """What detectors learn from, and by what is seen when that is enough: recordings by their configuration's name."""
+
+    training: dict[str, list[SampledRecording]]
+    validation: dict[str, list[SampledRecording]]
+
+
+def simulate_lessons(
     studio: Studio,
     configurations: Sequence[Configuration],
-    runs: Sequence[TrafficRun],
+    traffic: Traffic,
     grid: PillarGrid,
     most_points: int,
-) -> Generator[Progress, None, dict[str, list[SampledRecording]]]:
-    """Simulate what the configurations measure of some runs and keep what a detector learns from it, by their names."""
-    made: dict[str, list[SampledRecording]] = {}
-    total = sum(len(run.times) for run in runs) * len(configurations)
+) -> Generator[Progress, None, Lessons]:
+    """Simulate what the configurations measure, and keep what a detector on a grid learns from it."""
+    lessons = Lessons({}, {})
+    total = sum(len(run.times) for run in (*traffic.training, *traffic.validation)) * len(configurations)
     done = 0
     for configuration in configurations:
-        of_runs = [SampledRecording(studio.record(configuration, run), grid, most_points) for run in runs]
-        for sampled in of_runs:
-            for number in range(len(sampled)):
-                yield Progress(done, total, f"simulate {configuration.name}")
-                sampled.get(number)
-                done += 1
-        made[configuration.name] = of_runs
+        for kept, runs in ((lessons.training, traffic.training), (lessons.validation, traffic.validation)):
+            kept[configuration.name] = [
+                SampledRecording(studio.record(configuration, run), grid, most_points) for run in runs
+            ]
+            for sampled in kept[configuration.name]:
+                for number in range(len(sampled)):
+                    yield Progress(done, total, f"simulate {configuration.name}")
+                    sampled.get(number)
+                    done += 1
     yield Progress(total, total, "simulated")
-    return made
+    return lessons
 
 
 def train_all(
-    pupils: Sequence[Pupil],
-    lessons: Mapping[str, list[SampledRecording]],
-    tests: Mapping[str, list[SampledRecording]],
-    folder: Path,
-    *,
-    device: str,
+    pupils: Sequence[Pupil], lessons: Lessons, folder: Path, *, device: str
 ) -> Generator[Progress, None, list[Trained]]:
     """Train detectors one after the other; what was trained before an interruption is not trained again.
 
     Parameters
     ----------
     pupils : sequence of Pupil
-    lessons, tests : mapping of str to list of SampledRecording
-        By configuration: to learn from, and to see by when it is enough.
+    lessons : Lessons
     folder : path
         Of the detectors' files.
     device : str
@@ -237,8 +242,8 @@ def train_all(
     for pupil in pupils:
         names = [configuration.name for configuration in pupil.configurations]
         steps = train(
-            [recording for name in names for recording in lessons[name]],
-            [recording for name in names for recording in tests[name]],
+            [recording for name in names for recording in lessons.training[name]],
+            [recording for name in names for recording in lessons.validation[name]],
             pupil.network,
             pupil.training,
             device=device,
@@ -259,7 +264,7 @@ def judge_all(
     judged: dict[tuple[str, str], list[FrameResult]] = {}
     for configuration in configurations:
         asked = [
-            (pupil.name, detector)
+            (pupil, detector)
             for pupil, detector in zip(pupils, detectors, strict=True)
             if configuration in pupil.configurations
         ]
@@ -269,9 +274,11 @@ def judge_all(
                     yield Progress(done, total, f"detect with {configuration.name}")
                     done += 1
                     frame = studio.frame(configuration, run, number)
-                    for name, detector in asked:
-                        result = _result(studio, configuration, run, frame, detector)
-                        results.setdefault((name, configuration.name), []).append(result)
+                    for pupil, detector in asked:
+                        with deterministic(pupil.training.threads):
+                            found = detect(detector, frame.points, frame.intensity)
+                        result = _result(studio, configuration, run, frame, found)
+                        results.setdefault((pupil.name, configuration.name), []).append(result)
     yield Progress(total, total, "judged")
     return [judgement for pupil in pupils for judgement in _judgements(pupil, tried, judged)]
 
@@ -289,11 +296,11 @@ def _judgements(
 
 
 def _result(
-    studio: Studio, configuration: Configuration, run: TrafficRun, frame: Frame, detector: Detector
+    studio: Studio, configuration: Configuration, run: TrafficRun, frame: Frame, found: Detections
 ) -> FrameResult:
     return frame_result(
         frame,
-        detect(detector, frame.points, frame.intensity),
+        found,
         classes=tuple(GROUPS.values()),
         region=studio.static.region,
         sensors=configuration.places,

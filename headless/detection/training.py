@@ -128,7 +128,7 @@ def train(
         run.restore(store)
     yield run.progress()
     while not run.done:
-        with _deterministic(settings.threads):  # and no longer: whoever steps this may use torch in between
+        with deterministic(settings.threads):  # and no longer: whoever steps this may use torch in between
             run.advance()
             if run.step % settings.validate_every == 0 or run.step == settings.steps:
                 run.validate()
@@ -361,7 +361,7 @@ def _copied(state: dict[str, Any]) -> dict[str, Tensor]:
 
 
 @contextmanager
-def _deterministic(threads: int) -> Iterator[None]:
+def deterministic(threads: int) -> Iterator[None]:
     """Have torch do every sum in the same order, every time."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA asks for to do so
     before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
