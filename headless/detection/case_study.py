@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
@@ -132,14 +133,14 @@ class Judgement:
             padded=self.pupil.network.padded,
         )
 
-    @property
+    @cached_property
     def precisions(self) -> dict[str, float]:
         """Average precision by every rule, and KITTI's figures for the study's own."""
         by_rule = {name: evaluate(self.frames, rule).average_precision for name, rule in RULES.items()}
         figures = kitti(self.frames, MAIN)
         return by_rule | {"kitti_ap40": figures.ap40, "kitti_ap11": figures.ap11}
 
-    @property
+    @cached_property
     def interval(self) -> Interval | None:
         """95 % interval of the average precision over other traffic like this."""
         return average_precision_interval(self.evaluation, seed=0)

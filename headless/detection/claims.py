@@ -52,7 +52,7 @@ class Trial:
     coverage : float, 0 to 1
         Share of targets that the placement sees.
     false_positives : float
-        Per frame, at a score that all trials share.
+        Per frame, at a score that all trials of a training share.
     sparse : float, 0 to 1
         Share of these where the cloud is sparser than around half of the hits; NaN where there are none.
     padded : bool
