@@ -20,6 +20,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.detection.average_precision import evaluate
+from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.frames import SampledRecording, recording_of, require_separate
@@ -98,7 +99,13 @@ def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[Fra
     sensors = np.array([sensor["local_m"] for sensor in load_manifest(folder)["sensors"]])
     common: dict[str, Any] = {"classes": tuple(GROUPS.values()), "region": region, "sensors": sensors}
     return [
-        frame_result(frame, detect(detector, frame.points, frame.intensity), run=recording.traffic, **common)
+        frame_result(
+            frame,
+            CloudInPlan(frame.points),
+            detect(detector, frame.points, frame.intensity),
+            run=recording.traffic,
+            **common,
+        )
         for frame in recording.frames
     ]
 

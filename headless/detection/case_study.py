@@ -8,6 +8,7 @@ seen.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +18,7 @@ from pathlib import Path
 from seip_addon.core.coverage_study import NUMBERS, Case, Cell, solve_cell
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
-from seip_addon.core.progress import Progress, within
+from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
 from seip_addon.core.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid
@@ -25,6 +26,7 @@ from seip_addon.core.visibility.grid import VisibilityGrid
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
 from .breakdown import false_positives
 from .claims import Trial
+from .cloud_in_plan import CloudInPlan
 from .detections import Detections
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
@@ -47,6 +49,9 @@ RULES = {
 """How average precision is taken; the first is the study's own."""
 
 MAIN = next(iter(RULES.values()))
+
+SIDE_BY_SIDE = (os.cpu_count() or 1) + 1
+"""Trainings at once on the CPU: one more than there are cores, as each also waits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +233,7 @@ def simulate_lessons(
 def train_all(
     pupils: Sequence[Pupil], lessons: Lessons, folder: Path, *, device: str
 ) -> Generator[Progress, None, list[Trained]]:
-    """Train detectors one after the other; what was trained before an interruption is not trained again.
+    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again.
 
     Parameters
     ----------
@@ -239,7 +244,7 @@ def train_all(
     device : str
         Of torch.
     """
-    trained = []
+    trainings = []
     for pupil in pupils:
         names = [configuration.name for configuration in pupil.configurations]
         steps = train(
@@ -250,8 +255,10 @@ def train_all(
             device=device,
             store=folder / f"{pupil.name}.pt",
         )
-        trained.append((yield from steps))
-    return trained
+        trainings.append(steps)
+    at_once = SIDE_BY_SIDE if device == "cpu" else 1
+    with deterministic(pupils[0].training.threads):  # all the time, as torch keeps one such setting for all threads
+        return (yield from side_by_side(trainings, at_once))
 
 
 def judge_all(
@@ -275,10 +282,11 @@ def judge_all(
                     yield Progress(done, total, f"detect with {configuration.name}")
                     done += 1
                     frame = studio.frame(configuration, run, number)
+                    cloud = CloudInPlan(frame.points)
                     for pupil, detector in asked:
                         with deterministic(pupil.training.threads):
                             found = detect(detector, frame.points, frame.intensity)
-                        result = _result(studio, configuration, run, frame, found)
+                        result = _result(studio, configuration, run, frame, cloud, found)
                         results.setdefault((pupil.name, configuration.name), []).append(result)
     yield Progress(total, total, "judged")
     return [judgement for pupil in pupils for judgement in _judgements(pupil, tried, judged)]
@@ -297,10 +305,16 @@ def _judgements(
 
 
 def _result(
-    studio: Studio, configuration: Configuration, run: TrafficRun, frame: Frame, found: Detections
+    studio: Studio,
+    configuration: Configuration,
+    run: TrafficRun,
+    frame: Frame,
+    cloud: CloudInPlan,
+    found: Detections,
 ) -> FrameResult:
     return frame_result(
         frame,
+        cloud,
         found,
         classes=tuple(GROUPS.values()),
         region=studio.static.region,

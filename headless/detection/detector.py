@@ -6,6 +6,7 @@ import io
 import os
 import pickle
 import sys
+import threading
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -27,6 +28,7 @@ from .pillars import PillarGrid, Pillars
 from .settings import NetworkSettings
 
 SCHEMA, VERSION = "seip.detector", 1
+_SEEDED = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
 
 
 class Detector(nn.Module):
@@ -44,7 +46,7 @@ class Detector(nn.Module):
     def __init__(self, settings: NetworkSettings, grid: PillarGrid, seed: int = 0) -> None:
         super().__init__()
         self.settings, self.grid = settings, grid
-        with torch.random.fork_rng(devices=[]):
+        with _SEEDED, torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.feature_map = FeatureMap(settings)
             channels = self.feature_map.channels

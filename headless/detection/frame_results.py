@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.scans.frame import Frame
 
+from .cloud_in_plan import CloudInPlan
 from .detections import Detections
 
 NEIGHBOURHOOD = 3.0
@@ -102,8 +102,9 @@ class FrameResult:
     detected: Detected
 
 
-def frame_result(
+def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what errors are told apart by
     frame: Frame,
+    cloud: CloudInPlan,
     detections: Detections,
     *,
     classes: Sequence[Sequence[str]],
@@ -116,6 +117,8 @@ def frame_result(
     Parameters
     ----------
     frame : Frame
+    cloud : CloudInPlan
+        Of the frame's points: sorted once for all detectors that look at them.
     detections : Detections
     classes : sequence of sequence of str
         Categories of road users in each of the detector's classes.
@@ -128,7 +131,7 @@ def frame_result(
     """
     labels, boxes = frame.labels, detections.boxes
     first = np.array([members[0] for members in classes], dtype=np.str_)
-    points, density = _returns_around(boxes, frame.points)
+    points, density = _returns_around(boxes, cloud)
     return FrameResult(
         run=run,
         time=frame.time,
@@ -158,15 +161,12 @@ def _nearest(points: Float, sensors: Float) -> Float:
     return distance
 
 
-def _returns_around(boxes: Float, cloud: NDArray[np.float32]) -> tuple[Integer, Float]:
+def _returns_around(boxes: Float, cloud: CloudInPlan) -> tuple[Integer, Float]:
     """Return the number of returns in each box, and how dense they are in the plan around it."""
     inside, near = np.zeros(len(boxes), dtype=np.int64), np.zeros(len(boxes), dtype=np.int64)
-    order = np.argsort(cloud[:, 0])
-    along = cloud[order, 0]
     for row, (x, y, z, length, width, height, yaw) in enumerate(boxes):
         reach = max(NEIGHBOURHOOD, np.hypot(length, width) / 2)
-        first, last = np.searchsorted(along, np.array([x - reach, x + reach], dtype=along.dtype))
-        here = cloud[order[first:last]].astype(np.float64) - (x, y, z)
+        here = cloud.about(x, y, reach) - (x, y, z)
         near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= NEIGHBOURHOOD**2)
         ahead = np.cos(yaw) * here[:, 0] + np.sin(yaw) * here[:, 1]
         aside = np.cos(yaw) * here[:, 1] - np.sin(yaw) * here[:, 0]

@@ -2,6 +2,7 @@
 
 import math
 
+from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detections import Detections
 from headless.detection.frame_results import NEIGHBOURHOOD, frame_result
 
@@ -44,7 +45,9 @@ def simulated(points):
 def result(points, boxes):
     boxes = np.array(boxes, dtype=float).reshape(-1, 7)
     found = Detections(boxes, np.linspace(0.1, 0.9, len(boxes)), np.arange(len(boxes)) % 2)
-    return frame_result(simulated(points), found, classes=CLASSES, region=REGION, sensors=SENSORS, run="a")
+    frame = simulated(points)
+    cloud = CloudInPlan(frame.points)
+    return frame_result(frame, cloud, found, classes=CLASSES, region=REGION, sensors=SENSORS, run="a")
 
 
 def test_road_users_are_those_of_the_frame():

@@ -1,0 +1,72 @@
+"""Work in steps: several pieces at the same time."""
+
+import threading
+
+import pytest
+
+from seip_addon.core.progress import Progress, finish, side_by_side
+
+
+def counting(steps, name, seen=None):
+    for done in range(steps):
+        if seen is not None:
+            seen.append(name)
+        yield Progress(done, steps, name)
+    return name
+
+
+def endless(stopped):
+    pause = threading.Event()
+    try:
+        while not pause.wait(0.001):
+            yield Progress(0, 1, "endless")
+    finally:
+        stopped.set()
+
+
+def test_results_come_in_the_order_of_the_works():
+    works = [counting(30 - 10 * number, str(number)) for number in range(3)]
+    assert finish(side_by_side(works, 2)) == ["0", "1", "2"]
+
+
+def test_one_thread_runs_one_after_the_other():
+    seen = []
+    finish(side_by_side([counting(3, name, seen) for name in "abc"], 1))
+    assert seen == list("aaabbbccc")
+
+
+def test_progress_is_of_all_works():
+    go = threading.Event()
+
+    def waiting():
+        yield Progress(1, 4, "wait")
+        go.wait(10)
+        yield Progress(4, 4, "wait")
+
+    steps = side_by_side([waiting(), waiting()], 2)
+    told = []
+    while not told or told[-1].done < 2:
+        told.append(next(steps))
+    go.set()
+    finish(steps)
+    assert told[-1] == Progress(2, 8, "wait")
+
+
+def test_a_work_that_fails_stops_the_others():
+    stopped = threading.Event()
+
+    def failing():
+        yield Progress(0, 1, "fail")
+        raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        finish(side_by_side([endless(stopped), failing()], 2))
+    assert stopped.wait(10)
+
+
+def test_stopping_stops_all():
+    stopped = [threading.Event(), threading.Event()]
+    steps = side_by_side([endless(one) for one in stopped], 2)
+    next(steps)
+    steps.close()
+    assert all(one.wait(10) for one in stopped)
