@@ -4,6 +4,7 @@
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
 # make study       redo the study on the shipped junction: coverage, then detection (an hour)
+# make settings    chart what other settings of the detector cost and gain (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
@@ -18,7 +19,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study benchmark extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings benchmark extension clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -66,11 +67,14 @@ detection: environment
 
 test-detection: detection
 	$(PY) -m pip install --quiet --no-deps --only-binary :all: --group second-opinion
-	$(PY) -m pytest tests/detection tests/headless/test_train.py tests/headless/test_evaluate.py
+	$(PY) -m pytest tests/detection tests/headless/test_train.py tests/headless/test_evaluate.py tests/headless/test_compare_detectors.py
 
 study: detection
 	$(PY) -m headless.study scenes/junction.blend -o out/study
 	$(PY) -m headless.evaluate scenes/junction.blend -o out/study
+
+settings: detection
+	$(PY) -m headless.compare_detectors scenes/junction.blend -o out/detectors
 
 benchmark: environment
 	$(PY) -m pip install --quiet --group benchmark

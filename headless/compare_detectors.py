@@ -2,30 +2,35 @@
 
 python -m headless.compare_detectors scenes/junction.blend -o docs/detector
 
-Every setting trains for the same number of steps on all placements, and is judged on the same frames.
+Every setting trains for the same number of steps on all placements, and is judged on the same frames. Seconds
+are those that one core works, whatever else the machine does.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Generator
 from dataclasses import replace
 
 from headless import evaluate, session, survey
 from headless.detection import case_study
 from headless.detection.detector import Detector
 from headless.detection.inference import detect
+from headless.detection.pillars import grid_of
+from headless.detection.recordings import Studio
 from headless.detection.settings import PUBLISHED, NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
 
 import numpy as np
 
 from seip_addon.core.pictures.detection_charts import Setting, save_setting_chart
-from seip_addon.core.progress import finish
+from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.storage import save_json
 
 DEFAULT = NetworkSettings()
 SETTINGS = {
+    ("as published", "as published"): PUBLISHED,  # takes the longest, so it begins first
     ("default", "default"): DEFAULT,
     ("pillars", "0.32 m"): replace(DEFAULT, pillar=0.32),
     ("pillars", "0.5 m"): replace(DEFAULT, pillar=0.5),
@@ -34,7 +39,6 @@ SETTINGS = {
     ("width", "16"): replace(DEFAULT, width=16),
     ("width", "64"): replace(DEFAULT, width=64),
     ("head", "anchors"): replace(DEFAULT, head="anchor"),
-    ("as published", "as published"): PUBLISHED,
 }
 """What is compared: family and name, and the network."""
 
@@ -46,32 +50,33 @@ def main(argv: list[str]) -> None:
     """Train and judge every setting, and write the chart and its figures."""
     options = _parser().parse_args(argv)
     stage = evaluate.set_stage(options)
-    pupils, detectors, seconds = [], [], []
-    for (family, name), network in SETTINGS.items():
-        lessons = evaluate.learn_from(stage, network)
-        training = TrainingSettings(steps=options.steps, validate_every=options.steps)
-        file = f"{family} {name}".replace(" ", "-")
-        pupil = case_study.Pupil(file, stage.configurations, network, training)
-        begin = time.perf_counter()
-        with session.progress_bar() as report:
-            steps = case_study.train_all([pupil], lessons, options.output, device=options.device)
-            detectors.append(finish(steps, report)[0].detector)
-        seconds.append(time.perf_counter() - begin)
-        pupils.append(pupil)
+    pupils = [
+        case_study.Pupil(
+            f"{family} {name}",
+            stage.configurations,
+            network,
+            TrainingSettings(steps=options.steps, validate_every=options.steps),
+        )
+        for (family, name), network in SETTINGS.items()
+    ]
+    works = [_lesson(stage, pupil, options.device) for pupil in pupils]
+    with deterministic(1):
+        trained = stage.surveyed.stopwatch.run("training", side_by_side(works, case_study.SIDE_BY_SIDE))
+    detectors = [detector for detector, _ in trained]
     judging = case_study.judge_all(stage.studio, pupils, detectors, stage.traffic)
     judgements = stage.surveyed.stopwatch.run("judgement", judging)
     settings = [
         Setting(
             name=name,
             family=family,
-            training=trained,
+            training=seconds,
             inference=1000 * _inference(stage, detector),
             average_precision=float(
                 np.mean([one.evaluation.average_precision for one in judgements if one.pupil is pupil])
             ),
             default=pupil.network == DEFAULT,
         )
-        for (family, name), trained, pupil, detector in zip(SETTINGS, seconds, pupils, detectors, strict=True)
+        for (family, name), pupil, (detector, seconds) in zip(SETTINGS, pupils, trained, strict=True)
     ]
     title = f"{stage.surveyed.site.name}: mean over {len(stage.configurations)} placements, {options.steps} steps"
     with session.writing(options.output):
@@ -84,17 +89,31 @@ def main(argv: list[str]) -> None:
         )
 
 
+def _lesson(
+    stage: evaluate.Stage, pupil: case_study.Pupil, device: str
+) -> Generator[Progress, None, tuple[Detector, float]]:
+    """Simulate what a detector learns from, and train it; return it with the processor's seconds of the training."""
+    studio = Studio(stage.studio.static, stage.studio.settings)
+    grid = grid_of(stage.surveyed.geometry, pupil.network.pillar)
+    lessons = yield from case_study.simulate_lessons(
+        studio, pupil.configurations, stage.traffic, grid, pupil.network.most_points
+    )
+    begin = time.thread_time()
+    trained = yield from case_study.training(pupil, lessons, device=device)
+    return trained.detector, time.thread_time() - begin
+
+
 def _inference(stage: evaluate.Stage, detector: Detector) -> float:
-    """Return the seconds that detection takes in a merged frame: the mean over configurations of each one's median."""
+    """Return the processor's seconds for detection in a merged frame: the mean over configurations of medians."""
     medians = []
     for configuration in stage.configurations:
         frame = stage.studio.frame(configuration, stage.traffic.test[0], 0)
         looks = []
         for _ in range(LOOKS):
-            begin = time.perf_counter()
-            with deterministic(TrainingSettings().threads):
+            begin = time.thread_time()
+            with deterministic(1):
                 detect(detector, frame.points, frame.intensity)
-            looks.append(time.perf_counter() - begin)
+            looks.append(time.thread_time() - begin)
         medians.append(np.median(looks))
     return float(np.mean(medians))
 
@@ -104,7 +123,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="compare_detectors", description=__doc__.splitlines()[0], formatter_class=survey.HelpWithDefaults
     )
     evaluate.add_options(parser)
-    parser.set_defaults(steps=600)
+    parser.set_defaults(steps=600, every=5.0)
     return parser
 
 

@@ -230,6 +230,21 @@ def simulate_lessons(
     return lessons
 
 
+def training(
+    pupil: Pupil, lessons: Lessons, *, device: str, store: Path | None = None
+) -> Generator[Progress, None, Trained]:
+    """Train a detector on the lessons of its configurations."""
+    names = [configuration.name for configuration in pupil.configurations]
+    return train(
+        [recording for name in names for recording in lessons.training[name]],
+        [recording for name in names for recording in lessons.validation[name]],
+        pupil.network,
+        pupil.training,
+        device=device,
+        store=store,
+    )
+
+
 def train_all(
     pupils: Sequence[Pupil], lessons: Lessons, folder: Path, *, device: str
 ) -> Generator[Progress, None, list[Trained]]:
@@ -244,18 +259,7 @@ def train_all(
     device : str
         Of torch.
     """
-    trainings = []
-    for pupil in pupils:
-        names = [configuration.name for configuration in pupil.configurations]
-        steps = train(
-            [recording for name in names for recording in lessons.training[name]],
-            [recording for name in names for recording in lessons.validation[name]],
-            pupil.network,
-            pupil.training,
-            device=device,
-            store=folder / f"{pupil.name}.pt",
-        )
-        trainings.append(steps)
+    trainings = [training(pupil, lessons, device=device, store=folder / f"{pupil.name}.pt") for pupil in pupils]
     at_once = SIDE_BY_SIDE if device == "cpu" else 1
     with deterministic(pupils[0].training.threads):  # all the time, as torch keeps one such setting for all threads
         return (yield from side_by_side(trainings, at_once))

@@ -333,7 +333,9 @@ def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Setting]
     figure, axes = _figure(PANEL[0] * 1.1, count=2)
     families = list(dict.fromkeys(setting.family for setting in settings))
     costs = [[one.training for one in settings], [one.inference for one in settings]]
-    for panel, cost, what in zip(axes, costs, ("training (s)", "inference on one merged frame (ms)"), strict=True):
+    for panel, cost, what in zip(
+        axes, costs, ("training, one core (s)", "inference on one merged frame, one core (ms)"), strict=True
+    ):
         for row, family in enumerate(families):
             own = [(x, one) for x, one in zip(cost, settings, strict=True) if one.family == family]
             for x, one in own:

@@ -1,0 +1,36 @@
+"""The command that charts what other settings of the detector cost and gain."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless import compare_detectors
+
+from matplotlib.image import imread
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+RUNS = [str(SCENES / "junction_traffic" / f"run-{number}.npz") for number in (1, 2, 3, 4)]
+COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25", "--every", "74", "--steps", "2"]
+
+
+def test_each_setting_gets_its_price_and_its_precision(tmp_path, monkeypatch):
+    default = compare_detectors.DEFAULT
+    small = {("default", "default"): default, ("pillars", "0.5 m"): replace(default, pillar=0.5)}
+    monkeypatch.setattr(compare_detectors, "SETTINGS", small)
+    compare_detectors.main([str(SCENES / "junction.blend"), "-o", str(tmp_path), *COARSE, "--traffic", *RUNS])
+    first, second = json.loads((tmp_path / "settings.json").read_text(encoding="utf-8"))
+    assert (first["name"], first["default"], second["name"], second["default"]) == ("default", True, "0.5 m", False)
+    for setting in (first, second):
+        assert setting["training"] > 0
+        assert setting["inference"] > 0
+        assert 0 <= setting["average_precision"] <= 1
+    assert imread(tmp_path / "settings.png").shape[1] > 600
+
+
+def test_the_settings_hold_the_default_and_the_published():
+    assert list(compare_detectors.SETTINGS.values()).count(compare_detectors.DEFAULT) == 1
+    assert compare_detectors.PUBLISHED in compare_detectors.SETTINGS.values()
