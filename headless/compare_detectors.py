@@ -78,7 +78,9 @@ def main(argv: list[str]) -> None:
         )
         for (family, name), pupil, (detector, seconds) in zip(SETTINGS, pupils, trained, strict=True)
     ]
-    title = f"{stage.surveyed.site.name}: mean over {len(stage.configurations)} placements, {options.steps} steps"
+    title = (
+        f"{stage.surveyed.layout.site.name}: mean over {len(stage.configurations)} placements, {options.steps} steps"
+    )
     with session.writing(options.output):
         save_setting_chart(options.output / "settings.png", settings, title)
         save_json(options.output / "settings.json", [vars(setting) for setting in settings])
@@ -94,7 +96,7 @@ def _lesson(
 ) -> Generator[Progress, None, tuple[Detector, float]]:
     """Simulate what a detector learns from, and train it; return it with the processor's seconds of the training."""
     studio = Studio(stage.studio.static, stage.studio.settings)
-    grid = grid_of(stage.surveyed.geometry, pupil.network.pillar)
+    grid = grid_of(stage.surveyed.layout.geometry, pupil.network.pillar)
     lessons = yield from case_study.simulate_lessons(
         studio, pupil.configurations, stage.traffic, grid, pupil.network.most_points
     )

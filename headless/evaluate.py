@@ -65,12 +65,15 @@ def main(argv: list[str]) -> None:
     judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, stage.traffic))
     claims = judge([judgement.trial for judgement in judgements])
 
-    site = stage.surveyed.site
+    site = stage.surveyed.layout.site
     with session.writing(folder):
         results = study_results.StudyResults(site.name, studio, stage.traffic, tuple(pupils), tuple(judgements))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = stage.surveyed.settings | {"seeds": options.seeds, "frames_every_s": options.every}
+        settings = stage.surveyed.layout.settings.as_record() | {
+            "seeds": options.seeds,
+            "frames_every_s": options.every,
+        }
         study_results.save_record(
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )
@@ -110,16 +113,20 @@ def set_stage(options: argparse.Namespace) -> Stage:
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
     traffic = _traffic(options, surveyed)
     steps = case_study.place_all(
-        surveyed.site, surveyed.models, surveyed.grid, solver=options.solver, time_limit=options.time_limit
+        surveyed.layout.site,
+        surveyed.layout.models,
+        surveyed.grid,
+        solver=options.solver,
+        time_limit=options.time_limit,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
-    studio = Studio(static_scene(surveyed.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
+    studio = Studio(static_scene(surveyed.layout.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
     return Stage(surveyed, traffic, configurations, studio)
 
 
 def learn_from(stage: Stage, network: NetworkSettings) -> case_study.Lessons:
     """Simulate what a network learns from, on its own pillars."""
-    grid = grid_of(stage.surveyed.geometry, network.pillar)
+    grid = grid_of(stage.surveyed.layout.geometry, network.pillar)
     steps = case_study.simulate_lessons(stage.studio, stage.configurations, stage.traffic, grid, network.most_points)
     return stage.surveyed.stopwatch.run("simulation", steps)
 
@@ -134,7 +141,7 @@ def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study
         )
     runs = []
     for path in paths:
-        trajectories = Trajectories.load(path).moved_to(surveyed.geometry.origin)
+        trajectories = Trajectories.load(path).moved_to(surveyed.layout.geometry.origin)
         begin, end = trajectories.span
         times = np.arange(begin + WARM_UP, end, options.every)
         if not len(times):

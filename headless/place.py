@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -24,8 +23,9 @@ from headless import session, survey
 
 import bpy
 
-from seip_addon.core.goal import DEFAULT_COUNT, Goal, Plan, check_goal, make_plan
-from seip_addon.core.results.placement_record import Run, placement_record, versions
+from seip_addon.core.goal import DEFAULT_COUNT, Goal, Plan, check_goal
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.survey import Circumstances, place, record_of
 from seip_addon.scene.result_folder import write_result_folder
 
 
@@ -34,30 +34,21 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     goal = _goal(options)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
-    site, watch = surveyed.site, surveyed.stopwatch
-    steps = make_plan(
-        site, surveyed.grid.visible, surveyed.models, goal, solver=options.solver, time_limit=options.time_limit
-    )
-    plan = watch.run("placement", steps)
-    run = Run(
-        settings=surveyed.settings | {"goal": asdict(plan.goal), "render": not options.no_render},
-        created=datetime.now(UTC),
-        durations=watch.seconds,
-        versions=versions(blender=bpy.app.version_string),
-        inputs={"visibility": surveyed.grid.key},
-        warnings=surveyed.warnings,
-    )
+    layout, watch = surveyed.layout, surveyed.stopwatch
+    plan = watch.run("placement", place(layout, surveyed.grid, goal))
+    circumstances = Circumstances(datetime.now(UTC), watch.seconds, versions(blender=bpy.app.version_string))
+    record = record_of(layout, surveyed.grid, plan, circumstances, render=not options.no_render)
     session.say(_in_words(plan))
     with session.writing(options.output):
         write_result_folder(
             options.output,
             bpy.context.scene,
-            surveyed.geometry,
-            site,
+            layout.geometry,
+            layout.site,
             plan,
-            placement_record(site, plan, run),
+            record,
             visible=surveyed.grid.visible,
-            models=surveyed.models,
+            models=layout.models,
             render=not options.no_render,
         )
     session.say(f"written to {options.output}/")

@@ -26,8 +26,8 @@ def main(argv: list[str]) -> None:
     """Run the study on one scene and write charts, tables and plans to a folder."""
     options = _parser().parse_args(argv)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=1)))
-    site, visible, folder = surveyed.site, surveyed.grid.visible, options.output
-    steps = coverage_study(site, surveyed.models, visible, solver=options.solver, time_limit=options.time_limit)
+    site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
+    steps = coverage_study(site, surveyed.layout.models, visible, solver=options.solver, time_limit=options.time_limit)
     study = surveyed.stopwatch.run("study", steps)
     claims = judge(study)
 
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> None:
                 case = study.find(sensor, NUMBERS[-1], weight=weight)
                 if case is not None:
                     name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
-                    save_plan_view(folder / name, surveyed.geometry, site, case.deployment)
+                    save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
         session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")

@@ -5,31 +5,26 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Generator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from headless import session
 
 import bpy
 import numpy as np
 
-from seip_addon.core.candidates import CandidateSettings
-from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
-from seip_addon.core.placement.integer_program import check_solver
+from seip_addon.core.candidates import CandidateSettings, heights_of
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.scene_geometry import SceneGeometry
-from seip_addon.core.site import Site, make_site
+from seip_addon.core.site import Site
+from seip_addon.core.survey import Layout, SurveySettings, lay_out, see
 from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
-from seip_addon.core.visibility.ring_resolution import resolution_warnings
-from seip_addon.core.visibility.store import stored_visibility
 from seip_addon.scene.read import read_scene
 
 Result = TypeVar("Result")
-
-HIGHEST = 100.0
-"""Metres: the end of a range of heights beyond this is a slip of the keyboard."""
 
 
 @dataclass
@@ -53,28 +48,17 @@ class Stopwatch:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A scene with its site and who sees what.
+    """A scene laid out and seen.
 
     Parameters
     ----------
-    geometry : SceneGeometry
-    site : Site
-    models : dict of str to LidarModel
-        The sensor types asked for, by catalogue key.
+    layout : Layout
     grid : VisibilityGrid
-    settings : dict
-        All options of the survey, defaults included.
-    warnings : tuple of str
-        What a user should know before trusting the figures.
     stopwatch : Stopwatch
     """
 
-    geometry: SceneGeometry
-    site: Site
-    models: dict[str, LidarModel]
+    layout: Layout
     grid: VisibilityGrid
-    settings: dict[str, Any]
-    warnings: tuple[str, ...]
     stopwatch: Stopwatch
 
 
@@ -120,41 +104,40 @@ def survey(options: argparse.Namespace, check: Callable[[Site, dict[str, LidarMo
     -------
     Survey
     """
-    check_solver(options.solver)
-    models = find_models(load_catalogue(options.catalogue), options.sensor)
-    layout = CandidateSettings(
-        sensors=tuple(options.sensor),
-        heights=tuple(options.heights),
-        spacing=options.spacing,
-        setback=options.setback,
-        clearance=options.clearance,
-        bracket=options.bracket,
-    )
-    sight = VisibilitySettings(options.delta, options.min_intensity)
+    settings = _settings(options)
+    settings.models()  # refuses unknown types before the scene is read
     session.check_folder(options.output)
     session.open_scene(options.scene)
 
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
-    site = watch.time("lay out the site", lambda: make_site(reading.geometry, layout, options.grid))
-    session.say(_in_words(site))
-    warnings = reading.warnings + resolution_warnings(site, models, sight)
-    for sentence in warnings:
+    layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
+    session.say(_in_words(layout.site))
+    for sentence in layout.warnings:
         session.say(f"warning: {sentence}")
-    check(site, models)
-    store = options.output / "visibility.npz"
-    grid = watch.run("visibility", stored_visibility(store, site, models, sight, options.engine, options.scheduler))
+    check(layout.site, layout.models)
+    grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
     session.say(triangles_sentence(grid.parameters["triangles"]))
-    settings = {
-        "grid_spacing_m": options.grid,
-        "candidates": asdict(layout),
-        "visibility": asdict(sight),
-        "catalogue": [path.name for path in options.catalogue],
-        "engine": options.engine,
-        "solver": options.solver,
-        "time_limit_s": options.time_limit,
-    }
-    return Survey(reading.geometry, site, models, grid, settings, warnings, watch)
+    return Survey(layout, grid, watch)
+
+
+def _settings(options: argparse.Namespace) -> SurveySettings:
+    return SurveySettings(
+        candidates=CandidateSettings(
+            sensors=tuple(options.sensor),
+            heights=tuple(options.heights),
+            spacing=options.spacing,
+            setback=options.setback,
+            clearance=options.clearance,
+            bracket=options.bracket,
+        ),
+        visibility=VisibilitySettings(options.delta, options.min_intensity),
+        grid_spacing=options.grid,
+        catalogue=tuple(options.catalogue),
+        engine=options.engine,
+        solver=options.solver,
+        time_limit=options.time_limit,
+    )
 
 
 def _in_words(site: Site) -> str:
@@ -181,20 +164,8 @@ class _Heights(argparse.Action):
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, *_: object
     ) -> None:
         """Store the heights as a tuple of metres."""
-        heights: list[float] = []
-        for text in values if isinstance(values, list) else []:
-            try:
-                numbers = [float(part) for part in str(text).split(":")]
-            except ValueError:
-                numbers = []
-            if len(numbers) == 1:
-                heights += numbers
-            elif len(numbers) == 3 and 0 < numbers[0] <= numbers[1] <= HIGHEST and numbers[2] >= 0.01:
-                first, last, step = numbers
-                heights += np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
-            else:
-                parser.error(
-                    f"argument --heights: {text!r} is neither a height in metres nor a range FROM:TO:STEP "
-                    f"up to {HIGHEST:g} m in steps of at least 0.01 m"
-                )
-        setattr(namespace, self.dest, tuple(heights))
+        texts = values if isinstance(values, list) else []
+        try:
+            setattr(namespace, self.dest, heights_of(texts))
+        except SeipError as error:
+            parser.error(f"argument --heights: {error}")

@@ -19,6 +19,9 @@ from .scene_geometry import NamedArea, Pole, SceneGeometry, joined
 _ABOVE_POLE = 0.5
 """Metres that a sensor may hang above the top of its pole, on a short mast."""
 
+HIGHEST = 100.0
+"""Metres: a sensor higher than this is a slip of the keyboard."""
+
 
 @dataclass(frozen=True)
 class CandidateSettings:
@@ -53,14 +56,43 @@ class CandidateSettings:
         if not self.heights:
             raise SeipError("no mounting height is given: name at least one, in metres")
         for height in self.heights:
-            if not 0 < height <= 100:
-                raise SeipError(f"a mounting height must be a positive number of metres up to 100, not {height}")
+            if not 0 < height <= HIGHEST:
+                raise SeipError(
+                    f"a mounting height must be a positive number of metres up to {HIGHEST:g}, not {height}"
+                )
         if not 0.1 <= self.spacing <= 1000:
             raise SeipError(f"the candidate spacing must be 0.1 to 1000 m, not {self.spacing}")
         for name in ("setback", "clearance", "bracket"):
             value = getattr(self, name)
             if not 0 <= value <= 100:
                 raise SeipError(f"the {name} must be 0 to 100 m, not {value}")
+
+
+def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the heights in metres that texts name: each a height, or a range FROM:TO:STEP with both ends.
+
+    Raises
+    ------
+    SeipError
+        One is neither.
+    """
+    heights: list[float] = []
+    for text in texts:
+        try:
+            numbers = [float(part) for part in text.split(":")]
+        except ValueError:
+            numbers = []
+        if len(numbers) == 1:
+            heights += numbers
+        elif len(numbers) == 3 and 0 < numbers[0] <= numbers[1] <= HIGHEST and numbers[2] >= 0.01:
+            first, last, step = numbers
+            heights += np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
+        else:
+            raise SeipError(
+                f"{text!r} is neither a height in metres nor a range FROM:TO:STEP "
+                f"up to {HIGHEST:g} m in steps of at least 0.01 m"
+            )
+    return tuple(heights)
 
 
 @dataclass(frozen=True, eq=False)

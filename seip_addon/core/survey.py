@@ -1,0 +1,175 @@
+"""A survey: a place laid out for a choice of sensors, and who sees what there. Panel and batch both go this way."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from .candidates import CandidateSettings
+from .goal import Goal, Plan, make_plan
+from .lidar import LidarModel, find_models, load_catalogue
+from .placement.integer_program import check_solver
+from .progress import Progress
+from .results.placement_record import Record, Run, placement_record
+from .scene_geometry import SceneGeometry
+from .site import Site, make_site
+from .visibility.grid import VisibilityGrid, VisibilitySettings
+from .visibility.ray_casting import Engine
+from .visibility.ring_resolution import resolution_warnings
+from .visibility.store import stored_visibility
+
+
+@dataclass(frozen=True)
+class SurveySettings:
+    """All that a user may choose about a survey and how it is answered.
+
+    Parameters
+    ----------
+    candidates : CandidateSettings
+    visibility : VisibilitySettings
+    grid_spacing : float, metres
+        Between neighbouring targets.
+    catalogue : tuple of path
+        The user's own catalogues of LiDARs.
+    engine : {"auto", "bvh", "embree"}
+        What casts the rays.
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+        For each answer.
+    """
+
+    candidates: CandidateSettings = field(default_factory=CandidateSettings)
+    visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
+    grid_spacing: float = 1.0
+    catalogue: tuple[Path, ...] = ()
+    engine: Engine = "auto"
+    solver: str = "highs"
+    time_limit: float = 60.0
+
+    def models(self) -> dict[str, LidarModel]:
+        """Return the sensor types to choose from, by catalogue key.
+
+        Raises
+        ------
+        SeipError
+            The solver or a type is unknown, or a catalogue cannot be read.
+        """
+        check_solver(self.solver)
+        return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
+
+    def as_record(self) -> dict[str, Any]:
+        """Return the settings as records hold them: defaults included, values that JSON knows."""
+        return {
+            "grid_spacing_m": self.grid_spacing,
+            "candidates": asdict(self.candidates),
+            "visibility": asdict(self.visibility),
+            "catalogue": [path.name for path in self.catalogue],
+            "engine": self.engine,
+            "solver": self.solver,
+            "time_limit_s": self.time_limit,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A scene laid out for a survey.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+        What was read from the scene.
+    site : Site
+    models : dict of str to LidarModel
+        The sensor types asked for, by catalogue key.
+    settings : SurveySettings
+    warnings : tuple of str
+        What a user should know before trusting the figures.
+    """
+
+    geometry: SceneGeometry
+    site: Site
+    models: dict[str, LidarModel]
+    settings: SurveySettings
+    warnings: tuple[str, ...]
+
+
+def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequence[str] = ()) -> Layout:
+    """Lay targets and candidates into a scene.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : SurveySettings
+    warnings : sequence of str
+        Of the scene's reading.
+
+    Raises
+    ------
+    SeipError
+        As for `SurveySettings.models` and `make_site`.
+    """
+    models = settings.models()
+    site = make_site(geometry, settings.candidates, settings.grid_spacing)
+    resolution = resolution_warnings(site, models, settings.visibility)
+    return Layout(geometry, site, models, settings, (*warnings, *resolution))
+
+
+def see(layout: Layout, path: Path, scheduler: str | None = None) -> Generator[Progress, None, VisibilityGrid]:
+    """Find which pose sees which target, or read it from a file where an earlier survey found the same.
+
+    Parameters
+    ----------
+    layout : Layout
+    path : path
+        The grid's file, read and written.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work.
+    """
+    settings = layout.settings
+    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler)
+
+
+def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
+    """Answer a goal on a survey; see `make_plan`."""
+    settings = layout.settings
+    return make_plan(
+        layout.site, grid.visible, layout.models, goal, solver=settings.solver, time_limit=settings.time_limit
+    )
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What is no part of an answer, and stands in its record all the same.
+
+    Parameters
+    ----------
+    created : datetime
+        When, with its time zone.
+    durations : mapping of str to float, seconds
+        How long each step took.
+    versions : mapping of str to str
+        See `results.placement_record.versions`.
+    """
+
+    created: datetime
+    durations: Mapping[str, float]
+    versions: Mapping[str, str]
+
+
+def record_of(
+    layout: Layout, grid: VisibilityGrid, plan: Plan, circumstances: Circumstances, *, render: bool
+) -> Record:
+    """Return what ``placement.json`` holds of a plan; ``render`` is whether a rendered view goes with it."""
+    run = Run(
+        settings=layout.settings.as_record() | {"goal": asdict(plan.goal), "render": render},
+        created=circumstances.created,
+        durations=circumstances.durations,
+        versions=circumstances.versions,
+        inputs={"visibility": grid.key},
+        warnings=layout.warnings,
+    )
+    return placement_record(layout.site, plan, run)
