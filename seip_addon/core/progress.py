@@ -129,18 +129,17 @@ def side_by_side(
         with closing(works[number]) as work:
             return finish(work, report)
 
-    with ThreadPoolExecutor(threads) as pool:
-        futures = [pool.submit(run, number) for number in range(len(works))]
-        try:
-            while any(not future.done() for future in futures):
-                for failed in wait(futures, PAUSE, FIRST_EXCEPTION).done:
-                    failed.result()
-                yield _sum_of(list(latest.values()), len(works))
-            return [future.result() for future in futures]
-        finally:
-            stop.set()
-            for future in futures:
-                future.cancel()
+    pool = ThreadPoolExecutor(threads)
+    futures = [pool.submit(run, number) for number in range(len(works))]
+    try:
+        while any(not future.done() for future in futures):
+            for ended in wait(futures, PAUSE, FIRST_EXCEPTION).done:
+                ended.result()  # raises here what went wrong there
+            yield _sum_of(list(latest.values()), len(works))
+        return [future.result() for future in futures]
+    finally:
+        stop.set()
+        pool.shutdown(wait=False, cancel_futures=True)  # whoever stops this need not wait for the next report
 
 
 class _Stopped(BaseException):

@@ -16,8 +16,8 @@ from .progress import Progress
 from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
-from .visibility.grid import VisibilityGrid, VisibilitySettings
-from .visibility.ray_casting import Engine
+from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
+from .visibility.ray_casting import Engine, engine_name
 from .visibility.ring_resolution import resolution_warnings
 from .visibility.store import stored_visibility
 
@@ -116,6 +116,12 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     resolution = resolution_warnings(site, models, settings.visibility)
     return Layout(geometry, site, models, settings, (*warnings, *resolution))
+
+
+def grid_key(layout: Layout) -> str:
+    """Return the key of the visibility grid of a survey: what it is kept under."""
+    settings = layout.settings
+    return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
 def see(layout: Layout, path: Path, scheduler: str | None = None) -> Generator[Progress, None, VisibilityGrid]:

@@ -1,0 +1,134 @@
+"""How operators run: errors become reports, long work leaves Blender responsive and can be stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import Any, Generic, TypeVar
+
+import bpy
+
+from .. import state
+from ..core.errors import SeipError
+from ..core.progress import Progress, finish, side_by_side
+
+Result = TypeVar("Result")
+Outcome = set[str]
+
+PERIOD = 0.1
+"""Seconds between two looks at work that is under way."""
+
+
+def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
+    """Do something, and report a user's mistake instead of raising it."""
+    try:
+        work()
+    except SeipError as error:
+        operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    return {"FINISHED"}
+
+
+class LongWork(Generic[Result]):
+    """A mixin for operators with work of more than an instant.
+
+    From a script, or where there is no window, `execute` does it at once. A
+    click does it in a thread: Blender stays responsive, the panel shows how far
+    it is, and Esc stops it within a tenth of a second.
+    """
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
+        """Read what is needed from the scene and return the work, which must not touch Blender's data."""
+        raise NotImplementedError
+
+    def conclude(self, scene: bpy.types.Scene, result: Result) -> None:
+        """Write the result into the scene and report it."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Do the work at once."""
+        scene = context.scene
+        return attempt(self, lambda: self.conclude(scene, finish(self.prepare(scene))))
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Begin the work in a thread."""
+        if bpy.app.background:
+            return self.execute(context)
+        outcome = attempt(self, lambda: self._begin(context))
+        return {"RUNNING_MODAL"} if outcome == {"FINISHED"} else outcome
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """Look how far the work is, and write its result once it is done."""
+        if self._running is not state.running or self._running.stop or event.type == "ESC":
+            self._end(context)
+            self.report({"INFO"}, "stopped; nothing was changed")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        done: list[Any] = []
+        outcome = attempt(self, lambda: self._look(done))
+        if outcome == {"CANCELLED"} or done:
+            self._end(context)
+        if not done:
+            _redraw(context)
+            return outcome if outcome == {"CANCELLED"} else {"PASS_THROUGH"}
+        return attempt(self, lambda: self.conclude(state.scene_of(self._scene), done[0]))
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop because Blender ends or opens another file."""
+        self._end(context)
+
+    def _begin(self, context: bpy.types.Context) -> None:
+        if state.running is not None:
+            raise SeipError("other work is under way: wait for it, or stop it with Esc")
+        self._steps = side_by_side([self.prepare(context.scene)], 1)
+        self._scene = context.scene.session_uid
+        self._running = state.running = state.Running(self.bl_idname, Progress(0, 0, "begin"))
+        self._timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
+        context.window_manager.modal_handler_add(self)
+
+    def _look(self, done: list[Any]) -> None:
+        """Take one report of the thread; put the result into the list once there is one."""
+        try:
+            self._running.progress = next(self._steps)
+        except StopIteration as stop:
+            done += stop.value
+
+    def _end(self, context: bpy.types.Context) -> None:
+        self._steps.close()
+        context.window_manager.event_timer_remove(self._timer)
+        if state.running is self._running:
+            state.running = None
+        _redraw(context)
+
+
+def _redraw(context: bpy.types.Context) -> None:
+    """Have all viewports drawn anew, their sidebars with them."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+class SEIP_OT_stop(bpy.types.Operator):
+    """Stop the work that is under way"""
+
+    bl_idname = "seip.stop"
+    bl_label = "Stop"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Tell whether there is anything to stop."""
+        if state.running is None:
+            cls.poll_message_set("nothing is under way")
+        return state.running is not None
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Ask the work to stop."""
+        if state.running is not None:
+            state.running.stop = True
+        return {"FINISHED"}
+
+
+CLASSES = (SEIP_OT_stop,)

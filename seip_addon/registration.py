@@ -1,0 +1,53 @@
+"""What the add-on gives to Blender, in the order in which Blender must learn of it."""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+import bpy
+
+PARTS = (
+    "preferences",
+    "properties",
+    "state",
+    "operators.work",
+    "operators.visibility",
+    "operators.placement",
+    "panels.visibility",
+    "panels.placement",
+)
+"""Modules with ``CLASSES``, and with ``attach`` and ``detach`` for what is no class: handlers, properties, menus."""
+
+_registered: list[ModuleType] = []
+
+
+def register() -> None:
+    """Register all parts, or say in the sidebar what they lack."""
+    try:
+        parts = [importlib.import_module(f".{name}", __package__) for name in PARTS]
+    except ModuleNotFoundError as error:
+        parts = [_incomplete(error)]
+    for part in parts:
+        for one in part.CLASSES:
+            bpy.utils.register_class(one)
+        _registered.append(part)
+        if hasattr(part, "attach"):
+            part.attach()
+
+
+def unregister() -> None:
+    """Remove all parts, the last first."""
+    while _registered:
+        part = _registered.pop()
+        if hasattr(part, "detach"):
+            part.detach()
+        for one in reversed(part.CLASSES):
+            bpy.utils.unregister_class(one)
+
+
+def _incomplete(error: ModuleNotFoundError) -> ModuleType:
+    """Return the part that stands in for all others where a package is missing."""
+    part = importlib.import_module(".panels.incomplete", __package__)
+    part.MISSING = error.name or str(error)  # type: ignore[attr-defined]  # the panel's one fact
+    return part
