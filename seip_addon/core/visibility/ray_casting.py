@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import importlib.util
 import itertools
+import operator
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -104,6 +105,9 @@ def make_ray_caster(triangles: Float, engine: Engine = "auto", keep: Boolean | N
     raise SeipError(f"no ray-casting engine '{engine}'; choose auto, bvh or embree")
 
 
+_FACE, _DISTANCE = operator.itemgetter(2), operator.itemgetter(3)  # of what Blender's tree returns
+
+
 class BvhRayCaster:
     """Casts rays with ``mathutils.bvhtree``.
 
@@ -135,12 +139,11 @@ class BvhRayCaster:
         """Cast rays; see `RayCaster.cast`."""
         start = (origin - self._centre).tolist()
         starts = itertools.repeat(start) if origin.ndim == 1 else start
-        ray_cast, reach = self._tree.ray_cast, max_range * _BEYOND
         with _no_garbage_collection():
-            hits = [ray_cast(start, ray, reach)[2:] for start, ray in zip(starts, directions.tolist(), strict=False)]
+            hits = list(map(self._tree.ray_cast, starts, directions.tolist(), itertools.repeat(max_range * _BEYOND)))
             # None, on a miss, becomes NaN
-            face = np.array([hit[0] for hit in hits], dtype=np.float64)
-            distance = np.array([hit[1] for hit in hits], dtype=np.float64)
+            face = np.array(list(map(_FACE, hits)), dtype=np.float64)
+            distance = np.array(list(map(_DISTANCE, hits)), dtype=np.float64)
         return _result(distance, np.where(face >= 0, face, -1.0).astype(np.int64), self._index, max_range)
 
 
