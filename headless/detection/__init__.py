@@ -4,4 +4,7 @@ import sys
 from importlib.util import find_spec
 
 if find_spec("torch") is None:
-    sys.exit(f"error: {sys.executable} has no package 'torch', which detection needs: pip install --group detection")
+    sys.exit(
+        f"error: {sys.executable} has no package 'torch', which detection needs: run `make detection`, "
+        "and then this command with .venv/bin/python -m"
+    )
