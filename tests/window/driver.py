@@ -1,0 +1,196 @@
+"""Blender's window, driven by mouse and keyboard from within: what a script for a person to watch would do.
+
+Blender must run with ``--enable-event-simulate``. A scenario is a generator that
+yields seconds to wait; buttons are found by what they do, wherever they are: the
+mouse goes down the sidebar and asks of each place which operator or property is
+there.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+
+import bpy
+
+Steps = Generator[float, None, None]
+
+ROW = 8
+"""Pixels between two places that are asked: buttons are 20 high."""
+BEAT = 0.04
+"""Seconds that Blender has to notice an event."""
+NAMES = dict(zip("0123456789.:-/ ", (
+    "ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE",
+    "PERIOD", "SEMI_COLON", "MINUS", "SLASH", "SPACE",
+), strict=True))
+
+
+class Window:
+    """The first window with its 3D viewport.
+
+    Parameters
+    ----------
+    pictures : Path
+        Folder for pictures.
+    """
+
+    def __init__(self, pictures: Path) -> None:
+        self.pictures = pictures
+
+    @property
+    def window(self) -> bpy.types.Window:
+        """Blender's window."""
+        return bpy.context.window_manager.windows[0]
+
+    @property
+    def area(self) -> bpy.types.Area:
+        """The 3D viewport."""
+        return max((a for a in self.window.screen.areas if a.type == "VIEW_3D"), key=lambda a: a.width * a.height)
+
+    def region(self, kind: str) -> bpy.types.Region:
+        """Return a region of the viewport: UI is the sidebar."""
+        return next(region for region in self.area.regions if region.type == kind)
+
+    def event(self, kind: str, value: str, place: tuple[int, int], **more: object) -> None:
+        """Simulate one event."""
+        self.window.event_simulate(type=kind, value=value, x=place[0], y=place[1], **more)
+
+    def open_sidebar(self, tab: str) -> Steps:
+        """Show the sidebar with a tab in front."""
+        bpy.context.preferences.view.show_splash = False
+        self.area.spaces.active.show_region_ui = True
+        self.area.tag_redraw()
+        yield 0.7  # tabs exist once they have been drawn
+        self.region("UI").active_panel_category = tab
+        self.area.tag_redraw()
+        yield 0.7
+
+    def press(self, key: str, place: tuple[int, int] | None = None, **held: bool) -> Steps:
+        """Press and let go of a key or button of the mouse, with shift, ctrl or alt held."""
+        where = place or self.middle
+        for value in ("PRESS", "RELEASE"):
+            self.event(key, value, where, **held)
+            yield BEAT
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """The middle of the viewport."""
+        region = self.region("WINDOW")
+        return region.x + region.width // 2, region.y + region.height // 2
+
+    def find(self, what: str) -> Generator[float, None, tuple[int, int]]:
+        """Scroll the sidebar until a button is seen, and return its place.
+
+        Parameters
+        ----------
+        what : str
+            Part of an operator's call or of a property's path: ``seip.solve_placement(``, ``seip.goal.count``.
+        """
+        for page in range(12):  # as it is, then from the top down
+            if page == 1:
+                yield from self._scroll("WHEELUPMOUSE", 100)
+            elif page > 1:
+                yield from self._scroll("WHEELDOWNMOUSE", 10)
+            region = self.region("UI")
+            for y in range(region.y + region.height - 4, region.y, -ROW):
+                for share in (0.75, 0.3):  # a row may hold several
+                    place = (region.x + int(share * (region.width - 24)), y)
+                    self.event("MOUSEMOVE", "NOTHING", place)
+                    yield BEAT / 2
+                    if what in self._asked():
+                        return place
+        raise LookupError(f"there is no button {what} in the sidebar")
+
+    def click(self, what: str) -> Steps:
+        """Click a button of the sidebar."""
+        place = yield from self.find(what)
+        yield from self.press("LEFTMOUSE", place)
+        yield 0.2
+
+    def enter(self, what: str, text: str) -> Steps:
+        """Type into a field of the sidebar, in place of what is there."""
+        place = yield from self.find(what)
+        yield from self.press("RET", place)
+        yield from self.press("A", place, ctrl=True)
+        for letter in text:
+            key = NAMES.get(letter, letter.upper())
+            self.event(key, "PRESS", place, unicode=letter)
+            yield BEAT
+            self.event(key, "RELEASE", place)
+            yield BEAT
+        yield from self.press("RET", place)
+        yield 0.2
+
+    def until(self, holds: Callable[[], object], seconds: float) -> Steps:
+        """Wait until something holds."""
+        end = time.monotonic() + seconds
+        while not holds():
+            if time.monotonic() > end:
+                raise TimeoutError(f"not within {seconds:g} s")
+            yield 0.1
+
+    def picture(self, name: str) -> Steps:
+        """Save what the window shows."""
+        self.event("MOUSEMOVE", "NOTHING", self.middle)  # no tooltip, no button lit
+        yield 1.0
+        path = self.pictures / f"{name}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if shutil.which("import"):  # of X: Blender's own pictures are black where OpenGL is drawn in software
+            subprocess.run(["import", "-window", "root", str(path)], check=True)  # noqa: S603, S607
+        else:
+            with bpy.context.temp_override(window=self.window):
+                bpy.ops.screen.screenshot(filepath=str(path))
+
+    def _scroll(self, way: str, count: int) -> Steps:
+        region = self.region("UI")
+        place = (region.x + region.width // 3, region.y + region.height - 12)  # on a panel: below all, it would zoom
+        self.event("MOUSEMOVE", "NOTHING", place)
+        yield BEAT
+        for _ in range(count):
+            self.event(way, "PRESS", place)
+        yield 0.3
+
+    def _asked(self) -> str:
+        """Return what the button under the mouse does."""
+        manager = bpy.context.window_manager
+        manager.clipboard = ""
+        with bpy.context.temp_override(window=self.window, area=self.area, region=self.region("UI")):
+            for ask in (
+                lambda: bpy.ops.ui.copy_python_command_button(),
+                lambda: bpy.ops.ui.copy_data_path_button(full_path=True),
+            ):
+                try:
+                    ask()
+                except RuntimeError:  # no such button there
+                    continue
+        return str(manager.clipboard)
+
+
+def play(scenario: Callable[[Window], Iterator[float]], window: Window) -> None:
+    """Play a scenario once Blender's window is up, and end Blender: status 0, or 1 with the fault on standard error."""
+    steps = scenario(window)
+
+    def tick() -> float | None:
+        try:
+            return next(steps)
+        except StopIteration:
+            _leave(0)
+        except Exception:  # noqa: BLE001  # whatever it is, the window must close
+            traceback.print_exc()
+            subprocess.run(["import", "-window", "root", str(window.pictures / "fault.png")], check=False)  # noqa: S603, S607
+            _leave(1)
+        return None
+
+    bpy.app.timers.register(tick, first_interval=2.0, persistent=True)
+
+
+def _leave(status: int) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)  # asks nothing about unsaved changes
