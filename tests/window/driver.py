@@ -15,6 +15,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -25,10 +26,32 @@ ROW = 8
 """Pixels between two places that are asked: buttons are 20 high."""
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
-NAMES = dict(zip("0123456789.:-/ ", (
-    "ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE",
-    "PERIOD", "SEMI_COLON", "MINUS", "SLASH", "SPACE",
-), strict=True))
+NAMES = dict(
+    zip(
+        "0123456789.:-/ ",
+        (
+            "ZERO",
+            "ONE",
+            "TWO",
+            "THREE",
+            "FOUR",
+            "FIVE",
+            "SIX",
+            "SEVEN",
+            "EIGHT",
+            "NINE",
+            "PERIOD",
+            "SEMI_COLON",
+            "MINUS",
+            "SLASH",
+            "SPACE",
+        ),
+        strict=True,
+    )
+)
+
+
+FULL = {"full_path": True}
 
 
 class Window:
@@ -161,14 +184,9 @@ class Window:
         manager = bpy.context.window_manager
         manager.clipboard = ""
         with bpy.context.temp_override(window=self.window, area=self.area, region=self.region("UI")):
-            for ask in (
-                lambda: bpy.ops.ui.copy_python_command_button(),
-                lambda: bpy.ops.ui.copy_data_path_button(full_path=True),
-            ):
-                try:
-                    ask()
-                except RuntimeError:  # no such button there
-                    continue
+            for ask, more in ((bpy.ops.ui.copy_python_command_button, {}), (bpy.ops.ui.copy_data_path_button, FULL)):
+                with suppress(RuntimeError):  # no such button there
+                    ask(**more)
         return str(manager.clipboard)
 
 

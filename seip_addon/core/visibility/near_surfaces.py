@@ -24,6 +24,52 @@ _FLOAT32_ROUNDINGS = 64
 
 
 @dataclass(frozen=True, eq=False)
+class Cuts:
+    """What balls of radius δ about targets cut out of the planes of the triangles that they meet: discs.
+
+    Parameters
+    ----------
+    target : (k,) int64
+        Ascending.
+    corners : (k, 3, 3) float64, metres
+        Of the triangle.
+    normal : (k, 3) float64
+        Unit normals.
+    middle : (k, 3) float64, metres
+        Of the disc.
+    radius : (k,) float64, metres
+    """
+
+    target: Integer
+    corners: Float
+    normal: Float
+    middle: Float
+    radius: Float
+
+    def bounds(self, tolerance: float) -> Discs:
+        """Bound in plan and in height what lies both in the disc and in the triangle."""
+        corners, middle = self.corners, self.middle
+        half = self.radius * np.sqrt(np.maximum(1 - self.normal[:, 2] ** 2, 0.0))
+        low = np.maximum(middle[:, 2] - half, corners[:, :, 2].min(axis=1))
+        high = np.minimum(middle[:, 2] + half, corners[:, :, 2].max(axis=1))
+        # In plan a small or steep triangle lies in a circle about its centroid that is narrower than the disc.
+        centroid = corners.mean(axis=1)
+        reach = np.linalg.norm((corners - centroid[:, None])[:, :, :2], axis=2).max(axis=1)
+        centre = np.where((reach < self.radius)[:, None], centroid, middle)
+        radius = np.minimum(reach, self.radius)
+        both = low <= high
+        return Discs(
+            target=self.target[both],
+            centre=centre[both],
+            normal=self.normal[both],
+            radius=radius[both],
+            low=low[both] - tolerance,
+            high=high[both] + tolerance,
+            cuts=self,
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Discs:
     """Circles about what balls of radius δ about targets cut out of the triangles that they meet.
 
@@ -39,6 +85,8 @@ class Discs:
         In plan.
     low, high : (k,) float64, metres
         Heights between which the triangle and the disc both lie.
+    cuts : Cuts
+        What they are about.
     """
 
     target: Integer
@@ -47,6 +95,7 @@ class Discs:
     radius: Float
     low: Float
     high: Float
+    cuts: Cuts
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +147,34 @@ def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurface
         order = np.argsort(near, kind="stable")
         target = near[order] + begin
         parts.append(_cut(triangles[triangle[order]], targets[target], target, radius))
-    discs = Discs(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Discs)))
-    discs = replace(discs, low=discs.low - tolerance, high=discs.high + tolerance)
+    cuts = Cuts(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Cuts)))
+    return _about(targets, radius, cuts.bounds(tolerance), tolerance)
+
+
+def turned_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -> NearSurfaces:
+    """Return the same surfaces in the axes of a sensor that hangs anywhere and is turned anyhow.
+
+    Parameters
+    ----------
+    surfaces : NearSurfaces
+        In the site's axes.
+    origin : (3,) float64, metres
+        The sensor's.
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
+    """
+    cuts, tolerance = surfaces.discs.cuts, surfaces.tolerance
+    turned = replace(
+        cuts,
+        corners=(cuts.corners - origin) @ orientation,
+        normal=cuts.normal @ orientation,
+        middle=(cuts.middle - origin) @ orientation,
+    )
+    return _about((surfaces.xyz - origin) @ orientation, surfaces.radius, turned.bounds(tolerance), tolerance)
+
+
+def _about(targets: Float, radius: float, discs: Discs, tolerance: float) -> NearSurfaces:
+    """Put discs about their targets."""
     low, high = np.full(len(targets), np.inf), np.full(len(targets), -np.inf)
     np.minimum.at(low, discs.target, discs.low)
     np.maximum.at(high, discs.target, discs.high)
@@ -115,8 +190,8 @@ def caster_tolerance(triangles: Float) -> float:
     return max(_LEAST_TOLERANCE, _FLOAT32_ROUNDINGS * float(np.finfo(np.float32).eps) * extent)
 
 
-def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Discs:
-    """Cut triangles with balls, pair by pair. Pairs that just miss each other near a corner may be among the discs."""
+def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Cuts:
+    """Cut triangles with balls, pair by pair. Pairs that just miss each other near a corner may be among them."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0, length, 1.0)[:, None]
@@ -128,13 +203,4 @@ def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Discs:
         outward = np.cross(edge, normal)
         meets &= ((centre - corners[:, side]) * outward).sum(axis=1) <= disc * np.linalg.norm(edge, axis=1)
     middle = centre - above[:, None] * normal
-    half = disc * np.sqrt(np.maximum(1 - normal[:, 2] ** 2, 0.0))
-    low = np.maximum(middle[:, 2] - half, corners[:, :, 2].min(axis=1))
-    high = np.minimum(middle[:, 2] + half, corners[:, :, 2].max(axis=1))
-    meets &= low <= high
-    # In plan a small or steep triangle lies in a circle about its centroid that is narrower than the disc.
-    centroid = corners.mean(axis=1)
-    reach = np.linalg.norm((corners - centroid[:, None])[:, :, :2], axis=2).max(axis=1)
-    middle = np.where((reach < disc)[:, None], centroid, middle)
-    radius = np.minimum(reach, disc)
-    return Discs(target[meets], middle[meets], normal[meets], radius[meets], low[meets], high[meets])
+    return Cuts(*(part[meets] for part in (target, corners, normal, middle, disc)))

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -23,10 +24,27 @@ from ..lidar import BeamPattern, LidarModel, return_intensity
 from .beam_culling import Beams, NearRays, disc_patches, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
-from .ray_casting import RayCaster
 from .target_index import TargetIndex
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
+
+
+class Corners(Protocol):
+    """Triangles whose corners can be asked for."""
+
+    def __getitem__(self, which: Integer, /) -> Float:
+        """Return corners, (k, 3, 3) float64, metres."""
+
+
+class Caster(Protocol):
+    """What a place needs of a `RayCaster`."""
+
+    @property
+    def triangles(self) -> Corners:
+        """The triangles that hits index."""
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays; see `RayCaster.cast`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +53,7 @@ class Place:
 
     Parameters
     ----------
-    caster : RayCaster
+    caster : Caster
     origin : (3,) float64, metres
     yaw : float, radians
     models : sequence of LidarModel
@@ -44,7 +62,7 @@ class Place:
     min_intensity : float
     """
 
-    caster: RayCaster
+    caster: Caster
     origin: Float
     yaw: float
     models: Sequence[LidarModel]

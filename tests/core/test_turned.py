@@ -1,0 +1,88 @@
+"""Sensors that hang and are turned anyhow see what a full scan from there sees."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from engines import ANY, each_engine
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from synthetic_junction import junction_site
+
+from seip_addon.core.lidar import beam_directions, load_catalogue
+from seip_addon.core.progress import finish
+from seip_addon.core.scans.sensor import level_orientation
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.visibility.target_index import TargetIndex
+from seip_addon.core.visibility.turned import Onlooker, onlooker
+
+MODELS = load_catalogue()
+SITE = junction_site()
+SIGHT = VisibilitySettings(delta=1.0)
+MODEL = replace(MODELS["type1"], points_per_second=MODELS["type1"].points_per_second / 6)
+
+
+def turned(yaw, pitch, roll):
+    """The rotation about z, then the new y, then the new x."""
+    nod = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    lean = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    return level_orientation(yaw) @ nod @ lean
+
+
+def by_full_scan(caster, model, xyz, orientation, delta=SIGHT.delta):
+    directions = beam_directions(model).reshape(-1, 3) @ orientation.T
+    distance, triangle = caster.cast(xyz, directions, model.max_range)
+    hit = (triangle >= 0) & (distance >= model.min_range)
+    seen = np.zeros(len(SITE.targets), dtype=bool)
+    seen[TargetIndex(SITE.targets.xyz, delta).within_delta(xyz + directions[hit] * distance[hit, None])] = True
+    return seen
+
+
+@pytest.fixture(scope="module")
+def caster():
+    return make_ray_caster(SITE.triangles, ANY)
+
+
+@each_engine
+@pytest.mark.parametrize(
+    "angles", [(0.4, 0.0, 0.0), (1.0, 0.03, -0.02), (-2.0, 0.6, 0.0), (0.0, -0.4, 0.5), (3.0, 1.5, 3.0)]
+)
+def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
+    tried = make_ray_caster(SITE.triangles, engine)
+    xyz, orientation = np.array([6.0, -7.0, 6.0]), turned(*angles)
+    seen = Onlooker(SITE, SIGHT, tried).see(MODEL, xyz, orientation)
+    assert (seen == by_full_scan(tried, MODEL, xyz, orientation)).all()
+    assert seen.any()
+
+
+@given(
+    angles=st.tuples(st.floats(-4, 4), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+    place=st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(2, 9)),
+    delta=st.sampled_from([0.3, 1.0, 2.5]),
+)
+@hypothesis_settings(max_examples=25)
+def test_wherever_it_hangs(angles, place, delta):
+    caster = make_ray_caster(SITE.triangles, ANY)
+    xyz, orientation = np.array(place), turned(*angles)
+    seen = Onlooker(SITE, replace(SIGHT, delta=delta), caster).see(MODEL, xyz, orientation)
+    assert (seen == by_full_scan(caster, MODEL, xyz, orientation, delta)).all()
+
+
+def test_a_level_sensor_sees_what_its_candidate_sees():
+    grid = finish(compute_visibility(SITE, MODELS, SIGHT, ANY)).visible
+    looks = onlooker(SITE, SIGHT, ANY)
+    poses = SITE.candidates
+    for pose in range(0, len(poses), 5):
+        model = MODELS[str(poses.sensor[pose])]
+        seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
+        assert (seen == grid[pose]).all()
+
+
+def test_a_sensor_that_looks_up_sees_no_road(caster):
+    upside = turned(0.0, 0.0, math.pi)
+    narrow = replace(MODEL, elevations=np.radians(np.linspace(-60, -30, 16)))
+    assert Onlooker(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), np.eye(3)).any()
+    assert not Onlooker(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), upside).any()
