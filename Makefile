@@ -3,7 +3,7 @@
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
 # make detection   install PyTorch, for the detector; make test-detection tests it
-# make study       redo the study on the shipped junction: coverage, then detection (an hour)
+# make study       redo the study on the shipped junction: coverage, then detection (half an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)

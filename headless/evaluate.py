@@ -3,7 +3,7 @@
 python -m headless.evaluate scenes/junction.blend -o out/evaluation
 blender -b --python-exit-code 1 site.blend -P headless/evaluate.py -- --traffic run-*.npz -o out/evaluation
 
-Needs torch (pip install --group detection). An evaluation that was stopped goes on where it was.
+Needs torch (make detection). An evaluation that was stopped goes on where it was.
 """
 
 from __future__ import annotations
