@@ -12,8 +12,10 @@ PARTS = (
     "properties",
     "state",
     "operators.work",
+    "operators.site",
     "operators.visibility",
     "operators.placement",
+    "panels.site",
     "panels.visibility",
     "panels.placement",
 )
