@@ -15,7 +15,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from .core.candidates import CandidateSettings, heights_of
+from .core.candidates import HIGHEST, CandidateSettings, heights_of
 from .core.goal import DEFAULT_COUNT, Goal
 from .core.scene_geometry import DEFAULT_WEIGHT
 from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
@@ -114,7 +114,17 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     """How the site is laid out and when a target counts as seen."""
 
     types: CollectionProperty(type=SEIP_PG_sensor_type)
-    active_type: IntProperty(name="Sensor type")
+    active_type: IntProperty(name="Sensor type", description="The type whose details are shown")
+    preview_height: FloatProperty(
+        name="Preview Height",
+        description="Of the previewed sensor above the 3D cursor",
+        unit="LENGTH",
+        default=5.4,
+        min=0.1,
+        max=HIGHEST,
+        soft_max=20.0,
+        step=10,
+    )
     heights: StringProperty(
         name="Heights (m)",
         description="Mounting heights above the ground in metres, like 3.5 5.4 8, or a range FROM:TO:STEP",
