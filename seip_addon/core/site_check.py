@@ -408,7 +408,8 @@ def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> I
 
 def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) -> Iterator[Problem]:
     rings = [ring for part in shapely.get_parts(road) if part.geom_type == "Polygon" for ring in part.interiors]
-    holes = [hole for hole in shapely.polygons(rings) if LEAST_HOLE < hole.area <= HOLE and hole.intersects(region)]
+    areas = [shapely.Polygon(ring) for ring in rings]
+    holes = [hole for hole in areas if LEAST_HOLE < hole.area <= HOLE and hole.intersects(region)]
     if holes:
         largest = max(holes, key=lambda hole: float(hole.area))
         yield Problem(

@@ -39,15 +39,13 @@ class SEIP_UL_sensor_types(bpy.types.UIList):
         model = sensor_types.known.get(item.name)
         row = layout.row(align=True)
         row.prop(item, "use", text="")
-        split = row.split(factor=0.34)
+        split = row.split(factor=0.36)
         split.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
-        figures = split.row()
-        if model is None:
-            figures.label(text="not in the catalogue")
-        else:
-            figures.label(text=f"{model.channels} ch")
-            figures.label(text=f"{model.max_range:g} m")
-            figures.label(text=f"${model.price / 1000:,.3g}k")
+        split.label(text=_in_short(model) if model else "unknown", translate=False)
+
+
+def _in_short(model: LidarModel) -> str:
+    return f"{model.channels} ch · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
 
 
 class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
@@ -74,11 +72,10 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
             draw_sentence(layout, "Types 1 to 3 of the study are used.", icon="INFO")
             layout.operator(SEIP_OT_list_sensor_types.bl_idname, text="Choose Types")
         else:
-            row = layout.row()
-            row.template_list(SEIP_UL_sensor_types.bl_idname, "", survey, "types", survey, "active_type", rows=5)
-            column = row.column(align=True)
-            column.operator(SEIP_OT_add_catalogue.bl_idname, text="", icon="ADD")
-            column.operator(SEIP_OT_list_sensor_types.bl_idname, text="", icon="FILE_REFRESH")
+            layout.template_list(SEIP_UL_sensor_types.bl_idname, "", survey, "types", survey, "active_type", rows=5)
+            row = layout.row(align=True)
+            row.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
+            row.operator(SEIP_OT_list_sensor_types.bl_idname, text="", icon="FILE_REFRESH")
             if not any(one.use for one in survey.types):
                 draw_sentence(layout, "Use at least one type.", icon="ERROR", alert=True)
         column = layout.column()

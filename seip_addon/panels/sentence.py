@@ -6,7 +6,7 @@ import textwrap
 
 import bpy
 
-PIXELS_PER_LETTER = 7.0
+PIXELS_PER_LETTER = 6.3
 """Of Blender's font at a scale of one, about, with its margins."""
 MARGIN = 50.0
 """Pixels of a panel's frame, scroll bar and icon."""

@@ -151,10 +151,7 @@ class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
                 draw_sentence(layout, site.problems[site.active_problem].text)
                 layout.operator(SEIP_OT_show_problem.bl_idname, icon="ZOOM_SELECTED")
         for one in site.counts:
-            column = layout.column(align=True)
-            column.scale_y = 0.8
-            column.label(text=one.name)
-            column.label(text=one.value, icon="BLANK1")
+            draw_sentence(layout, f"{one.name}: {one.value}")
 
 
 CLASSES = (SEIP_PT_site, SEIP_PT_site_map, SEIP_PT_site_roles, SEIP_UL_problems, SEIP_PT_site_check)

@@ -44,7 +44,7 @@ def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap:
     axes : (3, 3) float64
         Columns are the sensor's x, y and z axis.
     ground : float, metres
-        Height of the road; no beam meets it from below.
+        Height of the road.
     gap : float, metres
         Distance of neighbouring rings up to which they are dense: twice δ.
     """

@@ -1,2 +1,0 @@
-def test_it_registers(add_on):
-    pass
