@@ -90,8 +90,8 @@ def catalogue() -> dict[str, LidarModel]:
 
 
 def add_catalogue(path: str) -> None:
-    """Keep the name of a catalogue."""
-    own().catalogues.add().path = path
+    """Keep the name of a catalogue, where the add-on has preferences."""
+    _files().add().path = path
     bpy.context.preferences.is_dirty = True
 
 
@@ -103,11 +103,18 @@ def remove_catalogue(number: int) -> None:
     SeipError
         There is none of that number.
     """
-    files = own().catalogues
+    files = _files()
     if number >= len(files):
         raise SeipError(f"there is no catalogue {number}: there are {len(files)}, counted from 0")
     files.remove(number)
     bpy.context.preferences.is_dirty = True
+
+
+def _files() -> bpy.types.bpy_prop_collection:
+    preferences = own()
+    if preferences is None:
+        raise SeipError("the add-on has no preferences to keep catalogues in: install it as an extension")
+    return preferences.catalogues
 
 
 def _kept() -> GridFolder:

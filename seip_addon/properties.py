@@ -55,9 +55,7 @@ def _show_problem(site: SEIP_PG_site, context: bpy.types.Context) -> None:
         bpy.ops.seip.show_problem()
 
 
-ROLE_ITEMS = tuple(
-    (role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES
-)
+ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
 
 
 class SEIP_PG_site(bpy.types.PropertyGroup):
@@ -101,7 +99,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         if not self.junction:
             return None
         found = self.junctions.get(self.junction)
-        return self.junction if found is None else found.id
+        return str(self.junction if found is None else found.id)
 
 
 class SEIP_PG_sensor_type(bpy.types.PropertyGroup):

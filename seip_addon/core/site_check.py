@@ -15,7 +15,7 @@ from .arrays import Float
 from .errors import SeipError
 from .plan_geometry import heights_over, outline, signed_area, surface_height
 from .progress import Progress
-from .scene_geometry import Pole, SceneGeometry, joined
+from .scene_geometry import Pole, SceneGeometry
 from .site import Site
 from .storage import digest
 from .targets import lay_targets
@@ -113,12 +113,15 @@ class SceneContents:
         Where all is there that a survey needs.
     problems : tuple of Problem
         That showed as it was read.
+    complaint : str
+        Why there is no geometry; empty where there is.
     """
 
     surfaces: tuple[Surface, ...]
     poles: tuple[Pole, ...]
     geometry: SceneGeometry | None
     problems: tuple[Problem, ...]
+    complaint: str = ""
 
 
 @dataclass(frozen=True)
@@ -167,6 +170,8 @@ def check_site(
         else:
             counts |= _site_counts(site)
             problems += [Problem("WARNING", text) for text in warnings]
+    elif not any(problem.severity == "ERROR" for problem in problems):
+        problems.append(Problem("ERROR", contents.complaint, _named_in(contents.complaint, contents)))
     yield Progress(STAGES, STAGES, "candidates")
     return SiteCheck(counts, _in_order(problems))
 
@@ -337,7 +342,10 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
     above = feet[:, 2] - surface_height(feet[:, :2], under) if len(under) else np.full(len(feet), np.nan)
     yield from _named(
         [
-            (pole.name, f"The origin of the pole {pole.name!r} is {_level(high)} the ground: set it to the post's foot.")
+            (
+                pole.name,
+                f"The origin of the pole {pole.name!r} is {_level(high)} the ground: set it to the post's foot.",
+            )
             for pole, high in zip(poles, above, strict=True)
             if abs(high) > OFF_GROUND
         ],
@@ -431,8 +439,8 @@ def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[P
         point = shapely.Point(places[first[worst], :2])
         yield Problem(
             "WARNING",
-            f"The road has steps or slopes over {STEP:.0%} at {_number(len(steep), 'place')}, up to {rise[worst]:.2g} m "
-            f"at {_place(point)}: targets there lie on what is no road, unless it is a bridge's edge.",
+            f"The road has steps or slopes over {STEP:.0%} at {_number(len(steep), 'place')}, up to "
+            f"{rise[worst]:.2g} m at {_place(point)}: targets there lie on no road, unless it is a bridge's edge.",
             _nearest_road(contents, point),
         )
 

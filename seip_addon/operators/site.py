@@ -14,7 +14,7 @@ from ..core.opendrive.road_map import RoadMap
 from ..core.progress import Progress, finish
 from ..core.scene_geometry import SceneGeometry
 from ..core.site import Site
-from ..core.site_check import Problem, SceneContents, SiteCheck, check_site
+from ..core.site_check import Problem, SiteCheck, check_site
 from ..core.streetscape.description import DESCRIPTION_SUFFIX, describe_place
 from ..core.streetscape.model import SiteModel, site_model
 from ..core.streetscape.parts import Role
@@ -237,13 +237,8 @@ class SEIP_OT_add_area(bpy.types.Operator):
         middle = context.scene.cursor.location.copy()
         if self.place == "VIEW" and context.region_data is not None:
             middle.xy = context.region_data.view_location.xy
-        thing = roles.add_area(
-            context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners
-        )
-        for other in context.selected_objects:
-            other.select_set(False)
-        thing.select_set(True)
-        context.view_layer.objects.active = thing
+        thing = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
+        _select_alone(context, thing)
         return {"FINISHED"}
 
 
@@ -311,10 +306,7 @@ class SEIP_OT_show_problem(bpy.types.Operator):
         """Select it alone, and frame it."""
         site = context.scene.seip.site
         thing = context.view_layer.objects[site.problems[site.active_problem].name]
-        for other in context.selected_objects:
-            other.select_set(False)
-        thing.select_set(True)
-        context.view_layer.objects.active = thing
+        _select_alone(context, thing)
         _frame_selected(context)
         return {"FINISHED"}
 
@@ -335,8 +327,15 @@ def nothing_to_show(context: bpy.types.Context) -> str:
     return "" if context.mode == "OBJECT" else "Leave Edit Mode first"
 
 
+def _select_alone(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    for other in context.selected_objects:
+        other.select_set(state=False)
+    thing.select_set(state=True)
+    context.view_layer.objects.active = thing
+
+
 def _frame_selected(context: bpy.types.Context) -> None:
-    """Bring what is selected into each 3D view of the window that can be asked to."""
+    """Bring what is selected into the 3D view that was clicked in."""
     area = context.area
     if area is None or area.type != "VIEW_3D":
         return

@@ -148,7 +148,9 @@ class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
         if preview is None:
             return
         draw_sentence(layout, f"{preview.model.key} at {preview.height:.3g} m")
-        draw_sentence(layout, f"Blue: within 2δ = {2 * preview.delta:.3g} m of the next ring inwards", icon="COLORSET_04_VEC")
+        draw_sentence(
+            layout, f"Blue: within 2δ = {2 * preview.delta:.3g} m of the next ring inwards", icon="COLORSET_04_VEC"
+        )
         draw_sentence(layout, "Orange: farther apart; road between may go unseen", icon="COLORSET_02_VEC")
         draw_sentence(layout, f"On a level road all is within 2δ up to {preview.resolved_to():.0f} m.")
 

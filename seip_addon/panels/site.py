@@ -33,7 +33,9 @@ class SEIP_PT_site(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Say what there is to begin with."""
         if not has_site(context.scene):
-            draw_sentence(self.layout, "Build a site from a map, or assign roles to the objects of your own.", icon="INFO")
+            draw_sentence(
+                self.layout, "Build a site from a map, or assign roles to the objects of your own.", icon="INFO"
+            )
 
 
 class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
@@ -124,7 +126,7 @@ class SEIP_UL_problems(bpy.types.UIList):
         _active_data: SEIP_PG_site,
     ) -> None:
         """Draw one."""
-        layout.label(text=item.text, icon="CANCEL" if item.is_error else "ERROR", translate=False)
+        layout.label(text=item.name or item.text, icon="CANCEL" if item.is_error else "ERROR", translate=False)
 
 
 class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
@@ -145,7 +147,13 @@ class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
             layout.label(text="No problem found", icon="CHECKMARK")
         else:
             layout.template_list(
-                SEIP_UL_problems.bl_idname, "", site, "problems", site, "active_problem", rows=min(5, len(site.problems))
+                SEIP_UL_problems.bl_idname,
+                "",
+                site,
+                "problems",
+                site,
+                "active_problem",
+                rows=min(5, len(site.problems)),
             )
             if 0 <= site.active_problem < len(site.problems):
                 draw_sentence(layout, site.problems[site.active_problem].text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
@@ -60,19 +60,16 @@ def contents_of(scene: bpy.types.Scene) -> SceneContents:
         if part.triangles is not None
     )
     problems += _without_role(scene, members, surfaces)
-    geometry = None
-    if not any(problem.severity == "ERROR" for problem in problems):
-        geometry, complaint = _tried(lambda: geometry_of(scene, parts, {}).geometry)
-        problems += complaint
-    return SceneContents(surfaces, _poles(parts), geometry, tuple(problems))
+    geometry, complaint = _geometry(scene, parts)
+    return SceneContents(surfaces, _poles(parts), geometry, tuple(problems), complaint)
 
 
-def _tried(read: Callable[[], SceneGeometry]) -> tuple[SceneGeometry | None, list[Problem]]:
-    """Return what a reading gives; that the region or the road is missing is found again by the check itself."""
+def _geometry(scene: bpy.types.Scene, parts: list[Shown]) -> tuple[SceneGeometry | None, str]:
+    """Return what a survey would read, or its complaint."""
     try:
-        return read(), []
-    except SeipError:
-        return None, []
+        return geometry_of(scene, parts, {}).geometry, ""
+    except SeipError as error:
+        return None, str(error)
 
 
 def _faults(parts: list[Shown]) -> Iterator[Problem]:
@@ -86,15 +83,15 @@ def _faults(parts: list[Shown]) -> Iterator[Problem]:
             yield _error(f"{part.name!r} in {min(surfaces)!r} has no faces: give it some or take it out", part)
         for name in NAMED_AREAS:
             if name in part.collections and part.triangles is not None:
-                yield from _complaints(lambda part=part, name=name: area_of(part, name), part)
+                yield from _area_complaints(part, name)
     for part in parts:
         if contract.POLES in part.collections and not np.isfinite(part.matrix).all() and not part.fault:
             yield _error(f"pole {part.name!r} stands at a place that is no finite number: set its location", part)
 
 
-def _complaints(work: Callable[[], object], part: Shown) -> Iterator[Problem]:
+def _area_complaints(part: Shown, collection: str) -> Iterator[Problem]:
     try:
-        work()
+        area_of(part, collection)
     except SeipError as error:
         yield _error(str(error), part)
 

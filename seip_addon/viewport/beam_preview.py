@@ -99,7 +99,7 @@ def redraw() -> None:
 
 
 def preview_of(context: bpy.types.Context) -> Preview | None:
-    """Return whose beams to show: the active sensor's, else the active type's at the 3D cursor; None for no known type."""
+    """Return whose beams to show: the active sensor's, else the active type's at the 3D cursor; None if unknown."""
     scene = context.scene
     survey = scene.seip.survey
     active = context.object
@@ -115,7 +115,7 @@ def preview_of(context: bpy.types.Context) -> Preview | None:
     model = sensor_types.known.get(survey.types[survey.active_type].name)
     if model is None:
         return None
-    place = np.array(scene.cursor.location, dtype=np.float64) + (0.0, 0.0, survey.preview_height)
+    place = np.add(scene.cursor.location, (0.0, 0.0, survey.preview_height))
     return Preview(model, place, np.eye(3), float(survey.preview_height), float(survey.delta))
 
 

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from headless import build_scene
+
 import bpy
 import numpy as np
 import pytest
-from headless import build_scene
 
 from seip_addon.scene import contract
 from seip_addon.scene.read import read_scene

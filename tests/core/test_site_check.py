@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
+from seip_addon.core.plan_geometry import outline
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import Pole
+from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
+from seip_addon.core.site import make_site
 from seip_addon.core.site_check import Problem, SceneContents, Surface, check_site
 
 
@@ -21,12 +24,22 @@ def sheet(low_x, low_y, high_x, high_y, z=0.0):
 ROAD = Surface("roads", "road", sheet(-50, -4, 50, 4))
 REGION = Surface("region", "region", sheet(-30, -5, 30, 5, 0.03))
 PAVEMENT = Surface("candidate_areas", "pavement", sheet(-50, 4, 50, 7))
-SOUND = SceneContents((ROAD, REGION, PAVEMENT), (), None, ())
+GEOMETRY = SceneGeometry(
+    name="street",
+    origin=np.zeros(3),
+    roads=(Mesh("road", ROAD.triangles),),
+    ground=(Mesh("pavement", PAVEMENT.triangles),),
+    occluders=(),
+    region=outline(REGION.triangles),
+    candidate_areas=outline(PAVEMENT.triangles),
+)
+SITE = make_site(GEOMETRY, CandidateSettings(heights=(8.0,), spacing=12.0), 4.0)
+SOUND = SceneContents((ROAD, REGION, PAVEMENT), (), GEOMETRY, ())
 
 
 def checked(*surfaces, poles=(), problems=()):
-    contents = SceneContents(tuple(surfaces), tuple(poles), None, tuple(problems))
-    return finish(check_site(contents, lambda geometry: pytest.fail("there is no geometry to lay out")))
+    contents = SceneContents(tuple(surfaces), tuple(poles), GEOMETRY, tuple(problems))
+    return finish(check_site(contents, lambda _: (SITE, ())))
 
 
 def found(*surfaces, poles=()):
@@ -34,7 +47,7 @@ def found(*surfaces, poles=()):
 
 
 def moved(surface, x=0.0, y=0.0, z=0.0, name=None):
-    return dataclasses.replace(surface, triangles=surface.triangles + (x, y, z), name=name or surface.name)
+    return dataclasses.replace(surface, triangles=np.add(surface.triangles, (x, y, z)), name=name or surface.name)
 
 
 def one(problems, words):
@@ -53,6 +66,8 @@ def test_everything_is_counted():
     assert counts["Road in the region"] == "480 m²"
     assert counts["Candidate area"] == "300 m²"
     assert counts["Poles"] == "1 pole, 1 mandatory"
+    assert counts["Targets"] == f"{len(SITE.targets)}, 0 in weighted regions"
+    assert counts["Poses"] == f"{len(SITE.candidates)}"
 
 
 def test_what_is_missing_stops_a_survey():
@@ -144,9 +159,14 @@ def test_what_the_layout_says_is_listed_with_its_object():
     def lay_out(_geometry):
         raise SeipError("mandatory pole 'post' stands in a forbidden area")
 
-    contents = dataclasses.replace(SOUND, geometry="any", poles=(Pole("post", np.array((0.0, 5.0, 0.0))),))
+    contents = dataclasses.replace(SOUND, poles=(Pole("post", np.array((0.0, 5.0, 0.0))),))
     (problem,) = finish(check_site(contents, lay_out)).problems
     assert problem == Problem("ERROR", "mandatory pole 'post' stands in a forbidden area", "post")
+
+
+def test_what_cannot_be_read_is_an_error_even_where_nothing_else_is_found():
+    contents = dataclasses.replace(SOUND, geometry=None, complaint="object 'road' is odd")
+    assert finish(check_site(contents, None)).problems == (Problem("ERROR", "object 'road' is odd", "road"),)
 
 
 def test_errors_come_first_and_each_once():

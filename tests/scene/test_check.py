@@ -3,10 +3,10 @@
 import bpy
 import pytest
 
+from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site import make_site
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.site_check import check_site
 from seip_addon.scene import contract
 from seip_addon.scene.check import contents_of

@@ -209,7 +209,8 @@ def describe_place(
         As for `read_site_description`; no map is named, or a number makes no sense.
     """
     described = _described(source, site)
-    if described.map is None:
+    map_path = described.map
+    if map_path is None:
         raise SeipError(f'{source} names no map: add map = "file.xodr" to it, or give the map and the description')
     if near is not None or junction is not None:
         if near is not None and not all(map(math.isfinite, near)):
@@ -219,7 +220,7 @@ def describe_place(
         if not 0 < radius < math.inf:
             raise SeipError(f"the radius must be above 0 m, not {radius:g}")
         described = replace(described, radius=radius, region=None)
-    return described.map, described
+    return map_path, described
 
 
 def _described(source: Path, site: Path | None) -> SiteDescription:
