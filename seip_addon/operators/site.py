@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
+from .. import sensor_types
 from ..core.errors import SeipError
 from ..core.opendrive import read_map
 from ..core.opendrive.road_map import RoadMap
@@ -111,6 +112,7 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
                 one = built.seip.site.junctions.add()
                 one.name, one.id = junction.name, junction.id
             built.seip.site.junction = chosen.junction
+            sensor_types.list_types(built)
         finish(build_scene(built, result.model, result.map_name))
         if bpy.context.window is not None:
             bpy.context.window.scene = built

@@ -39,13 +39,13 @@ class SEIP_UL_sensor_types(bpy.types.UIList):
         model = sensor_types.known.get(item.name)
         row = layout.row(align=True)
         row.prop(item, "use", text="")
-        split = row.split(factor=0.36)
+        split = row.split(factor=0.38)
         split.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
         split.label(text=_in_short(model) if model else "unknown", translate=False)
 
 
 def _in_short(model: LidarModel) -> str:
-    return f"{model.channels} ch · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
+    return f"{model.channels} · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
 
 
 class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
@@ -72,6 +72,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
             draw_sentence(layout, "Types 1 to 3 of the study are used.", icon="INFO")
             layout.operator(SEIP_OT_list_sensor_types.bl_idname, text="Choose Types")
         else:
+            draw_sentence(layout, "Channels · range · middle price")
             layout.template_list(SEIP_UL_sensor_types.bl_idname, "", survey, "types", survey, "active_type", rows=5)
             row = layout.row(align=True)
             row.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")

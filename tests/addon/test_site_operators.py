@@ -76,6 +76,7 @@ def test_a_scene_that_has_a_site_keeps_it(scene):
     assert contract.find(other, contract.ROADS) != contract.find(scene, contract.ROADS)
     assert other.seip.site.source == scene.seip.site.source
     assert [one.id for one in other.seip.site.junctions] == ["100"]
+    assert [one.name for one in other.seip.survey.types] == [one.name for one in scene.seip.survey.types]
 
 
 @pytest.mark.parametrize(

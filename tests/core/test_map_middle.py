@@ -16,8 +16,8 @@ from seip_addon.core.streetscape.road_surface import _line
 def test_the_middle_lies_on_a_road(tmp_path):
     angle = [road(geometry(length=200.0)), road(geometry(length=80.0, hdg=np.pi / 2), number="2")]
     x, y = read_text(tmp_path, document(*angle)).middle()
-    assert (x, y) == pytest.approx((0.0, 40.0), abs=10.0)
-    assert min(abs(x), abs(y)) < 1e-9
+    assert (x, y) == pytest.approx((100.0, 0.0), abs=10.0)
+    assert y == 0.0
 
 
 def test_the_middle_of_a_street_is_its_middle(tmp_path):
