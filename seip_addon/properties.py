@@ -114,7 +114,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     types: CollectionProperty(type=SEIP_PG_sensor_type)
     active_type: IntProperty(name="Sensor type", description="The type whose details are shown")
     preview_height: FloatProperty(
-        name="Preview Height",
+        name="Height",
         description="Of the previewed sensor above the 3D cursor",
         unit="LENGTH",
         default=5.4,

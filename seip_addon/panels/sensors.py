@@ -119,11 +119,11 @@ def _figures(model: LidarModel) -> list[tuple[str, str]]:
     cheap, dear = model.price_range
     return [
         ("Channels", f"{model.channels}"),
-        ("Elevations", f"{low:.4g}° to {high:.4g}°"),
-        ("Range", f"{model.min_range:g} to {model.max_range:g} m"),
+        ("Elevations", f"{low:.4g}…{high:.4g}°"),
+        ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
         ("Points", f"{model.points_per_second:,.0f} /s"),
         ("Rotation", f"{model.rotation_rate:g} Hz"),
-        ("Azimuth step", f"{360 / model.azimuth_count:.2g}°"),
+        ("Azimuth", f"{360 / model.azimuth_count:.2g}°"),
         ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}–{dear:,.0f}"),
     ]
 
