@@ -8,8 +8,6 @@ python -m headless.build_scene site.toml -o site.blend
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import math
 import sys
 from pathlib import Path
 
@@ -18,10 +16,9 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.streetscape.description import SiteDescription, read_site_description
+from seip_addon.core.streetscape.description import describe_place
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
@@ -30,13 +27,14 @@ from seip_addon.scene.build import build_scene
 def main(argv: list[str]) -> None:
     """Read the map and the site description, model the site and save it."""
     asked = _parser().parse_args(argv)
-    description = _description(asked)
-    if description.map is None:
-        raise SeipError(f'{asked.source} names no map: add map = "file.xodr" to it, or give the map and --site')
+    near = None if asked.near is None else (asked.near[0], asked.near[1])
+    map_path, description = describe_place(
+        asked.source, site=asked.site, near=near, junction=asked.junction, radius=asked.radius
+    )
     check_name(asked.output)
     with session.progress_bar() as report:
-        model = finish(site_model(read_map(description.map), description), report)
-        finish(build_scene(new_file(), model, description.map.name), report)
+        model = finish(site_model(read_map(map_path), description), report)
+        finish(build_scene(new_file(), model, map_path.name), report)
     save_blend(asked.output)
     for note in model.notes:
         sys.stdout.write(f"note: {note}\n")
@@ -59,27 +57,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="BLEND", help="the .blend to write")
     return parser
-
-
-def _description(asked: argparse.Namespace) -> SiteDescription:
-    """Return the site description, with what the command line says in its place."""
-    if asked.source.suffix.lower() == ".toml":
-        if asked.site is not None:
-            raise SeipError(f"{asked.source} is a site description already; leave --site out")
-        description = read_site_description(asked.source)
-    else:
-        described = SiteDescription() if asked.site is None else read_site_description(asked.site)
-        description = dataclasses.replace(described, map=asked.source)
-    if asked.near is not None or asked.junction is not None:
-        near = None if asked.near is None else (asked.near[0], asked.near[1])
-        if near is not None and not all(map(math.isfinite, near)):
-            raise SeipError("--near must be two numbers, x and y in metres")
-        description = dataclasses.replace(description, near=near, junction=asked.junction, region=None)
-    if asked.radius is not None:
-        if not 0 < asked.radius < math.inf:
-            raise SeipError(f"--radius must be above 0 m, not {asked.radius:g}")
-        description = dataclasses.replace(description, radius=asked.radius, region=None)
-    return description
 
 
 if __name__ == "__main__":

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
 
+from .core.errors import SeipError
 from .core.lidar import LidarModel, load_catalogue
+from .core.visibility import ray_casting
+from .core.visibility.store import GridFolder
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
 """The extension's key among Blender's add-ons: not that of the package in it."""
@@ -20,11 +24,23 @@ class SEIP_PG_catalogue_file(bpy.types.PropertyGroup):
     )
 
 
+def _use_cores(preferences: SEIP_AP_preferences, _context: bpy.types.Context) -> None:
+    ray_casting.use_threads(preferences.cores)
+
+
 class SEIP_AP_preferences(bpy.types.AddonPreferences):
     """Preferences of the add-on."""
 
     bl_idname = ADDON_ID
 
+    cores: bpy.props.IntProperty(
+        name="Cores",
+        description="Processor cores that cast rays at once; more than four rarely help",
+        default=ray_casting.most_threads(),
+        min=1,
+        max=max(1, os.cpu_count() or 1),
+        update=_use_cores,
+    )
     cache: bpy.props.StringProperty(
         name="Cache",
         subtype="DIR_PATH",
@@ -34,16 +50,28 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the preferences."""
-        self.layout.prop(self, "cache")
-        for file in self.catalogues:
-            self.layout.prop(file, "path")
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "cores")
+        layout.prop(self, "cache")
+        row = layout.row()
+        row.label(text=f"Kept visibility: {_kept().megabytes():,.1f} MB")
+        row.operator("seip.empty_cache", icon="TRASH")
+        layout.label(text="Catalogues of sensor types")
+        for number, file in enumerate(self.catalogues):
+            row = layout.row(align=True)
+            row.prop(file, "path", text="")
+            row.operator("seip.remove_catalogue", text="", icon="X").index = number
+        row = layout.row(align=True)
+        row.operator("seip.add_catalogue", icon="ADD")
+        row.operator("seip.list_sensor_types", icon="FILE_REFRESH")
 
 
 def cache_folder() -> Path:
     """Return the folder in which visibility is kept."""
-    own = _preferences()
-    if own is not None and own.cache:
-        return Path(bpy.path.abspath(own.cache))
+    preferences = own()
+    if preferences is not None and preferences.cache:
+        return Path(bpy.path.abspath(preferences.cache))
     if ADDON_ID.startswith("bl_ext."):
         return Path(bpy.utils.extension_path_user(ADDON_ID, path="visibility", create=True))
     return Path(bpy.utils.resource_path("USER")) / "seip" / "visibility"  # run from a checkout
@@ -51,8 +79,9 @@ def cache_folder() -> Path:
 
 def catalogue_files() -> tuple[Path, ...]:
     """Return the user's own catalogues."""
-    own = _preferences()
-    return () if own is None else tuple(Path(bpy.path.abspath(file.path)) for file in own.catalogues if file.path)
+    preferences = own()
+    files = () if preferences is None else preferences.catalogues
+    return tuple(Path(bpy.path.abspath(file.path)) for file in files if file.path)
 
 
 def catalogue() -> dict[str, LidarModel]:
@@ -60,9 +89,59 @@ def catalogue() -> dict[str, LidarModel]:
     return load_catalogue(catalogue_files())
 
 
-def _preferences() -> SEIP_AP_preferences | None:
+def add_catalogue(path: str) -> None:
+    """Keep the name of a catalogue, where the add-on has preferences."""
+    _files().add().path = path
+    bpy.context.preferences.is_dirty = True
+
+
+def remove_catalogue(number: int) -> None:
+    """Forget a catalogue.
+
+    Raises
+    ------
+    SeipError
+        There is none of that number.
+    """
+    files = _files()
+    if number >= len(files):
+        raise SeipError(f"there is no catalogue {number}: there are {len(files)}, counted from 0")
+    files.remove(number)
+    bpy.context.preferences.is_dirty = True
+
+
+def _files() -> bpy.types.bpy_prop_collection:
+    preferences = own()
+    if preferences is None:
+        raise SeipError("the add-on has no preferences to keep catalogues in: install it as an extension")
+    return preferences.catalogues
+
+
+def _kept() -> GridFolder:
+    return GridFolder(cache_folder())
+
+
+def empty_cache() -> int:
+    """Delete all visibility that is kept, and return how many files there were."""
+    return _kept().empty()
+
+
+def why_not_empty() -> str:
+    """Say why the cache cannot be emptied, or nothing."""
+    return "" if _kept().megabytes() else "The cache is empty"
+
+
+def own() -> SEIP_AP_preferences | None:
+    """Return the add-on's preferences; None where it was not enabled as an add-on."""
     add_on = bpy.context.preferences.addons.get(ADDON_ID)
     return None if add_on is None else add_on.preferences
 
 
 CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)
+
+
+def attach() -> None:
+    """Use as many cores as the user allows."""
+    preferences = own()
+    if preferences is not None:
+        ray_casting.use_threads(preferences.cores)

@@ -15,16 +15,91 @@ from bpy.props import (
     StringProperty,
 )
 
-from .core.candidates import CandidateSettings, heights_of
+from .core.candidates import HIGHEST, CandidateSettings, heights_of
 from .core.goal import DEFAULT_COUNT, Goal
+from .core.scene_geometry import DEFAULT_WEIGHT
+from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from .core.survey import SurveySettings
 from .core.visibility.grid import VisibilitySettings
 from .preferences import catalogue_files
+from .scene import contract, roles
 
 VERSION = 1
 """Of the layout of these properties: a file with a higher one was saved by a newer add-on."""
 
 _LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
+
+
+class SEIP_PG_junction(bpy.types.PropertyGroup):
+    """A junction of the chosen map; its name is what the list shows."""
+
+    id: StringProperty(name="Id", description="Of the junction, as in the map")
+
+
+class SEIP_PG_count(bpy.types.PropertyGroup):
+    """Something that the check counted; its name is what."""
+
+    value: StringProperty(name="Count", description="How much there is")
+
+
+class SEIP_PG_problem(bpy.types.PropertyGroup):
+    """Something that the check found; its name is the object to look at, or empty."""
+
+    is_error: BoolProperty(name="Error", description="Whether a survey cannot go on")
+    text: StringProperty(name="Problem", description="What is wrong, and the cure")
+
+
+def _show_problem(site: SEIP_PG_site, context: bpy.types.Context) -> None:
+    """Select what was clicked at, and frame it; a problem of the scene has nothing to show."""
+    if site.problems[site.active_problem].name and context.area is not None and bpy.ops.seip.show_problem.poll():
+        bpy.ops.seip.show_problem()
+
+
+ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
+
+
+class SEIP_PG_site(bpy.types.PropertyGroup):
+    """Where the site comes from, and what the check found in it."""
+
+    source: StringProperty(
+        name="Map",
+        description="OpenDRIVE map, or site description that names one",
+        subtype="FILE_PATH",
+    )
+    junctions: CollectionProperty(type=SEIP_PG_junction)
+    junction: StringProperty(
+        name="Junction",
+        description="In the middle of the site; empty for the middle of the map, or the description's own place",
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="Of the region of interest",
+        unit="LENGTH",
+        default=DEFAULT_RADIUS,
+        min=1.0,
+        soft_max=500.0,
+        step=1000,
+    )
+    role: EnumProperty(name="Role", description="What objects mean to the placement", items=ROLE_ITEMS)
+    checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")
+    counts: CollectionProperty(type=SEIP_PG_count)
+    problems: CollectionProperty(type=SEIP_PG_problem)
+    active_problem: IntProperty(
+        name="Problem",
+        description="Click to select the object and bring it into view",
+        update=_show_problem,
+    )
+
+    def is_described(self) -> bool:
+        """Return whether a site description says where the place is, and how large."""
+        return self.source.lower().endswith(DESCRIPTION_SUFFIX) and not self.junction
+
+    def junction_id(self) -> str | None:
+        """Return the id of the chosen junction, what was typed where the map has no such, None where none is chosen."""
+        if not self.junction:
+            return None
+        found = self.junctions.get(self.junction)
+        return str(self.junction if found is None else found.id)
 
 
 class SEIP_PG_sensor_type(bpy.types.PropertyGroup):
@@ -37,7 +112,17 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     """How the site is laid out and when a target counts as seen."""
 
     types: CollectionProperty(type=SEIP_PG_sensor_type)
-    active_type: IntProperty(name="Sensor type")
+    active_type: IntProperty(name="Sensor type", description="The type whose details are shown")
+    preview_height: FloatProperty(
+        name="Height",
+        description="Of the previewed sensor above the 3D cursor",
+        unit="LENGTH",
+        default=5.4,
+        min=0.1,
+        max=HIGHEST,
+        soft_max=20.0,
+        step=10,
+    )
     heights: StringProperty(
         name="Heights (m)",
         description="Mounting heights above the ground in metres, like 3.5 5.4 8, or a range FROM:TO:STEP",
@@ -251,6 +336,7 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
     version: IntProperty(name="Version", default=VERSION, options={"HIDDEN"})
+    site: PointerProperty(type=SEIP_PG_site)
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)
     result: PointerProperty(type=SEIP_PG_result)
@@ -262,6 +348,10 @@ def _written(value: float) -> float:
 
 
 CLASSES = (
+    SEIP_PG_junction,
+    SEIP_PG_count,
+    SEIP_PG_problem,
+    SEIP_PG_site,
     SEIP_PG_sensor_type,
     SEIP_PG_survey,
     SEIP_PG_position_rule,
@@ -271,11 +361,59 @@ CLASSES = (
 )
 
 
+def _weight(thing: bpy.types.Object) -> float:
+    value = thing.get(contract.WEIGHT, DEFAULT_WEIGHT)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number else DEFAULT_WEIGHT  # the check says what is wrong with it
+
+
+def _set_weight(thing: bpy.types.Object, value: float) -> None:
+    thing[contract.WEIGHT] = _written(value)
+
+
+_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
+
+
+def _rule(thing: bpy.types.Object) -> int:
+    return next((number for number, mark in enumerate(_RULES) if mark and thing.get(mark)), 0)
+
+
+def _set_rule(thing: bpy.types.Object, value: int) -> None:
+    for number, mark in enumerate(_RULES[1:], start=1):
+        if number == value:
+            thing[mark] = True
+        elif mark in thing:
+            del thing[mark]
+
+
 def attach() -> None:
-    """Give every scene its properties."""
+    """Give every scene its properties, and objects those that stand for the contract's custom properties."""
     bpy.types.Scene.seip = PointerProperty(type=SEIP_PG_scene)
+    bpy.types.Object.seip_region_weight = FloatProperty(
+        name="Weight",
+        description=f"How much each target in this region counts, where others count 1 ({contract.WEIGHT})",
+        get=_weight,
+        set=_set_weight,
+        min=0.001,
+        soft_max=10.0,
+        options=set(),
+    )
+    bpy.types.Object.seip_pole_rule = EnumProperty(
+        name="Rule",
+        description=f"What the placement does with this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
+        items=(
+            ("FREE", "Free", "It may carry a sensor"),
+            ("MANDATORY", "Sensor", "It must carry one"),
+            ("FORBIDDEN", "No Sensor", "It must carry none"),
+        ),
+        get=_rule,
+        set=_set_rule,
+        options=set(),
+    )
 
 
 def detach() -> None:
     """Take them away."""
+    del bpy.types.Object.seip_pole_rule
+    del bpy.types.Object.seip_region_weight
     del bpy.types.Scene.seip

@@ -40,12 +40,24 @@ class SceneReading:
 
 
 @dataclass(frozen=True)
-class _Shown:
+class Shown:
     """One object or instance as the viewport shows it.
 
-    ``source`` is what the user put into the scene: the object or what instances
-    it. ``own`` are the collections that the object itself is in, ``collections``
-    these and those of its source.
+    Parameters
+    ----------
+    name : str
+    own, collections : frozenset of str
+        The collections of the contract that the object itself is in; these and those of its source.
+    matrix : (4, 4) float64
+        From the object's axes to the site's.
+    triangles : (n, 3, 3) float64, metres, or None
+        In site axes; None where there are no faces, or faulty ones.
+    reflectivity : (n,) float64 or None
+        Of the triangles.
+    source : bpy.types.Object
+        What the user put into the scene: the object or what instances it.
+    fault : str
+        What is wrong with it, as a sentence; empty where nothing is.
     """
 
     name: str
@@ -55,6 +67,7 @@ class _Shown:
     triangles: Float | None
     reflectivity: Float | None
     source: bpy.types.Object
+    fault: str = ""
 
 
 def read_scene(scene: bpy.types.Scene) -> SceneReading:
@@ -78,8 +91,16 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
         none, has a coordinate that is no number, or has no area at all.
     """
     members = contract.members(scene)
-    _require_libraries(scene, members)
-    parts = list(_shown(scene, members))
+    for sentence in missing_libraries(scene, members).values():
+        raise SeipError(sentence)
+    return geometry_of(scene, list(shown_parts(scene, members)), hidden_members(scene, members))
+
+
+def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, list[str]]) -> SceneReading:
+    """Sort what a scene shows by what it means; see `read_scene`."""
+    for part in parts:
+        if part.fault:
+            raise SeipError(part.fault)
     region = outline(joined(_meshes(parts, contract.REGION)))
     if region.is_empty:
         raise SeipError(
@@ -109,27 +130,27 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
         weighted_regions=_areas(parts, contract.WEIGHTED_REGIONS),
         forbidden_areas=_areas(parts, contract.FORBIDDEN_AREAS),
         mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
-        poles=_poles(parts),
+        poles=poles_of(parts),
     )
-    return SceneReading(geometry, _hidden(scene, members))
+    return SceneReading(geometry, tuple(hidden_sentence(name, things) for name, things in hidden.items()))
 
 
-def _require_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> None:
-    """Refuse a scene that lacks a library: Blender shows nothing, or placeholders, in its place."""
+def missing_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> dict[str, str]:
+    """Say of each thing which library it lacks, by its name: Blender shows nothing, or a placeholder, in its place."""
     objects = set().union(*members.values())
     instanced = {item.instance_collection for item in objects if item.instance_collection is not None}
     objects.update(*(collection.all_objects for collection in instanced))
     data = {item.data for item in objects if item.data is not None}
-    for thing in (*scene.collection.children_recursive, *instanced, *objects, *data):
-        library = thing.library
-        if library is not None and not Path(bpy.path.abspath(library.filepath)).is_file():
-            raise SeipError(
-                f"{thing.name!r} is linked from {library.filepath}, which is not there: "
-                "bring the file back, relocate the library, or delete what is linked from it"
-            )
+    return {
+        thing.name: f"{thing.name!r} is linked from {thing.library.filepath}, which is not there: "
+        "bring the file back, relocate the library, or delete what is linked from it"
+        for thing in (*scene.collection.children_recursive, *instanced, *objects, *data)
+        if thing.library is not None and not Path(bpy.path.abspath(thing.library.filepath)).is_file()
+    }
 
 
-def _shown(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[_Shown]:
+def shown_parts(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[Shown]:
+    """Yield what the viewport shows of the members of collections, faulty things too."""
     depsgraph = _depsgraph(scene)
     faces: dict[int, _Faces | None] = {}
     counts: dict[str, int] = {}
@@ -153,11 +174,15 @@ def _shown(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) ->
             local = faces[key]
         matrix = np.array(instance.matrix_world, dtype=np.float64)
         if local is None:
-            yield _Shown(name, own, found, matrix, None, None, source)
+            yield Shown(name, own, found, matrix, None, None, source)
             continue
-        triangles, solid = _place(local.triangles, matrix, name)
-        reflects = _reflectivity(shown, local.material[solid])
-        yield _Shown(name, own, found, matrix, triangles, reflects, source)
+        try:
+            triangles, solid = _place(local.triangles, matrix, name)
+            reflects = _reflectivity(shown, local.material[solid])
+        except SeipError as error:
+            yield Shown(name, own, found, matrix, None, None, source, str(error))
+            continue
+        yield Shown(name, own, found, matrix, triangles, reflects, source)
 
 
 def _depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
@@ -212,7 +237,7 @@ def _place(local: Float, matrix: Float, name: str) -> tuple[Float, Boolean]:
     return world[solid], solid
 
 
-def _meshes(parts: list[_Shown], collection: str) -> tuple[Mesh, ...]:
+def _meshes(parts: list[Shown], collection: str) -> tuple[Mesh, ...]:
     meshes = []
     instancers = {part.source for part in parts if part.triangles is not None}
     for part in parts:
@@ -227,26 +252,33 @@ def _meshes(parts: list[_Shown], collection: str) -> tuple[Mesh, ...]:
     return tuple(meshes)
 
 
-def _areas(parts: list[_Shown], collection: str) -> tuple[NamedArea, ...]:
-    areas = []
-    for part in parts:
-        if collection in part.collections:
-            (mesh,) = _meshes([part], collection)
-            plan = outline(mesh.triangles)
-            if plan.is_empty:
-                raise SeipError(f"object {part.name!r} in {collection!r} covers no area in plan: lay it flat")
-            areas.append(NamedArea(part.name, plan, _weight(part)))
-    return tuple(areas)
+def _areas(parts: list[Shown], collection: str) -> tuple[NamedArea, ...]:
+    return tuple(area_of(part, collection) for part in parts if collection in part.collections)
 
 
-def _weight(part: _Shown) -> float:
+def area_of(part: Shown, collection: str) -> NamedArea:
+    """Return the area in plan that an object of a collection means.
+
+    Raises
+    ------
+    SeipError
+        It has no faces, covers no area in plan, or its weight is no number.
+    """
+    (mesh,) = _meshes([part], collection)
+    plan = outline(mesh.triangles)
+    if plan.is_empty:
+        raise SeipError(f"object {part.name!r} in {collection!r} covers no area in plan: lay it flat")
+    return NamedArea(part.name, plan, _weight(part))
+
+
+def _weight(part: Shown) -> float:
     weight = part.source.get(contract.WEIGHT, DEFAULT_WEIGHT)
     if isinstance(weight, bool) or not isinstance(weight, int | float):
         raise SeipError(f"property {contract.WEIGHT} of object {part.name!r} must be a number, not {weight!r}")
     return float(weight)
 
 
-def _poles(parts: list[_Shown]) -> tuple[Pole, ...]:
+def poles_of(parts: list[Shown]) -> tuple[Pole, ...]:
     """Return one pole for each member that stands in the scene.
 
     A collection instance that is a member is one pole at its own foot,
@@ -270,7 +302,7 @@ def _poles(parts: list[_Shown]) -> tuple[Pole, ...]:
     )
 
 
-def _height(pole: _Shown, pieces: list[_Shown]) -> float | None:
+def _height(pole: Shown, pieces: list[Shown]) -> float | None:
     """Return how far the shaft reaches above the foot, or None where there are no faces to tell."""
     made_of = [pole] if pole.triangles is not None else [part for part in pieces if part.source == pole.source]
     corners = [part.triangles.reshape(-1, 3) for part in made_of if part.triangles is not None]
@@ -281,7 +313,7 @@ def _height(pole: _Shown, pieces: list[_Shown]) -> float | None:
     return float(above[near if near.any() else slice(None), 2].max())
 
 
-def _finite_foot(part: _Shown) -> Float:
+def _finite_foot(part: Shown) -> Float:
     foot: Float = part.matrix[:3, 3]
     if not np.isfinite(foot).all():
         raise SeipError(f"pole {part.name!r} stands at a place that is no finite number: set its location")
@@ -300,14 +332,21 @@ def origin_of(scene: bpy.types.Scene) -> Float:
     return np.array(values)
 
 
-def _hidden(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> tuple[str, ...]:
-    """Say which collections hold objects that the viewport does not show."""
+def hidden_members(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> dict[str, list[str]]:
+    """Return by collection the names of the objects that the viewport does not show."""
     layer = scene.view_layers[0]
-    warnings = []
-    for name, objects in members.items():
-        count = sum(1 for item in objects if item.name in layer.objects and not item.visible_get(view_layer=layer))
-        if count:
-            warnings.append(
-                f"{count} hidden object{'s' * (count > 1)} in {name!r} did not count: show them if they should"
-            )
-    return tuple(warnings)
+    hidden = {
+        name: sorted(item.name for item in objects if item.name in layer.objects and not _is_visible(item, layer))
+        for name, objects in members.items()
+    }
+    return {name: things for name, things in hidden.items() if things}
+
+
+def _is_visible(thing: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    return bool(thing.visible_get(view_layer=layer))
+
+
+def hidden_sentence(collection: str, hidden: list[str]) -> str:
+    """Say that objects of a collection do not count because the viewport does not show them."""
+    objects = f"{len(hidden)} hidden object{'s' * (len(hidden) > 1)}"
+    return f"{objects} in {collection!r} did not count: show them if they should"

@@ -88,12 +88,12 @@ def test_the_command_line_goes_before_the_site_file(site, road, tmp_path):
     [
         (["{road}", "-o", "{out}.blend"], "no place is named"),
         (["{road}", "--junction", "7", "-o", "{out}.blend"], "no junction '7'"),
-        (["{road}", "--near", "1100", "2000", "--radius", "-3", "-o", "{out}.blend"], "--radius must be above 0"),
-        (["{road}", "--near", "1100", "2000", "--radius", "nan", "-o", "{out}.blend"], "--radius must be above 0"),
-        (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "--near"),
+        (["{road}", "--near", "1100", "2000", "--radius", "-3", "-o", "{out}.blend"], "the radius must be above 0"),
+        (["{road}", "--near", "1100", "2000", "--radius", "nan", "-o", "{out}.blend"], "the radius must be above 0"),
+        (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "two finite numbers"),
         (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"let it end in \.blend"),
         (["{out}.xodr", "--near", "0", "0", "-o", "{out}.blend"], r"out\.xodr"),
-        (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave --site out"),
+        (["{site}", "--site", "{site}", "-o", "{out}.blend"], "leave the other one"),
         (["{road}", "--near", "1100", "2000", "-o", "{road}/out.blend"], "cannot write"),
     ],
 )

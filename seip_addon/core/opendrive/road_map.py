@@ -10,6 +10,9 @@ from ..arrays import Float
 from .profile import Profile, Shape
 from .reference_line import ReferenceLine
 
+MIDDLE_STEP = 10.0
+"""Metres along a road between the places that may be a map's middle."""
+
 
 @dataclass(frozen=True)
 class Junction:
@@ -289,3 +292,16 @@ class RoadMap:
     geo_reference: str | None
     roads: tuple[Road, ...]
     junctions: tuple[Junction, ...]
+
+    def junctions_with_roads(self) -> tuple[Junction, ...]:
+        """Return the junctions that some road belongs to, in the order of the file: others are no place to work on."""
+        used = {road.junction_id for road in self.roads}
+        return tuple(junction for junction in self.junctions if junction.id in used)
+
+    def middle(self) -> tuple[float, float]:
+        """Return the place on a reference line, x and y in metres, that is nearest to the middle of the map."""
+        lines = [road.frame(np.linspace(0.0, road.length, 2 + int(road.length / MIDDLE_STEP))) for road in self.roads]
+        plan = np.concatenate([line.origin[:, :2] for line in lines])
+        from_middle = plan - (plan.min(axis=0) + plan.max(axis=0)) / 2
+        x, y = plan[np.argmin(np.hypot(*from_middle.T))].tolist()
+        return x, y

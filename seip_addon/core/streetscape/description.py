@@ -10,7 +10,7 @@ import difflib
 import math
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from ..errors import SeipError
 from ..scene_geometry import DEFAULT_WEIGHT
 
 DEFAULT_RADIUS = 80.0
+DESCRIPTION_SUFFIX = ".toml"
 
 LARGEST = 100_000.0
 """Metres (or degrees, or a weight) that nothing described may exceed."""
@@ -177,6 +178,58 @@ def read_site_description(path: Path) -> SiteDescription:
     if description.near is not None and description.junction is not None:
         raise SeipError(f"{path}: give either near or junction, not both")
     return description
+
+
+def describe_place(
+    source: Path,
+    *,
+    site: Path | None = None,
+    near: tuple[float, float] | None = None,
+    junction: str | None = None,
+    radius: float | None = None,
+) -> tuple[Path, SiteDescription]:
+    """Return a place's map and description, what is given here in place of what a file says.
+
+    Parameters
+    ----------
+    source : Path
+        The map, or a site description that names it.
+    site : Path, optional
+        Site description to go with a map.
+    near : (x, y), metres, optional
+        Middle of the place, map coordinates.
+    junction : str, optional
+        Id or name of the junction in the middle of the place.
+    radius : float, metres, optional
+        Of the region of interest.
+
+    Raises
+    ------
+    SeipError
+        As for `read_site_description`; no map is named, or a number makes no sense.
+    """
+    described = _described(source, site)
+    map_path = described.map
+    if map_path is None:
+        raise SeipError(f'{source} names no map: add map = "file.xodr" to it, or give the map and the description')
+    if near is not None or junction is not None:
+        if near is not None and not all(map(math.isfinite, near)):
+            raise SeipError("the middle of the place must be two finite numbers, x and y in metres")
+        described = replace(described, near=near, junction=junction, region=None)
+    if radius is not None:
+        if not 0 < radius < math.inf:
+            raise SeipError(f"the radius must be above 0 m, not {radius:g}")
+        described = replace(described, radius=radius, region=None)
+    return map_path, described
+
+
+def _described(source: Path, site: Path | None) -> SiteDescription:
+    """Return what files say of a place."""
+    if source.suffix.lower() == DESCRIPTION_SUFFIX:
+        if site is not None:
+            raise SeipError(f"{source} is a site description already; leave the other one, {site}, out")
+        return read_site_description(source)
+    return replace(SiteDescription() if site is None else read_site_description(site), map=source)
 
 
 def _weighted_region(table: _Table) -> WeightedRegion:

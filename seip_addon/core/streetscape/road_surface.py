@@ -268,7 +268,8 @@ def _is_taper(lane: LaneSurface) -> bool:
 def _line(edge: Float, unpainted: BaseGeometry, *, dashed: bool) -> list[Float]:
     """Return quads of a painted line along a lane's edge (n, 3) outside an area."""
     rest = shapely.LineString(edge).difference(unpainted)
-    paths = [shapely.get_coordinates(part, include_z=True) for part in shapely.get_parts(rest)]
+    parts = [part for part in shapely.get_parts(rest) if not part.is_empty]  # none is left within an area
+    paths = [shapely.get_coordinates(part, include_z=True) for part in parts]
     return [_ribbon(piece) for path in paths for piece in (_dashes(path) if dashed else [path])]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import re
 import shutil
 import zipfile
 from collections.abc import Generator, Mapping
@@ -105,3 +107,51 @@ def _load(path: Path) -> VisibilityGrid | None:
         return VisibilityGrid.load(path)
     except SeipError:
         return None
+
+
+class GridFolder:
+    """A folder of grids that are kept under their keys; other files in it are let alone.
+
+    Parameters
+    ----------
+    path : path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def megabytes(self) -> float:
+        """Return the size of all grids; quick while none comes or goes, so that a panel may ask at each drawing."""
+        try:
+            return _megabytes(self._path, self._path.stat().st_mtime_ns)
+        except OSError:  # there is no such folder
+            return 0.0
+
+    def empty(self) -> int:
+        """Delete all grids and pieces of grids, and return how many there were.
+
+        Raises
+        ------
+        SeipError
+            One cannot be deleted.
+        """
+        entries = _grids(self._path)
+        for entry in entries:
+            try:
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+            except OSError as error:
+                raise SeipError(f"cannot delete {entry}: {error.strerror}; delete it by hand") from error
+        return len(entries)
+
+
+_GRID = re.compile(r"[0-9a-f]{32}\.(npz|pieces)")
+
+
+def _grids(folder: Path) -> list[Path]:
+    return sorted(entry for entry in folder.iterdir() if _GRID.fullmatch(entry.name)) if folder.is_dir() else []
+
+
+@functools.lru_cache(maxsize=4)
+def _megabytes(folder: Path, _changed: int) -> float:
+    files = [file for entry in _grids(folder) for file in (entry.rglob("*") if entry.is_dir() else (entry,))]
+    return sum(file.stat().st_size for file in files) / 1e6

@@ -1,0 +1,74 @@
+"""The rings that a LiDAR's beams draw on a flat road, and the edges of its vertical field of view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Boolean, Float
+from .beams import BeamPattern
+from .model import LidarModel
+
+DIRECTIONS = 120
+"""Azimuths at which rings are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class BeamRings:
+    """Lines to be drawn.
+
+    Parameters
+    ----------
+    rings : (n, 2, 3) float64, metres
+        Pieces of the rings on the road.
+    wide : (n,) bool
+        Whether the next ring inwards is farther away than asked: what is there may lie between two rings.
+    cone : (m, 2, 3) float64, metres
+        Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range.
+    """
+
+    rings: Float
+    wide: Boolean
+    cone: Float
+
+
+def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap: float) -> BeamRings:
+    """Return what a sensor's beams draw on a flat road.
+
+    Parameters
+    ----------
+    model : LidarModel
+    place : (3,) float64, metres
+        Optical centre.
+    axes : (3, 3) float64
+        Columns are the sensor's x, y and z axis.
+    ground : float, metres
+        Height of the road.
+    gap : float, metres
+        Distance of neighbouring rings up to which they are dense: twice δ.
+    """
+    beams = _directions(model) @ axes.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (ground - place[2]) / beams[..., 2]
+    meets = (reach > model.min_range) & (reach <= model.max_range)
+    hits = place + np.where(meets, reach, 0.0)[..., None] * beams
+    inwards = np.full(meets.shape, np.inf)  # to the next ring, along each azimuth
+    inwards[1:] = np.linalg.norm(hits[1:, :, :2] - hits[:-1, :, :2], axis=-1)
+    inwards[1:][~meets[:-1]] = 0.0
+    inwards[0] = 0.0
+    following = np.roll(np.arange(DIRECTIONS), -1)
+    drawn = meets & meets[:, following]
+    rings = np.stack([hits, hits[:, following]], axis=2)[drawn]
+    ends = place + np.where(meets, reach, model.max_range)[..., None] * beams
+    edges = ends[[0, -1], :: DIRECTIONS // 12].reshape(-1, 3)
+    cone = np.stack([np.broadcast_to(place, edges.shape), edges], axis=1)
+    return BeamRings(rings, (np.maximum(inwards, inwards[:, following]) > gap)[drawn], cone)
+
+
+def _directions(model: LidarModel) -> Float:
+    """Return unit directions (channels, `DIRECTIONS`, 3) in the sensor's axes, the lowest channel first."""
+    steps = np.arange(DIRECTIONS) * model.azimuth_count // DIRECTIONS
+    channels = np.argsort(model.elevations, kind="stable")
+    rays = channels[:, None] * model.azimuth_count + steps
+    return BeamPattern(model).directions(rays.ravel()).reshape(model.channels, DIRECTIONS, 3)

@@ -1,0 +1,169 @@
+"""Sensor types: the catalogue and the user's own files, presets, and their beams in the viewport."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bl_operators.presets import AddPresetBase
+
+from .. import preferences, sensor_types, state
+from ..core.errors import SeipError
+from ..core.lidar import load_catalogue
+from ..viewport import beam_preview
+from .work import Outcome, attempt
+
+
+class SEIP_OT_list_sensor_types(bpy.types.Operator):
+    """Read the catalogues anew, and list what is new"""
+
+    bl_idname = "seip.list_sensor_types"
+    bl_label = "Read Catalogues"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Read them."""
+        sensor_types.refresh()
+        if sensor_types.complaint:
+            self.report({"ERROR"}, sensor_types.complaint)
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{len(sensor_types.known)} sensor types")
+        return {"FINISHED"}
+
+
+class SEIP_OT_add_catalogue(bpy.types.Operator):
+    """Add a catalogue of your own: a TOML file of LiDAR models, as docs/sensors.md describes"""
+
+    bl_idname = "seip.add_catalogue"
+    bl_label = "Add Catalogue"
+
+    filepath: bpy.props.StringProperty(name="File", description="The catalogue", subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Tell whether there are preferences to keep it in."""
+        return _has_preferences(cls)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Open the file browser."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Read it, and keep its name."""
+        return attempt(self, self._add)
+
+    def _add(self) -> None:
+        path = Path(bpy.path.abspath(self.filepath))
+        shipped = load_catalogue()
+        models = load_catalogue([path])
+        if path in preferences.catalogue_files():
+            raise SeipError(f"{path.name} is a catalogue already: nothing was added")
+        preferences.add_catalogue(str(path))
+        sensor_types.refresh()
+        changed = sum(1 for key, model in models.items() if key not in shipped or model.source != shipped[key].source)
+        self.report({"INFO"}, f"{path.name}: {changed} sensor types added or replaced")
+
+
+class SEIP_OT_remove_catalogue(bpy.types.Operator):
+    """Forget a catalogue of your own; the file stays"""
+
+    bl_idname = "seip.remove_catalogue"
+    bl_label = "Remove Catalogue"
+
+    index: bpy.props.IntProperty(name="Number", description="Of the catalogue, from 0", min=0)
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Tell whether there are preferences."""
+        return _has_preferences(cls)
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Forget it."""
+        return attempt(self, self._remove)
+
+    def _remove(self) -> None:
+        preferences.remove_catalogue(self.index)
+        sensor_types.refresh()
+
+
+def _has_preferences(operator: type[bpy.types.Operator]) -> bool:
+    if preferences.own() is None:
+        operator.poll_message_set("Install the add-on as an extension: only then it has preferences")
+        return False
+    return True
+
+
+class SEIP_OT_empty_cache(bpy.types.Operator):
+    """Delete all visibility that was kept: it is computed again where it is needed"""
+
+    bl_idname = "seip.empty_cache"
+    bl_label = "Empty Cache"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Tell whether there is anything to delete, and nothing that needs it."""
+        reason = "Wait for the work under way" if state.running is not None else preferences.why_not_empty()
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """Ask first."""
+        outcome: Outcome = context.window_manager.invoke_confirm(self, event)
+        return outcome
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Delete it."""
+        return attempt(self, self._empty)
+
+    def _empty(self) -> None:
+        count = preferences.empty_cache()
+        self.report({"INFO"}, f"{count} files deleted")
+
+
+class SEIP_OT_preview_beams(bpy.types.Operator):
+    """Show or hide the beams of the active sensor, or else of the active type at the 3D cursor: rings on a flat road and the edges of the vertical field of view"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.preview_beams"
+    bl_label = "Preview Beams"
+
+    def execute(self, _context: bpy.types.Context) -> Outcome:
+        """Show or hide them."""
+        if beam_preview.is_shown():
+            beam_preview.hide()
+        else:
+            beam_preview.show()
+        return {"FINISHED"}
+
+
+class SEIP_MT_survey_presets(bpy.types.Menu):
+    """Presets of the survey."""
+
+    bl_label = "Survey Presets"
+    preset_subdir = "seip/survey"
+    preset_operator = "script.execute_preset"
+    draw = bpy.types.Menu.draw_preset
+
+
+class SEIP_OT_add_survey_preset(AddPresetBase, bpy.types.Operator):
+    """Keep types, heights and all other settings of the survey under a name, or remove the preset that is shown"""
+
+    bl_idname = "seip.add_survey_preset"
+    bl_label = "Add Survey Preset"
+    preset_menu = "SEIP_MT_survey_presets"
+    preset_subdir = "seip/survey"
+    preset_defines = ("survey = bpy.context.scene.seip.survey",)
+    preset_values = ("survey",)
+
+
+CLASSES = (
+    SEIP_OT_list_sensor_types,
+    SEIP_OT_add_catalogue,
+    SEIP_OT_remove_catalogue,
+    SEIP_OT_empty_cache,
+    SEIP_OT_preview_beams,
+    SEIP_MT_survey_presets,
+    SEIP_OT_add_survey_preset,
+)

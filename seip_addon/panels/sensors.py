@@ -1,0 +1,159 @@
+"""The panel of the sensors: which types to choose from, at which heights."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from .. import sensor_types
+from ..core.lidar import LidarModel
+from ..operators.sensors import (
+    SEIP_MT_survey_presets,
+    SEIP_OT_add_catalogue,
+    SEIP_OT_add_survey_preset,
+    SEIP_OT_list_sensor_types,
+    SEIP_OT_preview_beams,
+)
+from ..properties import SEIP_PG_sensor_type, SEIP_PG_survey
+from ..viewport import beam_preview
+from .sentence import draw_sentence
+from .sidebar import Sidebar
+
+
+class SEIP_UL_sensor_types(bpy.types.UIList):
+    """Sensor types of the catalogue."""
+
+    bl_idname = "SEIP_UL_sensor_types"
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: SEIP_PG_survey,
+        item: SEIP_PG_sensor_type,
+        _icon: int,
+        _active_data: SEIP_PG_survey,
+    ) -> None:
+        """Draw whether a type is used, its key, and its main figures."""
+        model = sensor_types.known.get(item.name)
+        row = layout.row(align=True)
+        row.prop(item, "use", text="")
+        split = row.split(factor=0.38)
+        split.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
+        split.label(text=_in_short(model) if model else "unknown", translate=False)
+
+
+def _in_short(model: LidarModel) -> str:
+    return f"{model.channels} · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
+
+
+class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
+    """Which types of sensor to choose from."""
+
+    bl_idname = "SEIP_PT_sensors"
+    bl_label = "Sensors"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """Draw the presets."""
+        row = self.layout.row(align=True)
+        row.menu(SEIP_MT_survey_presets.__name__, text="", icon="PRESET")
+        row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="ADD")
+        row.operator(SEIP_OT_add_survey_preset.bl_idname, text="", icon="REMOVE").remove_active = True
+        row.separator()
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the list and the heights."""
+        survey = context.scene.seip.survey
+        layout = self.layout
+        if sensor_types.complaint:
+            draw_sentence(layout, sensor_types.complaint, icon="ERROR", alert=True)
+        if not len(survey.types):
+            draw_sentence(layout, "Types 1 to 3 of the study are used.", icon="INFO")
+            layout.operator(SEIP_OT_list_sensor_types.bl_idname, text="Choose Types")
+        else:
+            draw_sentence(layout, "Channels · range · middle price")
+            layout.template_list(SEIP_UL_sensor_types.bl_idname, "", survey, "types", survey, "active_type", rows=5)
+            row = layout.row(align=True)
+            row.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
+            row.operator(SEIP_OT_list_sensor_types.bl_idname, text="", icon="FILE_REFRESH")
+            if not any(one.use for one in survey.types):
+                draw_sentence(layout, "Use at least one type.", icon="ERROR", alert=True)
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(survey, "heights")
+
+
+class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
+    """What is known of the active type."""
+
+    bl_idname = "SEIP_PT_sensor_details"
+    bl_parent_id = "SEIP_PT_sensors"
+    bl_label = "Details"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw its figures and where they are from."""
+        survey = context.scene.seip.survey
+        if not 0 <= survey.active_type < len(survey.types):
+            self.layout.label(text="No type is selected")
+            return
+        key = survey.types[survey.active_type].name
+        model = sensor_types.known.get(key)
+        if model is None:
+            draw_sentence(self.layout, f"{key} is not in the catalogue: add the file that has it, or do not use it.")
+            return
+        draw_sentence(self.layout, f"{model.manufacturer} {model.name}")
+        for what, value in _figures(model):
+            split = self.layout.split(factor=0.42)
+            split.scale_y = 0.8
+            split.label(text=what)
+            split.label(text=value)
+        draw_sentence(self.layout, f"Figures: {model.source}")
+        draw_sentence(self.layout, f"Price: {model.price_source or 'no source'}")
+
+
+def _figures(model: LidarModel) -> list[tuple[str, str]]:
+    low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
+    cheap, dear = model.price_range
+    return [
+        ("Channels", f"{model.channels}"),
+        ("Elevations", f"{low:.4g}…{high:.4g}°"),
+        ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
+        ("Points", f"{model.points_per_second:,.0f} /s"),
+        ("Rotation", f"{model.rotation_rate:g} Hz"),
+        ("Azimuth", f"{360 / model.azimuth_count:.2g}°"),
+        ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}–{dear:,.0f}"),
+    ]
+
+
+class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
+    """The active type's beams in the viewport."""
+
+    bl_idname = "SEIP_PT_beam_preview"
+    bl_parent_id = "SEIP_PT_sensors"
+    bl_label = "Beam Preview"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the button and what the colours mean."""
+        shown = beam_preview.is_shown()
+        layout = self.layout
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(context.scene.seip.survey, "preview_height")
+        text = "Hide Beams" if shown else "Show Beams"
+        layout.operator(SEIP_OT_preview_beams.bl_idname, text=text, icon="LIGHT_SPOT", depress=shown)
+        preview = beam_preview.preview_of(context) if shown else None
+        if preview is None:
+            return
+        draw_sentence(layout, f"{preview.model.key} at {preview.height:.3g} m")
+        draw_sentence(
+            layout, f"Blue: within 2δ = {2 * preview.delta:.3g} m of the next ring inwards", icon="COLORSET_04_VEC"
+        )
+        draw_sentence(layout, "Orange: farther apart; road between may go unseen", icon="COLORSET_02_VEC")
+        draw_sentence(layout, f"On a level road all is within 2δ up to {preview.resolved_to():.0f} m.")
+
+
+CLASSES = (SEIP_UL_sensor_types, SEIP_PT_sensors, SEIP_PT_sensor_details, SEIP_PT_beam_preview)

@@ -1,0 +1,165 @@
+"""The panel of the site: where it comes from, what its objects mean, and whether it is sound."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.streetscape.parts import Role
+from ..operators.site import (
+    NOTHING_SELECTED,
+    SEIP_OT_add_area,
+    SEIP_OT_assign_role,
+    SEIP_OT_build_site,
+    SEIP_OT_check_site,
+    SEIP_OT_choose_map,
+    SEIP_OT_show_problem,
+    SEIP_OT_take_out_of_role,
+    has_site,
+    missing_for_build,
+)
+from ..properties import SEIP_PG_problem, SEIP_PG_site
+from ..scene import roles
+from .run_button import draw_run
+from .sentence import draw_sentence
+from .sidebar import Sidebar
+
+
+class SEIP_PT_site(Sidebar, bpy.types.Panel):
+    """The place that sensors are to watch."""
+
+    bl_idname = "SEIP_PT_site"
+    bl_label = "Site"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Say what there is to begin with."""
+        if not has_site(context.scene):
+            draw_sentence(
+                self.layout, "Build a site from a map, or assign roles to the objects of your own.", icon="INFO"
+            )
+
+
+class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
+    """A site from a map."""
+
+    bl_idname = "SEIP_PT_site_map"
+    bl_parent_id = "SEIP_PT_site"
+    bl_label = "From OpenDRIVE"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the choice of the map and the place."""
+        site = context.scene.seip.site
+        layout = self.layout
+        name = bpy.path.basename(site.source)
+        layout.operator(SEIP_OT_choose_map.bl_idname, text=name or "Choose Map…", icon="FILE_FOLDER")
+        missing = missing_for_build(context.scene)
+        if missing:
+            draw_sentence(layout, missing, icon="INFO")
+            return
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
+        if site.is_described():
+            draw_sentence(layout, "The place is the one that the description names.")
+        else:
+            column.prop(site, "radius")
+            if not site.junction:
+                draw_sentence(layout, "No junction: the middle of the map.")
+        if has_site(context.scene):
+            draw_sentence(layout, "This scene has a site: a new scene is made.", icon="INFO")
+        draw_run(layout, SEIP_OT_build_site.bl_idname)
+
+
+class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
+    """What objects mean."""
+
+    bl_idname = "SEIP_PT_site_roles"
+    bl_parent_id = "SEIP_PT_site"
+    bl_label = "Roles of Objects"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what the active object is, and the buttons that change that."""
+        site = context.scene.seip.site
+        layout = self.layout
+        layout.prop(site, "role", text="")
+        row = layout.row(align=True)
+        row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
+        row.operator(SEIP_OT_take_out_of_role.bl_idname, icon="REMOVE").role = site.role
+        if not context.selected_objects:
+            draw_sentence(layout, NOTHING_SELECTED, icon="INFO")
+        if Role[site.role] in roles.AREAS:
+            row = layout.row(align=True)
+            for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
+                button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
+                button.role, button.place = site.role, place
+        if context.object is not None:
+            _draw_object(layout, context.scene, context.object)
+
+
+def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    held = roles.roles_of(scene, thing)
+    box = layout.box()
+    box.label(text=thing.name, icon="OBJECT_DATA")
+    draw_sentence(box, ", ".join(role.value for role in held).capitalize() or "No role")
+    column = box.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.enabled = thing.is_editable
+    if Role.WEIGHTED_REGIONS in held:
+        column.prop(thing, "seip_region_weight")
+    if Role.POLES in held:
+        column.prop(thing, "seip_pole_rule")
+
+
+class SEIP_UL_problems(bpy.types.UIList):
+    """Problems that the check found."""
+
+    bl_idname = "SEIP_UL_problems"
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: SEIP_PG_site,
+        item: SEIP_PG_problem,
+        _icon: int,
+        _active_data: SEIP_PG_site,
+    ) -> None:
+        """Draw one."""
+        layout.label(text=item.name or item.text, icon="CANCEL" if item.is_error else "ERROR", translate=False)
+
+
+class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
+    """Whether the site is sound."""
+
+    bl_idname = "SEIP_PT_site_check"
+    bl_parent_id = "SEIP_PT_site"
+    bl_label = "Check"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what was counted, and the problems."""
+        site = context.scene.seip.site
+        layout = self.layout
+        draw_run(layout, SEIP_OT_check_site.bl_idname)
+        if not site.checked:
+            return
+        if not site.problems:
+            layout.label(text="No problem found", icon="CHECKMARK")
+        else:
+            layout.template_list(
+                SEIP_UL_problems.bl_idname,
+                "",
+                site,
+                "problems",
+                site,
+                "active_problem",
+                rows=min(5, len(site.problems)),
+            )
+            if 0 <= site.active_problem < len(site.problems):
+                draw_sentence(layout, site.problems[site.active_problem].text)
+                layout.operator(SEIP_OT_show_problem.bl_idname, icon="ZOOM_SELECTED")
+        for one in site.counts:
+            draw_sentence(layout, f"{one.name}: {one.value}")
+
+
+CLASSES = (SEIP_PT_site, SEIP_PT_site_map, SEIP_PT_site_roles, SEIP_UL_problems, SEIP_PT_site_check)

@@ -1,0 +1,140 @@
+"""What objects mean to the placement: which collections of the contract they are linked to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from ..core.errors import SeipError
+from ..core.streetscape.model import VEILS
+from ..core.streetscape.parts import Role
+from . import contract
+from .build import COLLECTIONS
+from .materials import material
+
+ROLES = {role: collection for role, collection in COLLECTIONS.items() if collection in contract.INPUTS}
+"""The collection of each role that a user may assign."""
+
+WORDS = {
+    Role.REGION: "where targets are laid: its outline in plan is the region of interest",
+    Role.ROADS: "the carriageway: targets lie on it, and rays end on it",
+    Role.GROUND: "other surfaces that rays end on: pavements, verges, terrain",
+    Role.OCCLUDERS: "what stands in the way: buildings, trees, walls",
+    Role.POLES: "posts that can carry a sensor: the object's origin is the foot of the post",
+    Role.CANDIDATE_AREAS: "where new posts may stand, in plan; usually the pavements",
+    Role.WEIGHTED_REGIONS: "targets in its outline in plan count more",
+    Role.FORBIDDEN_AREAS: "no sensor within its outline in plan",
+    Role.MANDATORY_AREAS: "at least one sensor within its outline in plan",
+}
+"""What each role means."""
+AREAS = tuple(role for role in ROLES if ROLES[role] in contract.AREAS)
+"""Roles whose objects mean an area in plan."""
+
+SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+
+
+def roles_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Role, ...]:
+    """Return the roles that an object is linked to, directly or in a sub-collection."""
+    kinds = {
+        contract.kind(collection)
+        for collection in scene.collection.children_recursive
+        if contract.kind(collection) in contract.INPUTS and collection.all_objects.get(thing.name) == thing
+    }
+    return tuple(role for role, collection in ROLES.items() if collection in kinds)
+
+
+def assign(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], role: Role) -> int:
+    """Link objects to a role's collection, and return how many were not there before.
+
+    Raises
+    ------
+    SeipError
+        None of them can have the role.
+    """
+    given = list(things)
+    fit = [thing for thing in given if _can_be(thing, role)]
+    if not fit:
+        wish = "meshes or empties" if role is Role.POLES else "meshes, or empties that instance a collection"
+        raise SeipError(f"none of the {len(given)} selected objects can be among the {role.value}: select {wish}")
+    new = [thing for thing in fit if role not in roles_of(scene, thing)]
+    collection = contract.find_or_make(scene, ROLES[role])
+    for thing in new:
+        collection.objects.link(thing)
+    return len(new)
+
+
+def take_out(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], role: Role) -> int:
+    """Unlink objects from a role's collections, and return how many were there.
+
+    One that would be in no collection at all is linked to the scene's own.
+
+    Raises
+    ------
+    SeipError
+        None of them has the role by a collection of this file.
+    """
+    count = 0
+    top = [c for c in scene.collection.children_recursive if contract.kind(c) == ROLES[role]]
+    own = {c for collection in top for c in (collection, *collection.children_recursive) if c.library is None}
+    for thing in things:
+        linked = [collection for collection in own if thing.name in collection.objects]
+        for collection in linked:
+            collection.objects.unlink(thing)
+        if linked and not thing.users_collection:
+            scene.collection.objects.link(thing)
+        count += bool(linked)
+    if not count:
+        raise SeipError(f"none of the selected objects is among the {role.value} of this file: nothing to take out")
+    return count
+
+
+def _can_be(thing: bpy.types.Object, role: Role) -> bool:
+    instancer = thing.type == "EMPTY" and thing.instance_collection is not None
+    return thing.type in SURFACES or instancer or (thing.type == "EMPTY" and role is Role.POLES)
+
+
+def add_area(
+    scene: bpy.types.Scene,
+    role: Role,
+    middle: tuple[float, float, float],
+    size: tuple[float, float],
+    turn: float,
+    corners: int,
+) -> bpy.types.Object:
+    """Add a flat polygon in a role, ready to be edited.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    role : Role
+        One of `AREAS`.
+    middle : (3,) float, metres
+        Of the area; it is laid a little higher, so as to be seen above the road.
+    size : (2,) float, metres
+        Along x and y before it is turned.
+    turn : float, radians
+        Counter-clockwise.
+    corners : int
+        Four make a rectangle, more an ellipse.
+    """
+    above, shade = VEILS[role]
+    name = role.value.capitalize()
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(_polygon(size, corners), [], [tuple(range(corners))])
+    mesh.materials.append(material(shade))
+    thing = bpy.data.objects.new(name, mesh)
+    thing.location = (middle[0], middle[1], middle[2] + above)
+    thing.rotation_euler = (0.0, 0.0, turn)
+    thing.hide_render = True
+    contract.find_or_make(scene, ROLES[role]).objects.link(thing)
+    return thing
+
+
+def _polygon(size: tuple[float, float], corners: int) -> list[tuple[float, float, float]]:
+    angle = 2 * math.pi * (np.arange(corners) + 0.5) / corners
+    reach = math.sqrt(0.5) if corners == 4 else 0.5  # a rectangle's corners lie on its sides' lines
+    x, y = reach * size[0] * np.cos(angle), reach * size[1] * np.sin(angle)
+    return [(float(a), float(b), 0.0) for a, b in zip(x, y, strict=True)]

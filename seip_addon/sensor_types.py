@@ -1,0 +1,82 @@
+"""The sensor types that there are, and each scene's list of them.
+
+The catalogue is held in memory, for panels that only look; scenes keep keys
+and whether each is to be used.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from . import preferences
+from .core.candidates import CandidateSettings
+from .core.errors import SeipError
+from .core.lidar import LidarModel, load_catalogue
+
+known: dict[str, LidarModel] = {}
+"""By catalogue key: the shipped types and those of the user's own files."""
+
+complaint = ""
+"""What is wrong with one of the user's catalogues; empty where nothing is."""
+
+
+def refresh() -> None:
+    """Read the catalogues anew, and list what is new in all scenes; where a file is at fault the shipped types stay."""
+    global complaint  # noqa: PLW0603  # there is one catalogue
+    known.clear()
+    complaint = ""
+    try:
+        known.update(preferences.catalogue())
+    except SeipError as error:
+        known.update(load_catalogue())
+        complaint = str(error)
+    for scene in bpy.data.scenes:
+        if scene.library is None:
+            list_types(scene)
+
+
+def list_types(scene: bpy.types.Scene) -> None:
+    """Add to a scene's list the types that it lacks, and drop those that are neither known nor used.
+
+    In a list that was empty those are used that a survey takes if none is chosen.
+    """
+    types = scene.seip.survey.types
+    default = () if len(types) else CandidateSettings().sensors
+    for number in reversed(range(len(types))):
+        if types[number].name not in known and not types[number].use:
+            types.remove(number)
+    for key in known:
+        if key not in types:
+            one = types.add()
+            one.name = key
+            one.use = key in default
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _after_load(*_: object) -> None:
+    refresh()
+
+
+def _once() -> None:
+    """Do what Blender forbids while it registers an add-on: look at the open file."""
+    refresh()
+
+
+CLASSES: tuple[type, ...] = ()
+
+
+def attach() -> None:
+    """List the types now, and whenever a file is opened."""
+    bpy.app.handlers.load_post.append(_after_load)
+    if isinstance(bpy.data, bpy.types.BlendData):
+        refresh()
+    else:
+        bpy.app.timers.register(_once, first_interval=0.0)
+
+
+def detach() -> None:
+    """Forget them."""
+    if bpy.app.timers.is_registered(_once):
+        bpy.app.timers.unregister(_once)
+    bpy.app.handlers.load_post.remove(_after_load)
+    known.clear()

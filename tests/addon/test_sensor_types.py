@@ -1,0 +1,200 @@
+"""The list of sensor types, catalogues of one's own, presets, the beams in the viewport, and the cache."""
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon import preferences, sensor_types
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.viewport import beam_preview
+
+OWN = """
+[corner32]
+name = "Corner 32"
+manufacturer = "Example Optics"
+source = "data sheet of 2026"
+elevations_deg = [-25.0, -10.0, 0.0]
+range_m = [0.5, 150.0]
+points_per_second = 320_000
+rotation_rate_hz = 10.0
+price_usd = [9_000, 9_000]
+"""
+
+
+@pytest.fixture
+def survey(add_on):
+    return bpy.context.scene.seip.survey
+
+
+@pytest.fixture
+def own(survey):
+    """Enable the add-on as an add-on: only then it has preferences."""
+    entry = bpy.context.preferences.addons.new()
+    entry.module = preferences.ADDON_ID
+    yield entry.preferences
+    bpy.context.preferences.addons.remove(entry)
+
+
+@pytest.fixture
+def catalogue(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(OWN, encoding="utf-8")
+    return path
+
+
+def used(survey):
+    return tuple(one.name for one in survey.types if one.use)
+
+
+def test_the_list_is_the_catalogue_and_the_choice_the_default(survey):
+    assert [one.name for one in survey.types] == list(load_catalogue())
+    assert used(survey) == CandidateSettings().sensors
+    assert survey.settings().candidates == CandidateSettings()
+
+
+def test_the_choice_is_kept_when_a_file_is_reopened(survey, tmp_path):
+    survey.types["type2"].use = False
+    survey.types["vlp16"].use = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert used(bpy.context.scene.seip.survey) == CandidateSettings().sensors
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    assert used(bpy.context.scene.seip.survey) == ("type1", "type3", "vlp16")
+
+
+def test_an_unknown_type_that_is_used_stays_and_one_that_is_not_goes(survey):
+    for name, use in (("gone", False), ("lost", True)):
+        one = survey.types.add()
+        one.name, one.use = name, use
+    assert bpy.ops.seip.list_sensor_types() == {"FINISHED"}
+    assert "gone" not in survey.types
+    assert "lost" in survey.types
+    assert "lost" not in sensor_types.known
+
+
+def test_no_type_is_a_mistake(survey):
+    for one in survey.types:
+        one.use = False
+    with pytest.raises(Exception, match="no sensor type is chosen"):
+        survey.settings()
+
+
+def test_a_catalogue_of_one_s_own(survey, own, catalogue):
+    assert bpy.ops.seip.add_catalogue(filepath=str(catalogue)) == {"FINISHED"}
+    assert preferences.catalogue_files() == (catalogue,)
+    assert "corner32" in survey.types
+    assert not survey.types["corner32"].use
+    survey.types["corner32"].use = True
+    assert survey.settings().models()["corner32"].channels == 3
+    with pytest.raises(RuntimeError, match="a catalogue already"):
+        bpy.ops.seip.add_catalogue(filepath=str(catalogue))
+    bpy.ops.seip.remove_catalogue(index=0)
+    assert preferences.catalogue_files() == ()
+    assert "corner32" in survey.types  # it is used: shown as unknown
+    with pytest.raises(RuntimeError, match="there is no catalogue 3"):
+        bpy.ops.seip.remove_catalogue(index=3)
+
+
+def test_a_bad_catalogue_is_refused(survey, own, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text("[x]\nname = 1\n", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="lacks"):
+        bpy.ops.seip.add_catalogue(filepath=str(path))
+    assert preferences.catalogue_files() == ()
+
+
+def test_a_catalogue_that_broke_leaves_the_shipped_types(survey, own, catalogue):
+    bpy.ops.seip.add_catalogue(filepath=str(catalogue))
+    catalogue.unlink()
+    with pytest.raises(RuntimeError, match="cannot read the LiDAR catalogue"):
+        bpy.ops.seip.list_sensor_types()
+    assert sensor_types.complaint
+    assert list(sensor_types.known) == list(load_catalogue())
+
+
+def test_without_preferences_catalogues_cannot_be_kept(survey, catalogue):
+    with pytest.raises(RuntimeError, match="Install the add-on"):
+        bpy.ops.seip.add_catalogue(filepath=str(catalogue))
+
+
+def test_a_preset_brings_types_and_heights_back(survey, tmp_path, monkeypatch):
+    folder = tmp_path / "presets" / "seip" / "survey"
+    monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, path="", create=False: _made(tmp_path / path))
+    survey.heights, survey.grid, survey.types["vlp16"].use = "4 6", 2.5, True
+    assert bpy.ops.seip.add_survey_preset(name="Two heights") == {"FINISHED"}
+    (file,) = folder.glob("*.py")
+    survey.heights, survey.grid, survey.types["vlp16"].use = "8", 1.0, False
+    bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SEIP_MT_survey_presets")
+    assert (survey.heights, survey.grid) == ("4 6", 2.5)
+    assert used(survey) == (*CandidateSettings().sensors, "vlp16")
+    assert [one.name for one in survey.types] == list(load_catalogue())
+
+
+def _made(path):
+    path.mkdir(parents=True, exist_ok=True)
+    return str(path)
+
+
+def test_beams_are_shown_until_hidden_or_another_file_is_opened(survey):
+    assert bpy.ops.seip.preview_beams() == {"FINISHED"}
+    assert beam_preview.is_shown()
+    bpy.ops.seip.preview_beams()
+    assert not beam_preview.is_shown()
+    bpy.ops.seip.preview_beams()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not beam_preview.is_shown()
+    bpy.ops.seip.preview_beams()  # and the fixture sees that it goes with the add-on
+
+
+def test_the_preview_is_of_the_active_type_at_the_cursor(survey):
+    bpy.context.scene.cursor.location = (7.0, 8.0, 1.0)
+    survey.active_type = 3
+    survey.preview_height = 6.0
+    preview = beam_preview.preview_of(bpy.context)
+    assert preview.model.key == "vlp16"
+    assert preview.place.tolist() == [7.0, 8.0, 7.0]
+    assert np.allclose(preview.lines().rings[..., 2], 1.0 + beam_preview.LIFT)
+    assert 0 < preview.resolved_to() < preview.range_on_road()
+
+
+def test_the_preview_is_of_the_active_sensor(survey):
+    empty = bpy.data.objects.new("sensor", None)
+    empty["seip_sensor"], empty["seip_height"] = "type3", 5.4
+    empty.location = (1.0, 2.0, 5.6)
+    bpy.context.scene.collection.objects.link(empty)
+    bpy.context.view_layer.objects.active = empty
+    bpy.context.view_layer.update()
+    preview = beam_preview.preview_of(bpy.context)
+    assert preview.model.key == "type3"
+    assert np.allclose(preview.lines().rings[..., 2], 0.2 + beam_preview.LIFT)
+
+
+def test_the_preview_of_an_unknown_type_is_none(survey):
+    survey.types.add().name = "lost"
+    survey.active_type = len(survey.types) - 1
+    assert beam_preview.preview_of(bpy.context) is None
+
+
+def test_the_cache_is_emptied_of_grids_alone(survey):
+    folder = preferences.cache_folder()
+    with pytest.raises(RuntimeError, match="The cache is empty"):
+        bpy.ops.seip.empty_cache()
+    folder.mkdir(parents=True)
+    (folder / f"{'a' * 32}.npz").write_bytes(b"x" * 1000)
+    pieces = folder / f"{'b' * 32}.pieces"
+    pieces.mkdir()
+    (pieces / "1.npz").write_bytes(b"x" * 500)
+    (folder / "mine.txt").write_text("mine", encoding="utf-8")
+    assert bpy.ops.seip.empty_cache() == {"FINISHED"}
+    assert [entry.name for entry in folder.iterdir()] == ["mine.txt"]
+
+
+def test_cores_are_used(own):
+    from seip_addon.core.visibility import ray_casting  # noqa: PLC0415  # beside what it is about
+
+    before = ray_casting.most_threads()
+    own.cores = 1
+    assert ray_casting.most_threads() == 1
+    own.cores = before
+    assert ray_casting.most_threads() == min(before, own.cores)

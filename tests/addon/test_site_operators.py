@@ -1,0 +1,177 @@
+"""From a map, or from objects of one's own, to a site that is sound: the operators do what the batch command does."""
+
+from pathlib import Path
+
+from headless import build_scene
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon.scene import contract
+from seip_addon.scene.read import read_scene
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+MAP = SCENES / "junction.xodr"
+
+
+@pytest.fixture
+def scene(add_on):
+    return bpy.context.scene
+
+
+def choose(scene, path=MAP, radius=30.0):
+    assert bpy.ops.seip.choose_map(filepath=str(path)) == {"FINISHED"}
+    site = scene.seip.site
+    site.radius = radius
+    return site
+
+
+def shapes(scene):
+    return {thing.name: np.array(thing.matrix_world).tolist() for thing in scene.objects if thing.type == "MESH"}
+
+
+def test_a_map_s_junctions_are_listed(scene):
+    assert [one.name for one in choose(scene).junctions] == ["100 Central junction"]
+    assert scene.seip.site.radius == 30.0
+
+
+def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path):
+    site = choose(scene)
+    site.junction = site.junctions[0].name
+    assert bpy.ops.seip.build_site() == {"FINISHED"}
+    by_panel = shapes(scene), read_scene(scene).geometry
+    build_scene.main([str(MAP), "--junction", "100", "--radius", "30", "-o", str(tmp_path / "site.blend")])
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
+    by_batch = shapes(bpy.context.scene), read_scene(bpy.context.scene).geometry
+    assert by_panel[0] == by_batch[0]
+    assert by_panel[1].region.equals(by_batch[1].region)
+    assert by_panel[1].origin.tolist() == by_batch[1].origin.tolist()
+
+
+def test_without_a_junction_it_is_the_middle_of_the_map(scene):
+    choose(scene)
+    bpy.ops.seip.build_site()
+    assert "Region of interest" in scene.objects
+
+
+def test_a_description_says_where_and_how_large(scene):
+    site = choose(scene, SCENES / "junction.toml")
+    assert site.is_described()
+    bpy.ops.seip.build_site()
+    shipped = SCENES / "junction.blend"
+    area = read_scene(scene).geometry.region.area
+    bpy.ops.wm.open_mainfile(filepath=str(shipped))
+    assert area == pytest.approx(read_scene(bpy.context.scene).geometry.region.area)
+
+
+def test_a_scene_that_has_a_site_keeps_it(scene):
+    choose(scene)
+    bpy.ops.seip.build_site()
+    before = shapes(scene)
+    bpy.ops.seip.build_site()
+    assert len(bpy.data.scenes) == 2
+    assert shapes(scene) == before
+    other = next(each for each in bpy.data.scenes if each != scene)
+    assert contract.find(other, contract.ROADS) != contract.find(scene, contract.ROADS)
+    assert other.seip.site.source == scene.seip.site.source
+    assert [one.id for one in other.seip.site.junctions] == ["100"]
+    assert [one.name for one in other.seip.survey.types] == [one.name for one in scene.seip.survey.types]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"), [(None, "no such file"), ("<x/>", "is not OpenDRIVE"), ("<x", "broken XML")]
+)
+def test_a_bad_map_is_one_sentence(scene, tmp_path, text, complaint):
+    path = tmp_path / "map.xodr"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(RuntimeError, match=complaint):
+        bpy.ops.seip.choose_map(filepath=str(path))
+    assert not scene.seip.site.source
+
+
+def test_without_a_map_there_is_nothing_to_build(scene):
+    with pytest.raises(RuntimeError, match="Choose a map first"):
+        bpy.ops.seip.build_site()
+
+
+def test_an_unknown_junction_is_named(scene):
+    choose(scene).junction = "777"
+    with pytest.raises(RuntimeError, match="no junction '777'"):
+        bpy.ops.seip.build_site()
+    assert not any(contract.kind(collection) in contract.INPUTS for collection in bpy.data.collections)
+
+
+def test_roles_by_operator(scene):
+    bpy.ops.mesh.primitive_plane_add()
+    assert bpy.ops.seip.assign_role(role="ROADS") == {"FINISHED"}
+    assert bpy.context.object in contract.find(scene, contract.ROADS).objects[:]
+    assert bpy.ops.seip.take_out_of_role(role="ROADS") == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="nothing to take out"):
+        bpy.ops.seip.take_out_of_role(role="ROADS")
+    bpy.ops.object.select_all(action="DESELECT")
+    with pytest.raises(RuntimeError, match="Select objects first"):
+        bpy.ops.seip.assign_role(role="ROADS")
+
+
+def test_a_drawn_area_is_active_and_can_be_undone(scene):
+    scene.cursor.location = (5.0, 6.0, 1.0)
+    bpy.ops.ed.undo_push()
+    bpy.ops.seip.add_area(role="WEIGHTED_REGIONS", size=(10.0, 20.0))
+    thing = bpy.context.object
+    assert thing.name == "Weighted regions"
+    assert thing.select_get()
+    assert tuple(thing.location[:2]) == (5.0, 6.0)
+    bpy.ops.ed.undo_push()
+    bpy.ops.ed.undo()
+    assert "Weighted regions" not in bpy.data.objects
+
+
+def test_weights_and_rules_are_the_contract_s_own(scene):
+    bpy.ops.mesh.primitive_plane_add()
+    thing = bpy.context.object
+    assert thing.seip_region_weight == 2.0
+    assert thing.seip_pole_rule == "FREE"
+    assert not thing.keys()
+    thing.seip_region_weight = 3.3
+    assert thing[contract.WEIGHT] == 3.3
+    thing.seip_pole_rule = "MANDATORY"
+    assert thing[contract.MANDATORY]
+    thing.seip_pole_rule = "FORBIDDEN"
+    assert thing[contract.FORBIDDEN]
+    assert contract.MANDATORY not in thing
+    thing.seip_pole_rule = "FREE"
+    assert list(thing.keys()) == [contract.WEIGHT]
+    thing[contract.WEIGHT] = "heavy"
+    assert thing.seip_region_weight == 2.0
+
+
+def test_the_check_lists_and_shows(scene):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / "junction.blend"))
+    scene = bpy.context.scene
+    scene.seip.survey.grid, scene.seip.survey.spacing, scene.seip.survey.heights = 4.0, 12.0, "8"
+    scene.seip.survey.delta = 20.0
+    pole = contract.find(scene, contract.POLES).objects[0]
+    pole.location.z += 3.0
+    assert bpy.ops.seip.check_site() == {"FINISHED"}
+    site = scene.seip.site
+    assert site.checked
+    assert {one.name for one in site.counts} >= {"Region", "Roads", "Poles", "Targets", "Positions", "Poses"}
+    site.active_problem = [one.name for one in site.problems].index(pole.name)
+    assert not site.problems[site.active_problem].is_error
+    assert bpy.ops.seip.show_problem() == {"FINISHED"}
+    assert bpy.context.object == pole
+    assert bpy.context.selected_objects == [pole]
+    pole.hide_set(True)
+    with pytest.raises(RuntimeError, match="The object is hidden"):
+        bpy.ops.seip.show_problem()
+
+
+def test_the_check_lists_bad_settings(scene):
+    choose(scene)
+    bpy.ops.seip.build_site()
+    scene.seip.survey.heights = "high"
+    bpy.ops.seip.check_site()
+    assert scene.seip.site.problems[0].is_error
+    assert "'high' is neither a height" in scene.seip.site.problems[0].text

@@ -1,0 +1,181 @@
+"""Each problem is found where it is, and a sound site has none."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.errors import SeipError
+from seip_addon.core.plan_geometry import outline
+from seip_addon.core.progress import finish
+from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
+from seip_addon.core.site import make_site
+from seip_addon.core.site_check import Problem, SceneContents, Surface, check_site
+
+
+def sheet(low_x, low_y, high_x, high_y, z=0.0):
+    a, b, c, d = (low_x, low_y, z), (high_x, low_y, z), (high_x, high_y, z), (low_x, high_y, z)
+    return np.array([(a, b, c), (a, c, d)], dtype=float)
+
+
+ROAD = Surface("roads", "road", sheet(-50, -4, 50, 4))
+REGION = Surface("region", "region", sheet(-30, -5, 30, 5, 0.03))
+PAVEMENT = Surface("candidate_areas", "pavement", sheet(-50, 4, 50, 7))
+GEOMETRY = SceneGeometry(
+    name="street",
+    origin=np.zeros(3),
+    roads=(Mesh("road", ROAD.triangles),),
+    ground=(Mesh("pavement", PAVEMENT.triangles),),
+    occluders=(),
+    region=outline(REGION.triangles),
+    candidate_areas=outline(PAVEMENT.triangles),
+)
+SITE = make_site(GEOMETRY, CandidateSettings(heights=(8.0,), spacing=12.0), 4.0)
+SOUND = SceneContents((ROAD, REGION, PAVEMENT), (), GEOMETRY, ())
+
+
+def checked(*surfaces, poles=(), problems=()):
+    contents = SceneContents(tuple(surfaces), tuple(poles), GEOMETRY, tuple(problems))
+    return finish(check_site(contents, lambda _: (SITE, ())))
+
+
+def found(*surfaces, poles=()):
+    return [(p.severity, p.thing, p.text) for p in checked(*surfaces, poles=poles).problems]
+
+
+def moved(surface, x=0.0, y=0.0, z=0.0, name=None):
+    return dataclasses.replace(surface, triangles=np.add(surface.triangles, (x, y, z)), name=name or surface.name)
+
+
+def one(problems, words):
+    (hit,) = [problem for problem in problems if words in problem[2]]
+    return hit[:2]
+
+
+def test_a_sound_site_has_no_problem():
+    assert found(*SOUND.surfaces) == []
+
+
+def test_everything_is_counted():
+    counts = checked(*SOUND.surfaces, poles=[Pole("post", np.zeros(3), mandatory=True)]).counts
+    assert counts["Roads"] == "1 object, 2 triangles"
+    assert counts["Area of the region"] == "600 m²"
+    assert counts["Road in the region"] == "480 m²"
+    assert counts["Candidate area"] == "300 m²"
+    assert counts["Poles"] == "1 pole, 1 mandatory"
+    assert counts["Targets"] == f"{len(SITE.targets)}, 0 in weighted regions"
+    assert counts["Poses"] == f"{len(SITE.candidates)}"
+
+
+def test_what_is_missing_stops_a_survey():
+    problems = found()
+    assert [severity for severity, _, _ in problems] == ["ERROR"] * 3
+    assert one(problems, "no region") == one(problems, "no road") == one(problems, "stand nowhere") == ("ERROR", "")
+
+
+def test_poles_do_for_candidate_areas():
+    assert found(ROAD, REGION, poles=[Pole("post", np.array((0.0, 5.0, 0.0)))]) == []
+
+
+def test_a_region_beside_the_road_is_an_error_and_one_of_two_a_warning():
+    beside = moved(REGION, y=200, name="beside")
+    assert one(found(ROAD, beside, PAVEMENT), "no road within") == ("ERROR", "beside")
+    assert one(found(*SOUND.surfaces, beside), "no road within") == ("WARNING", "beside")
+
+
+@pytest.mark.parametrize(("factor", "complains"), [(0.05, True), (1.0, False), (300.0, True)])
+def test_a_region_of_no_earthly_size(factor, complains):
+    surfaces = [dataclasses.replace(each, triangles=each.triangles * factor) for each in SOUND.surfaces]
+    assert any("m across" in text for _, _, text in found(*surfaces)) == complains
+
+
+def test_map_coordinates_are_too_far_for_single_precision():
+    surfaces = [moved(each, x=5.4e6) for each in SOUND.surfaces]
+    severity, _ = one(found(*surfaces), "5,400 km from the origin")
+    assert severity == "WARNING"
+
+
+def test_what_stands_is_no_road():
+    stands = dataclasses.replace(ROAD, name="upright", triangles=ROAD.triangles[:, :, [0, 2, 1]])
+    assert one(found(*SOUND.surfaces, stands), "stands more than it lies") == ("WARNING", "upright")
+
+
+def test_a_pole_far_from_the_region_and_one_above_the_ground():
+    poles = [Pole("far", np.array((20.0, 100.0, 0.0))), Pole("high", np.array((5.0, 2.0, 4.2)))]
+    problems = found(*SOUND.surfaces, poles=poles)
+    assert one(problems, "95 m from the region") == ("WARNING", "far")
+    assert one(problems, "4.2 m above the ground") == ("WARNING", "high")
+
+
+def test_two_poles_at_one_place():
+    poles = [Pole(name, np.array((0.0, 3.0, 0.0))) for name in ("a", "b")]
+    assert one(found(*SOUND.surfaces, poles=poles), "stand at one place") == ("WARNING", "b")
+
+
+def test_many_culprits_are_named_together():
+    poles = [Pole(f"p{number}", np.array((0.4 * number, 2.0, 9.0))) for number in range(40)]
+    problems = found(*SOUND.surfaces, poles=poles)
+    assert len(problems) == 6
+    assert problems[-1][1:] == ("p5", problems[-1][2])
+    assert problems[-1][2].startswith("35 more poles have their origin")
+
+
+def test_a_weighted_region_that_is_there_twice_weighs_twice():
+    weighted = Surface("weighted_regions", "middle", sheet(-5, -5, 5, 5))
+    twice = moved(weighted, name="copy")
+    assert one(found(*SOUND.surfaces, weighted, twice), "weights multiply") == ("WARNING", "copy")
+    assert found(*SOUND.surfaces, weighted, moved(weighted, x=1, name="beside")) == []
+
+
+def test_an_area_outside_the_region():
+    outside = Surface("weighted_regions", "outside", sheet(100, 100, 110, 110))
+    assert one(found(*SOUND.surfaces, outside), "outside the region") == ("WARNING", "outside")
+
+
+def test_a_missing_face_is_a_hole_and_an_island_is_none():
+    around = [(-50, -4, 50, -1), (-50, -1, -1, 1), (1, -1, 50, 1), (-50, 1, 50, 4)]
+    holed = Surface("roads", "holed", np.concatenate([sheet(*box) for box in around]))
+    assert one(found(holed, REGION, PAVEMENT), "1 hole of up to 4 m²") == ("WARNING", "holed")
+    wide = [(-50, -4, 50, -1), (-50, -1, -10, 1), (10, -1, 50, 1), (-50, 1, 50, 4)]
+    island = Surface("roads", "island", np.concatenate([sheet(*box) for box in wide]))
+    assert found(island, REGION, PAVEMENT) == []
+
+
+def test_a_step_in_the_road():
+    halves = Surface("roads", "halves", np.concatenate([sheet(-50, -4, 0, 4), sheet(0, -4, 50, 4, 1.0)]))
+    assert one(found(halves, REGION, PAVEMENT), "steps or slopes") == ("WARNING", "halves")
+
+
+@pytest.mark.parametrize(("above", "complains"), [(0.01, False), (0.3, True), (6.0, False)])
+def test_road_closely_above_road_is_a_mistake_and_a_bridge_is_none(above, complains):
+    deck = Surface("roads", "deck", sheet(-50, -4, 50, 4, above))
+    assert any("above other road" in text for _, _, text in found(*SOUND.surfaces, deck)) == complains
+
+
+def test_what_the_layout_says_is_listed_with_its_object():
+    def lay_out(_geometry):
+        raise SeipError("mandatory pole 'post' stands in a forbidden area")
+
+    contents = dataclasses.replace(SOUND, poles=(Pole("post", np.array((0.0, 5.0, 0.0))),))
+    (problem,) = finish(check_site(contents, lay_out)).problems
+    assert problem == Problem("ERROR", "mandatory pole 'post' stands in a forbidden area", "post")
+
+
+def test_what_cannot_be_read_is_an_error_even_where_nothing_else_is_found():
+    contents = dataclasses.replace(SOUND, geometry=None, complaint="object 'road' is odd")
+    assert finish(check_site(contents, None)).problems == (Problem("ERROR", "object 'road' is odd", "road"),)
+
+
+def test_errors_come_first_and_each_once():
+    warning, error = Problem("WARNING", "w", ""), Problem("ERROR", "e", "")
+    assert checked(*SOUND.surfaces, problems=(warning, error, warning)).problems == (error, warning)
+
+
+@given(st.lists(st.tuples(*[st.floats(-1e5, 1e5)] * 9), max_size=6), st.sampled_from(["region", "roads", "occluders"]))
+def test_no_triangles_break_it(corners, role):
+    odd = Surface(role, "odd", np.array(corners, dtype=float).reshape(-1, 3, 3))
+    surfaces = (*SOUND.surfaces, odd) if len(corners) else SOUND.surfaces
+    assert checked(*surfaces).counts

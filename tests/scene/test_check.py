@@ -1,0 +1,143 @@
+"""The check goes on where a survey's reading stops, and names each culprit."""
+
+import bpy
+import pytest
+
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.site import make_site
+from seip_addon.core.site_check import check_site
+from seip_addon.scene import contract
+from seip_addon.scene.check import contents_of
+from seip_addon.scene.read import read_scene
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    sheet(scene, "region", contract.REGION, 40, 5)
+    sheet(scene, "road", contract.ROADS, 60, 7)
+    sheet(scene, "pavement", contract.CANDIDATE_AREAS, 60, 2, (0, 10, 0))
+    contract.find_or_make(scene, contract.GROUND).objects.link(bpy.data.objects["pavement"])
+    return scene
+
+
+def sheet(scene, name, where, half_x, half_y, at=(0, 0, 0)):
+    mesh = bpy.data.meshes.new(name)
+    corners = [(-half_x, -half_y, 0), (half_x, -half_y, 0), (half_x, half_y, 0), (-half_x, half_y, 0)]
+    mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
+    return put(scene, bpy.data.objects.new(name, mesh), where, at)
+
+
+def put(scene, thing, where, at=(0, 0, 0)):
+    thing.location = at
+    collection = scene.collection if where is None else contract.find_or_make(scene, where)
+    collection.objects.link(thing)
+    return thing
+
+
+def cube(scene, name, where, at, side):
+    bpy.ops.mesh.primitive_cube_add(size=side, location=at)
+    thing = bpy.context.object
+    thing.name = name
+    scene.collection.objects.unlink(thing)
+    return put(scene, thing, where, at)
+
+
+def lay_out(geometry):
+    return make_site(geometry, CandidateSettings(), 2.0), ()
+
+
+def problems(scene):
+    return [(p.severity, p.thing, p.text) for p in finish(check_site(contents_of(scene), lay_out)).problems]
+
+
+def only(scene):
+    (problem,) = problems(scene)
+    return problem
+
+
+def test_a_sound_scene_has_no_problem_and_is_laid_out(scene):
+    checked = finish(check_site(contents_of(scene), lay_out))
+    assert checked.problems == ()
+    site = make_site(read_scene(scene).geometry, CandidateSettings(), 2.0)
+    assert checked.counts["Targets"].startswith(f"{len(site.targets):,},")
+    assert checked.counts["Poses"] == f"{len(site.candidates):,}"
+
+
+def test_an_empty_scene_lacks_everything():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert [severity for severity, _, _ in problems(bpy.context.scene)] == ["ERROR"] * 3
+
+
+def test_all_faults_are_listed_where_reading_stops_at_the_first(scene):
+    broken = sheet(scene, "broken", contract.OCCLUDERS, 1, 1, (0, 20, 0))
+    broken.data.vertices[0].co.x = float("nan")
+    sheet(scene, "flat", contract.OCCLUDERS, 0, 0, (0, 20, 0))
+    put(scene, bpy.data.objects.new("bare", bpy.data.meshes.new("bare")), contract.GROUND)
+    weighted = sheet(scene, "weighted", contract.WEIGHTED_REGIONS, 3, 3)
+    weighted["seip_weight"] = "heavy"
+    found = problems(scene)
+    assert {(severity, thing) for severity, thing, _ in found} == {
+        ("ERROR", name) for name in ("broken", "flat", "bare", "weighted")
+    }
+    with pytest.raises(SeipError):
+        read_scene(scene)
+
+
+def test_an_area_that_stands_on_edge(scene):
+    sheet(scene, "edge", contract.FORBIDDEN_AREAS, 3, 3).rotation_euler.x = 1.5707963267948966
+    severity, thing, text = only(scene)
+    assert (severity, thing) == ("ERROR", "edge")
+    assert "covers no area in plan" in text
+
+
+def test_a_unit_scale_that_is_none_of_metres(scene):
+    scene.unit_settings.scale_length = 0.01
+    assert "unit scale is 0.01" in only(scene)[2]
+
+
+def test_a_broken_origin(scene):
+    scene["seip_origin"] = "here"
+    severity, _, text = only(scene)
+    assert severity == "ERROR"
+    assert "seip_origin" in text
+
+
+def test_hidden_objects_do_not_count(scene):
+    sheet(scene, "wall", contract.OCCLUDERS, 1, 1, (0, 20, 0)).hide_set(True)
+    severity, _, text = only(scene)
+    assert severity == "WARNING"
+    assert text.startswith("1 hidden object in 'SEIP Occluders'")
+
+
+def test_a_large_object_without_a_role(scene):
+    house = cube(scene, "house", None, (0, 30, 5), 10)
+    cube(scene, "far away", None, (0, 900, 5), 10)
+    cube(scene, "small", None, (0, 20, 0), 1)
+    assert only(scene)[:2] == ("WARNING", "house")
+    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(house)
+    assert problems(scene) == []
+
+
+def test_what_is_drawn_or_driven_needs_no_role(scene):
+    cube(scene, "lorry", contract.TRAFFIC, (0, 0, 2), 4)
+    assert problems(scene) == []
+
+
+def test_a_missing_library(scene, tmp_path):
+    bpy.data.libraries.write(str(tmp_path / "lib.blend"), {bpy.data.objects["pavement"]})
+    with bpy.data.libraries.load(str(tmp_path / "lib.blend"), link=True) as (_, taken):
+        taken.objects = ["pavement"]
+    put_linked = taken.objects[0]
+    contract.find_or_make(scene, contract.OCCLUDERS).objects.link(put_linked)
+    (tmp_path / "lib.blend").unlink()
+    assert ("ERROR", "pavement") in {found[:2] for found in problems(scene)}
+
+
+def test_checking_changes_nothing(scene):
+    before = [(thing.name, tuple(c.name for c in thing.users_collection)) for thing in bpy.data.objects]
+    problems(scene)
+    assert [(thing.name, tuple(c.name for c in thing.users_collection)) for thing in bpy.data.objects] == before

@@ -1,0 +1,83 @@
+"""Roles are links to the contract's collections and nothing else."""
+
+import bpy
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.streetscape.parts import Role
+from seip_addon.scene import contract, roles
+from seip_addon.scene.read import read_scene
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy.context.scene
+
+
+@pytest.fixture
+def plate(scene):
+    bpy.ops.mesh.primitive_plane_add(size=20)
+    return bpy.context.object
+
+
+@pytest.mark.parametrize("role", list(roles.ROLES))
+def test_a_mesh_can_have_any_role_and_lose_it(scene, plate, role):
+    assert roles.assign(scene, [plate], role) == 1
+    assert roles.assign(scene, [plate], role) == 0
+    assert roles.roles_of(scene, plate) == (role,)
+    assert {c.name for c in plate.users_collection} == {scene.collection.name, roles.ROLES[role]}
+    assert roles.take_out(scene, [plate], role) == 1
+    assert roles.roles_of(scene, plate) == ()
+    assert list(plate.users_collection) == [scene.collection]
+
+
+def test_roles_add_up(scene, plate):
+    roles.assign(scene, [plate], Role.GROUND)
+    roles.assign(scene, [plate], Role.CANDIDATE_AREAS)
+    assert set(roles.roles_of(scene, plate)) == {Role.GROUND, Role.CANDIDATE_AREAS}
+    roles.take_out(scene, [plate], Role.GROUND)
+    assert roles.roles_of(scene, plate) == (Role.CANDIDATE_AREAS,)
+
+
+def test_what_would_be_nowhere_goes_to_the_scene(scene, plate):
+    roles.assign(scene, [plate], Role.ROADS)
+    scene.collection.objects.unlink(plate)
+    roles.take_out(scene, [plate], Role.ROADS)
+    assert list(plate.users_collection) == [scene.collection]
+
+
+def test_sub_collections_count(scene, plate):
+    roads = contract.find_or_make(scene, contract.ROADS)
+    north = bpy.data.collections.new("north")
+    roads.children.link(north)
+    north.objects.link(plate)
+    assert roles.roles_of(scene, plate) == (Role.ROADS,)
+    assert roles.take_out(scene, [plate], Role.ROADS) == 1
+    assert roles.roles_of(scene, plate) == ()
+
+
+def test_a_light_is_nothing_and_an_empty_a_pole(scene):
+    light = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
+    empty = bpy.data.objects.new("empty", None)
+    for thing in (light, empty):
+        scene.collection.objects.link(thing)
+    with pytest.raises(SeipError, match="select meshes or empties"):
+        roles.assign(scene, [light], Role.POLES)
+    with pytest.raises(SeipError, match="instance a collection"):
+        roles.assign(scene, [empty], Role.ROADS)
+    assert roles.assign(scene, [light, empty], Role.POLES) == 1
+
+
+def test_nothing_to_take_out_is_said(scene, plate):
+    with pytest.raises(SeipError, match="nothing to take out"):
+        roles.take_out(scene, [plate], Role.POLES)
+
+
+@pytest.mark.parametrize(("corners", "area"), [(4, 200.0), (360, 157.07)])
+def test_a_drawn_region_is_as_large_as_asked(scene, plate, corners, area):
+    roles.assign(scene, [plate], Role.ROADS)
+    roles.add_area(scene, Role.REGION, (1.0, 2.0, 0.0), (20.0, 10.0), 0.3, corners)
+    region = read_scene(scene).geometry.region
+    assert region.area == pytest.approx(area, rel=1e-3)
+    assert (region.centroid.x, region.centroid.y) == pytest.approx((1.0, 2.0), abs=1e-3)
