@@ -11,11 +11,17 @@ PARTS = (
     "preferences",
     "properties",
     "state",
+    "scans",
+    "viewport.layers",
     "operators.work",
     "operators.visibility",
     "operators.placement",
+    "operators.view",
+    "operators.traffic",
     "panels.visibility",
     "panels.placement",
+    "panels.view",
+    "panels.traffic",
 )
 """Modules with ``CLASSES``, and with ``attach`` and ``detach`` for what is no class: handlers, properties, menus."""
 

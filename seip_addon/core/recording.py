@@ -9,6 +9,8 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from .datasets import FORMATS, SPLITS, SensorPose, TrafficRun, write_dataset
 from .progress import Progress
 from .scans import MountedSensor, ScanSettings, Simulation, frame_times, prepare, static_scene
@@ -17,6 +19,9 @@ from .scene_geometry import SceneGeometry
 from .traffic import Trajectories
 from .traffic.bodies import fitted_body
 from .visibility.ray_casting import engine_name
+
+SAME_TIME = 1e-6
+"""Seconds between two times that are one: of frames of Blender's timeline, and of a run."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,16 @@ def make_run(
 def simulation_of(run: Run) -> Generator[Progress, None, Simulation]:
     """Make a run's sensors ready to scan; see `prepare`."""
     return prepare(run.static, run.sensors, run.trajectories, run.bodies, run.settings)
+
+
+def frame_number(run: Run, time: float) -> tuple[int, float]:
+    """Return which frame of a run a time is next to, and its time where that is the same one, else the time given.
+
+    Noise follows from the number: at a time of the run's own a scan is the run's frame.
+    """
+    number = int(np.abs(run.times - time).argmin())
+    own = float(run.times[number])
+    return number, own if abs(own - time) < SAME_TIME else time
 
 
 def record(

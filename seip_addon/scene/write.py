@@ -25,7 +25,7 @@ MARK = "seip_result"
 
 SEEN_BY, TARGET_WEIGHT, COLOUR = "seip_seen", "seip_weight", "seip_colour"
 """Attributes of the coverage mesh, the first two of each target's square."""
-CLASSES, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
+CLASS_WORDS, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
 """Custom properties of the coverage: what its colours mean; the aspect is empty where they are another's."""
 
 LIFT = max(height for height, _ in VEILS.values()) + 0.02
@@ -199,7 +199,7 @@ def _paint(thing: bpy.types.Object, colours: Colouring) -> None:
         mesh.materials.append(matt(words, colour))
     mesh.polygons.foreach_set("material_index", colours.of.astype(np.int32))
     mesh.update()
-    thing[CLASSES], thing[CLASS_COLOURS] = list(colours.words), list(colours.colours)
+    thing[CLASS_WORDS], thing[CLASS_COLOURS] = list(colours.words), list(colours.colours)
     thing[SHARES] = colours.shares.tolist()
     thing[ASPECT] = ""
 
