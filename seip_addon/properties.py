@@ -274,6 +274,20 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         ),
         update=_recolour,
     )
+    picture: StringProperty(
+        name="Picture",
+        description="PNG to write; where one of that name is there already, the next gets a number",
+        subtype="FILE_PATH",
+        default="//placement.png",
+    )
+    picture_of: EnumProperty(
+        name="View",
+        description="What stands beside the plan",
+        items=(
+            ("VIEW", "This View", "What this viewport shows, with all that is drawn in it and its legend"),
+            ("RENDER", "Rendered", "The rendered view that the batch command makes; takes some seconds"),
+        ),
+    )
 
 
 class SEIP_PG_traffic(bpy.types.PropertyGroup):

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import chain, count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
 import bpy
 
 from .. import state
@@ -17,6 +22,7 @@ from .work import Outcome, attempt
 
 NO_COVERAGE = "place sensors first: there is no coverage to show"
 NO_GRID = "compute visibility first: that is what sight lines are drawn from"
+NO_PLAN = "place sensors first: there is nothing to take a picture of"
 NO_SENSORS = "place sensors first: there is none to look from"
 
 
@@ -154,6 +160,102 @@ class SEIP_OT_hide_sight_lines(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def why_no_picture(scene: bpy.types.Scene) -> str:
+    """Return why no picture can be taken; nothing where one can."""
+    held = state.find(scene)
+    return NO_PLAN if held is None or held.plan is None else ""
+
+
+class SEIP_OT_save_picture(bpy.types.Operator):
+    """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
+
+    bl_idname = "seip.save_picture"
+    bl_label = "Save Picture"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is a placement to show."""
+        return _can(cls, why_no_picture(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Take it."""
+        return attempt(self, lambda: self._save(context))
+
+    def _save(self, context: bpy.types.Context) -> None:
+        settings = context.scene.seip.view
+        path = _free(_named(settings.picture))
+        if settings.picture_of == "VIEW":
+            save_viewport_sheet(path, context.scene, _viewport(context))
+        else:
+            save_rendered_sheet(path, context.scene)
+        self.report({"INFO"}, f"written {path}")
+
+
+def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+    """Write what a viewport shows, and the plan beside it."""
+    from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
+
+    from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
+
+    _save_sheet(path, scene, Image.fromarray(view_pixels(scene, area)))
+
+
+def save_rendered_sheet(path: Path, scene: bpy.types.Scene) -> None:
+    """Write the rendered view that batch commands make, and the plan beside it."""
+    from PIL import Image  # noqa: PLC0415  # as above
+
+    from ..scene.render import save_rendered_view  # noqa: PLC0415  # as above
+
+    held = _placed(scene)
+    with TemporaryDirectory(prefix="seip-") as folder:
+        view = Path(folder) / "view.png"
+        save_rendered_view(view, scene, held.layout.site, held.plan.deployment)
+        with Image.open(view) as picture:
+            _save_sheet(path, scene, picture)
+
+
+def _save_sheet(path: Path, scene: bpy.types.Scene, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
+    from PIL import Image  # noqa: PLC0415  # as above
+
+    from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
+    from ..core.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
+
+    held = _placed(scene)
+    layout, plan = held.layout, held.plan
+    with TemporaryDirectory(prefix="seip-") as folder:
+        drawn = Path(folder) / "plan.png"
+        notes = [plan.certificate, *layout.warnings]
+        save_plan_view(drawn, layout.geometry, layout.site, plan.deployment, notes)
+        with Image.open(drawn) as picture:
+            save_sheet(path, view, picture)
+
+
+def _placed(scene: bpy.types.Scene) -> Any:  # noqa: ANN401  # what is held, with its plan
+    held = state.find(scene)
+    if held is None or held.plan is None:
+        raise SeipError(NO_PLAN)
+    return held
+
+
+def _viewport(context: bpy.types.Context) -> bpy.types.Area:
+    area = context.area
+    if bpy.app.background or area is None or area.type != "VIEW_3D":
+        raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
+    return area
+
+
+def _named(text: str) -> Path:
+    if text.startswith("//") and not bpy.data.filepath:
+        raise SeipError(f"the picture {text} is beside the file, and the file has not been saved: save it first")
+    return Path(bpy.path.abspath(text)).with_suffix(".png")
+
+
+def _free(path: Path) -> Path:
+    """Return the name, with the first number that is free where there is a picture of that name."""
+    numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    return next(name for name in chain([path], numbered) if not name.exists())
+
+
 def _can(operator: type[bpy.types.Operator], why_not: str) -> bool:
     if why_not:
         operator.poll_message_set(why_not)
@@ -166,4 +268,5 @@ CLASSES = (
     SEIP_OT_toggle_legend,
     SEIP_OT_show_sight_lines,
     SEIP_OT_hide_sight_lines,
+    SEIP_OT_save_picture,
 )

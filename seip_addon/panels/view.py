@@ -8,10 +8,12 @@ from .. import scans
 from ..operators.view import (
     SEIP_OT_colour_coverage,
     SEIP_OT_hide_sight_lines,
+    SEIP_OT_save_picture,
     SEIP_OT_show_coverage_colours,
     SEIP_OT_show_sight_lines,
     SEIP_OT_toggle_legend,
     why_no_coverage,
+    why_no_picture,
     why_no_sight,
 )
 from ..scene.write import ASPECT, coverage_of
@@ -34,6 +36,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         self._draw_coverage(context)
         self._draw_sight(context)
         self._draw_cloud(context)
+        self._draw_picture(context)
 
     def _draw_coverage(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
@@ -78,6 +81,17 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
             column.operator("seip.hide_scan", icon="X")
         else:
             draw_sentence(column, context, "scan a frame first, under Traffic and Scans", "INFO")
+
+    def _draw_picture(self, context: bpy.types.Context) -> None:
+        view = context.scene.seip.view
+        column = self.layout.column(align=True)
+        column.label(text="Picture for a Report")
+        column.row(align=True).prop(view, "picture_of", expand=True)
+        column.prop(view, "picture", text="")
+        column.operator(SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
+        why_not = why_no_picture(context.scene)
+        if why_not:
+            draw_sentence(column, context, why_not, "INFO")
 
 
 CLASSES = (SEIP_PT_view,)

@@ -12,6 +12,7 @@ TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0
 """Pixels at the interface's usual scale."""
 PAPER: Colour = (0.06, 0.08, 0.10, 0.82)
 INK: Colour = (0.95, 0.96, 0.97, 1.0)
+EDGE: Colour = (0.55, 0.58, 0.62, 1.0)
 FONT = 0
 
 
@@ -60,6 +61,7 @@ def _width(block: Block) -> float:
 
 
 def _draw_entry(entry: Entry, x: float, y: float, scale: float) -> None:
+    _fill(x - scale, y + scale, (SWATCH + 2) * scale, 13 * scale, (EDGE, EDGE))
     ends = entry.colours if len(entry.colours) > 1 else entry.colours * 2
     part = SWATCH * scale / (len(ends) - 1)
     for number, pair in enumerate(pairwise(ends)):
