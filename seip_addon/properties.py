@@ -279,13 +279,18 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
         description="PNG to write; where one of that name is there already, the next gets a number",
         subtype="FILE_PATH",
         default="//placement.png",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     picture_of: EnumProperty(
         name="View",
         description="What stands beside the plan",
         items=(
             ("VIEW", "This View", "What this viewport shows, with all that is drawn in it and its legend"),
-            ("RENDER", "Rendered", "The rendered view that the batch command makes; takes some seconds"),
+            (
+                "RENDER",
+                "Rendered",
+                "The rendered view that the batch command makes; Blender does not answer for up to half a minute",
+            ),
         ),
     )
 
@@ -298,16 +303,19 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         description="Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
         "empty for objects that are animated in the scene",
         subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     routes: StringProperty(
         name="Routes",
         description="SUMO's file with the vehicle types, which knows their sizes",
         subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     net: StringProperty(
         name="Network",
         description="SUMO's .net.xml, which knows the offset from the map",
         subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     loaded: StringProperty(name="Loaded", description="What was found in the file, one fact a line")
     seed: IntProperty(name="Seed", description="Of noise and lost returns", default=0, min=0)
@@ -353,6 +361,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         description="Of the run: its frames and its datasets; a run that was stopped goes on there",
         subtype="DIR_PATH",
         default="//scans",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     formats: EnumProperty(
         name="Formats",

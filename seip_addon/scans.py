@@ -53,15 +53,15 @@ class HeldScan:
     frame : Frame
     seconds : float
         That the scan took.
-    in_words : str
-        What came of it, one fact a line.
+    in_words : tuple of str
+        What came of it, one fact each.
     """
 
     run: Run
     simulation: Simulation
     frame: Frame
     seconds: float
-    in_words: str = ""
+    in_words: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         counts = np.bincount(self.frame.sensor, minlength=len(self.run.sensors)).tolist()
@@ -69,7 +69,7 @@ class HeldScan:
         lines = [f"{sensor.label}: {count:,} points" for sensor, count in zip(self.run.sensors, counts, strict=True)]
         lines.append(f"{np.count_nonzero(users)} of {len(users)} road users seen")
         lines.append(f"{self.frame.time:.2f} s, scanned in {1e3 * self.seconds:.0f} ms")
-        self.in_words = "\n".join(lines)
+        self.in_words = tuple(lines)
 
 
 traffic: dict[int, HeldTraffic] = {}

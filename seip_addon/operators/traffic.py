@@ -22,7 +22,32 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from .work import LongWork, Outcome
+from .work import LongWork, Outcome, Result
+
+NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
+NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
+NO_SENSORS = "There is no sensor to scan with: place sensors first."
+
+
+def why_no_scan(scene: bpy.types.Scene) -> str:
+    """Return why nothing can be scanned; nothing where it can."""
+    sensors = contract.find(scene, contract.SENSORS)
+    if sensors is None or not len(sensors.all_objects):
+        return NO_SENSORS
+    there = scene.seip.traffic.file or contract.find(scene, contract.TRAFFIC) is not None
+    return "" if there else NO_TRAFFIC
+
+
+class _Scanning(LongWork[Result]):
+    """A mixin: a button that works where there are sensors and traffic."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is anything to scan."""
+        sentence = why_no_scan(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
 
 
 class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
@@ -79,7 +104,7 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_scan_frame(LongWork[scans.HeldScan], bpy.types.Operator):
+class SEIP_OT_scan_frame(_Scanning[scans.HeldScan], bpy.types.Operator):
     """Show what the placed sensors measure at the current frame of the timeline"""
 
     bl_idname = "seip.scan_frame"
@@ -89,11 +114,14 @@ class SEIP_OT_scan_frame(LongWork[scans.HeldScan], bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, scans.HeldScan]:
         """Read what is scanned."""
         self._scene_read = _SceneRead(scene)
-        return self._work(scans.now(scene))
+        return self._work(scans.now(scene), scans.find(scene))
 
-    def _work(self, at: float) -> Generator[Progress, None, scans.HeldScan]:
+    def _work(self, at: float, before: scans.HeldScan | None) -> Generator[Progress, None, scans.HeldScan]:
         run = yield from self._scene_read.run()
-        simulation = yield from simulation_of(run)
+        if before is not None and before.run.key == run.key:
+            run, simulation = before.run, before.simulation
+        else:
+            simulation = yield from simulation_of(run)
         yield Progress(0, 0, "scan")
         return scans.measure(run, simulation, at)
 
@@ -118,7 +146,7 @@ class SEIP_OT_hide_scan(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_write_dataset(LongWork[Record], bpy.types.Operator):
+class SEIP_OT_write_dataset(_Scanning[Record], bpy.types.Operator):
     """Scan frame after frame and write them, with the boxes of all road users, as datasets to train detectors on"""
 
     bl_idname = "seip.write_dataset"
@@ -192,8 +220,6 @@ def _facts(trajectories: Trajectories) -> list[str]:
     kinds = [f"{counts[category]} {category}" for category in CATEGORIES if counts[category]]
     return [f"{len(trajectories)} road users, {begin:g} to {end:g} s", ", ".join(kinds)]
 
-
-NO_FILE = "name a traffic file first"
 
 CLASSES = (
     SEIP_OT_load_traffic,

@@ -20,10 +20,10 @@ from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
 from .work import Outcome, attempt
 
-NO_COVERAGE = "place sensors first: there is no coverage to show"
-NO_GRID = "compute visibility first: that is what sight lines are drawn from"
-NO_PLAN = "place sensors first: there is nothing to take a picture of"
-NO_SENSORS = "place sensors first: there is none to look from"
+NO_COVERAGE = "There is no coverage to show: place sensors first."
+NO_GRID = "It is not known who sees what: compute visibility first."
+NO_PLAN = "There is nothing to take a picture of: place sensors first."
+NO_SENSORS = "There is no sensor to look from: place sensors first."
 
 
 def why_no_coverage(scene: bpy.types.Scene) -> str:

@@ -11,11 +11,10 @@ from ..operators.traffic import (
     SEIP_OT_load_traffic,
     SEIP_OT_scan_frame,
     SEIP_OT_write_dataset,
+    why_no_scan,
 )
-from ..operators.view import NO_SENSORS
-from ..scene.sensors import placed_sensors
 from .run_button import draw_run
-from .sentences import draw_sentence
+from .sentence import draw_sentence
 from .sidebar import Sidebar
 
 
@@ -35,13 +34,13 @@ class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
             column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
             column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
         if not traffic.file:
-            draw_sentence(layout, context, f"{NO_FILE}, or animate objects in SEIP Traffic", "INFO")
+            draw_sentence(layout, NO_FILE, icon="INFO")
         row = layout.row(align=True)
         draw_run(row, SEIP_OT_load_traffic.bl_idname)
         row.operator(SEIP_OT_clear_traffic.bl_idname, text="", icon="TRASH")
         row.operator("screen.animation_play", text="", icon="PLAY")
-        if traffic.loaded:
-            draw_sentence(layout, context, traffic.loaded)
+        for line in traffic.loaded.splitlines():
+            draw_sentence(layout, line)
 
 
 class SEIP_PT_scan(Sidebar, bpy.types.Panel):
@@ -63,11 +62,12 @@ class SEIP_PT_scan(Sidebar, bpy.types.Panel):
         column.prop(traffic, "rolling_shutter")
         column.prop(traffic, "follow")
         draw_run(layout, SEIP_OT_scan_frame.bl_idname)
-        if not placed_sensors(context.scene):
-            draw_sentence(layout, context, NO_SENSORS, "INFO")
+        why_not = why_no_scan(context.scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
         scan = scans.find(context.scene)
-        if scan is not None:
-            draw_sentence(layout, context, scan.in_words)
+        for line in scan.in_words if scan is not None else ():
+            draw_sentence(layout, line)
 
 
 class SEIP_PT_dataset(Sidebar, bpy.types.Panel):
@@ -95,6 +95,9 @@ class SEIP_PT_dataset(Sidebar, bpy.types.Panel):
         layout.label(text="Formats")
         layout.column(align=True).prop(traffic, "formats")
         draw_run(layout, SEIP_OT_write_dataset.bl_idname)
+        why_not = why_no_scan(context.scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
 
 
 CLASSES = (SEIP_PT_traffic, SEIP_PT_scan, SEIP_PT_dataset)

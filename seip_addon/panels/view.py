@@ -19,7 +19,7 @@ from ..operators.view import (
 from ..scene.write import ASPECT, coverage_of
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
-from .sentences import draw_sentence
+from .sentence import draw_sentence
 from .sidebar import Sidebar
 
 ASPECTS = ("seen", "times", "weights")
@@ -52,9 +52,9 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
             button.aspect = aspect
         why_not = why_no_coverage(context.scene)
         if why_not:
-            draw_sentence(column, context, why_not, "INFO")
+            draw_sentence(column, why_not, icon="INFO")
         elif not coverage.shows_coverage(context.space_data):
-            draw_sentence(column, context, "This view's shading does not show the colours", "ERROR")
+            draw_sentence(column, "This view's shading does not show the colours.", icon="ERROR")
             column.operator(SEIP_OT_show_coverage_colours.bl_idname)
 
     def _draw_sight(self, context: bpy.types.Context) -> None:
@@ -68,7 +68,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
             row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
         why_not = why_no_sight(context.scene)
         if why_not:
-            draw_sentence(column, context, why_not, "INFO")
+            draw_sentence(column, why_not, icon="INFO")
 
     def _draw_cloud(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
@@ -80,7 +80,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         if there:
             column.operator("seip.hide_scan", icon="X")
         else:
-            draw_sentence(column, context, "scan a frame first, under Traffic and Scans", "INFO")
+            draw_sentence(column, "There is no scan yet: scan a frame, under Traffic and Scans.", icon="INFO")
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
         view = context.scene.seip.view
@@ -91,7 +91,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column.operator(SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
         why_not = why_no_picture(context.scene)
         if why_not:
-            draw_sentence(column, context, why_not, "INFO")
+            draw_sentence(column, why_not, icon="INFO")
 
 
 CLASSES = (SEIP_PT_view,)

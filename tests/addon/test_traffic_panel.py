@@ -10,8 +10,11 @@ import pytest
 
 from seip_addon import scans
 from seip_addon.core.scans import Frame
+from seip_addon.scene.write import write_result
 from seip_addon.viewport import layers
 from seip_addon.viewport.point_cloud import NAME as CLOUD
+from tests.scene_by_hand import make_scene
+from tests.small_junction import make_example
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 TRAFFIC = SCENES / "junction_traffic" / "run-1.npz"
@@ -128,8 +131,11 @@ def test_following_scans_at_each_frame_and_leaves_no_handler(placed):
     ("wrong", "words"),
     [
         (lambda scene: setattr(scene.seip.traffic, "file", "/nowhere/run.npz"), "there is no .*run.npz"),
-        (lambda scene: setattr(scene.seip.traffic, "file", ""), "has no traffic"),
-        (lambda scene: bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects), "has no sensors"),
+        (lambda scene: setattr(scene.seip.traffic, "file", ""), "There is nothing to scan: name a traffic file"),
+        (
+            lambda scene: bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects),
+            "There is no sensor to scan with",
+        ),
         (lambda scene: setattr(scene.seip.traffic, "folder", ""), "name a folder"),
     ],
 )
@@ -141,8 +147,34 @@ def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_beside_a_file_that_was_never_saved_has_its_sentence(placed, monkeypatch):
-    placed.seip.traffic.folder = "//scans"
+def test_a_folder_beside_a_file_that_was_never_saved_has_its_sentence(add_on):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with pytest.raises(RuntimeError):
+    scene = make_scene(make_example().geometry)
+    write_result(scene, make_example().site, make_example().deployment)
+    scene.seip.traffic.file = str(TRAFFIC)
+    with pytest.raises(RuntimeError, match="the file has not been saved: save it first"):
         bpy.ops.seip.write_dataset()
+
+
+def test_a_second_scan_of_the_same_scene_needs_no_preparation(placed):
+    bpy.ops.seip.scan_frame()
+    first = scans.find(placed).simulation
+    placed.frame_set(300)
+    bpy.ops.seip.scan_frame()
+    assert scans.find(placed).simulation is first
+    empty = next(thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY")
+    empty.location.z += 1.0
+    bpy.ops.seip.scan_frame()
+    assert scans.find(placed).simulation is not first
+
+
+def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
+    car = '<vehicle id="a" x="{}" y="-1.75" angle="90" type="car" speed="5"/>'
+    lines = [f'<timestep time="{time}">{car.format(5 * time - 40)}</timestep>' for time in range(6)]
+    fcd = tmp_path / "run.fcd.xml"
+    fcd.write_text(f"<fcd-export>{''.join(lines)}</fcd-export>", encoding="utf-8")
+    placed.seip.traffic.file = str(fcd)
+    assert bpy.ops.seip.load_traffic() == {"FINISHED"}
+    assert placed.seip.traffic.loaded.startswith("1 road users, 0 to 5 s\n1 car")
+    bpy.ops.seip.scan_frame()
+    assert scans.find(placed).run.trajectories.source == "run.fcd.xml"

@@ -5,9 +5,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from PIL import Image
 
 import seip_addon
 from seip_addon import state
+from seip_addon.scene import render
 from seip_addon.viewport import layers
 from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT
@@ -33,9 +35,9 @@ def placed(junction):
 
 
 def test_nothing_can_be_shown_before_a_placement(junction):
-    with pytest.raises(RuntimeError, match="place sensors first: there is no coverage to show"):
+    with pytest.raises(RuntimeError, match="There is no coverage to show: place sensors first"):
         bpy.ops.seip.colour_coverage()
-    with pytest.raises(RuntimeError, match="place sensors first: there is none to look from"):
+    with pytest.raises(RuntimeError, match="There is no sensor to look from: place sensors first"):
         bpy.ops.seip.show_sight_lines()
     assert layers.drawing() == 0
 
@@ -100,6 +102,23 @@ def test_draw_handlers_are_always_removed(placed, ending):
     assert layers.drawing() == 0
     if ending == "unregister":
         seip_addon.register()
+
+
+def test_a_picture_has_the_rendered_view_and_the_plan(placed, tmp_path, monkeypatch):
+    for name, value in (("WIDTH", 320), ("HEIGHT", 180), ("SAMPLES", 1)):
+        monkeypatch.setattr(render, name, value)
+    placed.seip.view.picture, placed.seip.view.picture_of = str(tmp_path / "report.png"), "RENDER"
+    assert bpy.ops.seip.save_picture() == {"FINISHED"}
+    assert bpy.ops.seip.save_picture() == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["report-2.png", "report.png"]
+    with Image.open(tmp_path / "report.png") as picture:
+        assert picture.width > 2 * picture.height
+
+
+def test_a_picture_of_a_viewport_needs_one(placed, tmp_path):
+    placed.seip.view.picture = str(tmp_path / "report.png")
+    with pytest.raises(RuntimeError, match="there is no viewport here to take a picture of"):
+        bpy.ops.seip.save_picture()
 
 
 def test_another_scene_shows_nothing_of_this_one(placed):
