@@ -330,7 +330,6 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         description="Scan again whenever the frame changes",
         default=False,
         update=_follow,
-        options={"SKIP_SAVE"},
     )
     whole: BoolProperty(name="All of the Traffic", description="From its first moment to its last", default=True)
     start: FloatProperty(

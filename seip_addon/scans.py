@@ -110,6 +110,7 @@ def measure(run: Run, simulation: Simulation, at: float) -> HeldScan:
 def keep(scene: bpy.types.Scene, scan: HeldScan) -> None:
     """Hold a scan and show its points."""
     held[scene.session_uid] = scan
+    keep_following()  # a file may have been saved while it followed
     show_cloud(scene)
 
 

@@ -106,11 +106,12 @@ class LongWork(Generic[Result]):
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    """Have all viewports drawn anew, their sidebars with them."""
+    """Have the sidebars of all viewports drawn anew; the views themselves may be slow to draw, and have not changed."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+            for region in area.regions if area.type == "VIEW_3D" else ():
+                if region.type == "UI":
+                    region.tag_redraw()
 
 
 class SEIP_OT_stop(bpy.types.Operator):

@@ -28,7 +28,8 @@ def draw_legend(scene: bpy.types.Scene, region: bpy.types.Region, area: bpy.type
     scale : float
         Of the interface.
     """
-    beside = next((other.width for other in area.regions if other.type == "UI" and other.width > 1), 0)
+    overlaps = bpy.context.preferences.system.use_region_overlap
+    beside = next((other.width for other in area.regions if other.type == "UI" and overlaps and other.width > 1), 0)
     draw_legend_at(scene, region.width - beside - MARGIN * scale, MARGIN * scale, scale)
 
 
