@@ -65,12 +65,7 @@ def test_a_dataset_is_that_of_the_batch_command(placed, tmp_path):
     assert one.keys() == other.keys()
     assert len(list((tmp_path / "panel" / "run" / "frames").iterdir())) == 2
     for name in one:
-        if name.suffix != ".npz":  # zip archives carry the time
-            assert one[name] == other[name], name
-    for name in (name for name in one if name.suffix == ".npz"):
-        mine, batch = (Frame.load(tmp_path / which / name) for which in ("panel", "batch"))
-        assert mine.points.tobytes() == batch.points.tobytes()
-        assert mine.instance.tobytes() == batch.instance.tobytes()
+        assert one[name] == other[name], name
 
 
 def test_a_scan_at_a_time_of_the_run_is_the_runs_frame(placed, tmp_path):
