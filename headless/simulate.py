@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -21,26 +20,18 @@ from headless import session
 from headless.survey import HelpWithDefaults
 
 import bpy
-import numpy as np
 
-from seip_addon.core.datasets import FORMATS, SPLITS, SensorPose, TrafficRun, write_dataset
-from seip_addon.core.errors import SeipError
+from seip_addon.core.datasets import FORMATS, SPLITS
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.pictures.scan_view import save_scan_view
-from seip_addon.core.progress import Progress, finish
+from seip_addon.core.progress import finish
+from seip_addon.core.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.scans import ScanSettings, frame_times, prepare, static_scene
-from seip_addon.core.scans.run_folder import Record, Run, check_run_folder, load_frames, write_run
-from seip_addon.core.scene_geometry import SceneGeometry
-from seip_addon.core.traffic import Trajectories
-from seip_addon.core.traffic.bodies import fitted_body
-from seip_addon.core.visibility.ray_casting import engine_name
+from seip_addon.core.scans import ScanSettings
+from seip_addon.core.scans.run_folder import Record, Run, check_run_folder
+from seip_addon.core.traffic.source import load_trajectories
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 from seip_addon.scene.traffic import read_traffic
-
-FAR = 500.0
-"""Metres from the region beyond which traffic is another place's."""
 
 
 def main(argv: list[str]) -> None:
@@ -48,74 +39,51 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     session.check_folder(options.output)
     session.open_scene(options.scene)
-    run = _run(options)
+    settings = _settings(options)
+    run = _run(options, settings)
     check_run_folder(options.output, run)
     session.say(_in_words(run))
     with session.progress_bar() as report:
-        simulation = finish(prepare(run.static, run.sensors, run.trajectories, run.bodies, run.settings), report)
+        simulation = finish(simulation_of(run), report)
     for sentence in simulation.warnings:
         session.say(f"warning: {sentence}")
     with session.progress_bar() as report:
-        record = finish(write_run(options.output, run, simulation), report)
-    session.say(_summary(record))
-    save_scan_view(options.output / "frame.png", next(load_frames(options.output))[1], run.static.region, run.sensors)
-    for key in options.format:
-        with session.progress_bar() as report:
-            _export(key, options, run, report)
+        manifest = finish(record(options.output, run, simulation, settings), report)
+    session.say(_summary(manifest))
+    for key in settings.formats:
+        session.say(f"{FORMATS[key].name}: {dataset_folder(options.output, settings, key)}/")
     session.say(f"written to {options.output}/")
 
 
-def _run(options: argparse.Namespace) -> Run:
-    """Gather all that the frames follow from."""
+def _settings(options: argparse.Namespace) -> RecordingSettings:
+    return RecordingSettings(
+        scan=ScanSettings(
+            seed=options.seed,
+            noise=not options.no_noise,
+            rolling_shutter=options.rolling_shutter,
+            engine=options.engine,
+        ),
+        start=options.start,
+        duration=options.duration,
+        rate=options.rate,
+        formats=tuple(options.format),
+        dataset=options.dataset,
+        split=options.split,
+    )
+
+
+def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
+    """Read what the frames follow from: the scene, its sensors, and its traffic."""
     reading = read_scene(bpy.context.scene)
     for sentence in reading.warnings:
         session.say(f"warning: {sentence}")
     sensors = read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
-    trajectories = _trajectories(options.traffic, reading.geometry)
-    return Run(
-        static=static_scene(reading.geometry),
-        origin=reading.geometry.origin,
-        sensors=sensors,
-        trajectories=trajectories,
-        bodies=tuple(fitted_body(user) for user in trajectories.users),
-        times=frame_times(trajectories, sensors, start=options.start, duration=options.duration, rate=options.rate),
-        settings=ScanSettings(
-            seed=options.seed,
-            noise=not options.no_noise,
-            rolling_shutter=options.rolling_shutter,
-            engine=engine_name(options.engine),
-        ),
-        versions=versions(blender=bpy.app.version_string),
-    )
-
-
-def _trajectories(path: Path | None, geometry: SceneGeometry) -> Trajectories:
-    """Return the traffic of a file, else that which is animated in the scene, in the scene's axes."""
-    if path is None:
+    if options.traffic is None:
         with session.progress_bar() as report:
-            return finish(read_traffic(bpy.context.scene), report)
-    trajectories = Trajectories.load(path).moved_to(geometry.origin)
-    left, bottom, right, top = geometry.region.bounds
-    low, high = np.array([left, bottom]) - FAR, np.array([right, top]) + FAR
-    plan = trajectories.position[:, :2]
-    if not ((plan >= low) & (plan <= high)).all(axis=1).any():
-        raise SeipError(f"all traffic of {path} is far from this scene: name traffic that was made for its map")
-    return trajectories
-
-
-def _export(key: str, options: argparse.Namespace, run: Run, report: Callable[[Progress], None]) -> None:
-    """Write the run into the dataset of a format, beside the frames."""
-    traffic = TrafficRun(
-        name=options.output.resolve().name,
-        split=options.split,
-        key=run.key,
-        sensors=tuple(SensorPose(s.label, s.model.name, s.xyz, s.orientation) for s in run.sensors),
-        origin=run.origin,
-        record=run.record(),
-    )
-    folder = options.output / key if options.dataset is None else options.dataset / key
-    finish(write_dataset(FORMATS[key], load_frames(options.output), traffic, folder), report)
-    session.say(f"{FORMATS[key].name}: {folder}/")
+            trajectories = finish(read_traffic(bpy.context.scene), report)
+    else:
+        trajectories = load_trajectories(options.traffic, reading.geometry)
+    return make_run(reading.geometry, sensors, trajectories, settings, versions(blender=bpy.app.version_string))
 
 
 def _in_words(run: Run) -> str:
@@ -130,8 +98,8 @@ def _in_words(run: Run) -> str:
     return "\n".join(lines)
 
 
-def _summary(record: Record) -> str:
-    frames = record["frames"]
+def _summary(manifest: Record) -> str:
+    frames = manifest["frames"]
     points, users = (sum(frame[what] for frame in frames) / len(frames) for what in ("points", "road_users"))
     empty = sum(frame["road_users"] == 0 for frame in frames)
     note = f"; {empty} frames have no road user" if empty else ""

@@ -15,7 +15,6 @@ import argparse
 import math
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Generator, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -29,30 +28,29 @@ from headless import session, survey
 import bpy
 import numpy as np
 
-from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.scene_geometry import SceneGeometry, joined
-from seip_addon.core.traffic import CATEGORIES, Trajectories
+from seip_addon.core.scene_geometry import SceneGeometry
+from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.demand import Demand
-from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories, some
-from seip_addon.core.traffic.overlaps import find_overlaps, without_overlaps
+from seip_addon.core.traffic.floating_car_data import Window, some
+from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
+from seip_addon.core.traffic.source import (
+    MARGIN,
+    TrafficFiles,
+    kinds_in_words,
+    load_traffic,
+    read_sumo,
+    road_bounds,
+)
 from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
-from seip_addon.core.traffic.sumo_files import read_net_offset
-from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate
 
 Result = TypeVar("Result")
-
-MARGIN = 20.0
-"""Metres beyond the road of the scene within which traffic is read."""
-
-LOOKS = 1.0
-"""Seconds between two looks for road users in one place, where a file is read."""
 
 
 def main(argv: list[str]) -> None:
@@ -71,19 +69,10 @@ def main(argv: list[str]) -> None:
 
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
-    window = Window(options.begin, options.end, _bounds(geometry, MARGIN))
-    read = _read(options.fcd, options.routes, options.net, window, geometry.origin, options.fcd.name)
-    trajectories = _fitted(read, geometry)
-    overlaps = _run(find_overlaps(trajectories, LOOKS))
-    if len(overlaps):
-        worst = int(overlaps.area.argmax())
-        one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
-        sentence = (
-            f"{len(overlaps)} pairs of road users stand in one another; {one} and {other} "
-            f"share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
-        )
-        _warn([sentence])
-    return trajectories
+    files = TrafficFiles(options.fcd, tuple(options.routes), options.net, options.begin, options.end)
+    loaded = _run(load_traffic(files, geometry))
+    _warn(loaded.warnings)
+    return loaded.trajectories
 
 
 def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
@@ -93,11 +82,14 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     end = options.warm_up + options.duration
     scenario = Scenario(demand, SignalPlan(options.green), options.seed, end)
     with tempfile.TemporaryDirectory() as folder:
-        files = _run(simulate(options.simulate, Path(folder), scenario, _bounds(geometry, 0.0)))
+        files = _run(simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0)))
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
-        window = Window(options.warm_up, end, _bounds(geometry, MARGIN))
-        read = _read(files.floating_car_data, [files.routes], files.network, window, geometry.origin, source)
-    simulated = _fitted(smooth_walks(read), geometry)
+        window = Window(options.warm_up, end, road_bounds(geometry, MARGIN))
+        made = TrafficFiles(files.floating_car_data, (files.routes,), files.network)
+        read = _run(read_sumo(made, window, geometry.origin, source))
+    fit = fit_to_road(smooth_walks(read.trajectories), geometry)
+    _warn((*read.warnings, *fit.warnings))
+    simulated = fit.trajectories
     apart, collided = _run(without_overlaps(simulated))
     if collided:
         session.say(
@@ -106,32 +98,9 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))
 
 
-def _read(  # all that a file of traffic needs beside it
-    path: Path, routes: list[Path], net: Path | None, window: Window, origin: Float, source: str
-) -> Trajectories:
-    offset = None if net is None else read_net_offset(net)
-    data = _run(read_floating_car_data(path, offset, window))
-    trajectories, warnings = read_trajectories(data, _run(read_vehicle_types(routes)), origin, source)
-    _warn(warnings)
-    return trajectories
-
-
-def _fitted(trajectories: Trajectories, geometry: SceneGeometry) -> Trajectories:
-    fit = fit_to_road(trajectories, geometry)
-    _warn(fit.warnings)
-    return fit.trajectories
-
-
 def _warn(sentences: Iterable[str]) -> None:
     for sentence in sentences:
         session.say(f"warning: {sentence}")
-
-
-def _bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:
-    """Return the rectangle of the scene's road in map coordinates."""
-    road = joined(geometry.roads)[:, :, :2].reshape(-1, 2) + geometry.origin[:2]
-    (left, low), (right, high) = road.min(axis=0) - margin, road.max(axis=0) + margin
-    return float(left), float(low), float(right), float(high)
 
 
 def _run(steps: Generator[Progress, None, Result]) -> Result:
@@ -141,12 +110,10 @@ def _run(steps: Generator[Progress, None, Result]) -> Result:
 
 def _in_words(trajectories: Trajectories) -> str:
     begin, end = trajectories.span
-    counts = Counter(user.category for user in trajectories.users)
-    kinds = ", ".join(f"{counts[category]} {category}" for category in CATEGORIES if counts[category])
     present = len(trajectories.at((begin + end) / 2.0))
     return (
-        f"{len(trajectories)} road users ({kinds}) from {begin:g} to {end:g} s, {len(trajectories.time):,} samples, "
-        f"{present} at once halfway"
+        f"{len(trajectories)} road users ({kinds_in_words(trajectories)}) from {begin:g} to {end:g} s, "
+        f"{len(trajectories.time):,} samples, {present} at once halfway"
     )
 
 

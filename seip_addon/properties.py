@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 import bpy
@@ -15,11 +16,16 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import scans
 from .core.candidates import HIGHEST, CandidateSettings, heights_of
+from .core.datasets import FORMATS, SPLITS
 from .core.goal import DEFAULT_COUNT, Goal
+from .core.recording import RecordingSettings
+from .core.scans import ScanSettings
 from .core.scene_geometry import DEFAULT_WEIGHT
 from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from .core.survey import SurveySettings
+from .core.traffic.source import TrafficFiles
 from .core.visibility.grid import VisibilitySettings
 from .preferences import catalogue_files
 from .scene import contract, roles
@@ -332,6 +338,146 @@ class SEIP_PG_result(bpy.types.PropertyGroup):
     record: StringProperty(name="Record", description="The placement as placement.json holds it")
 
 
+def _recolour(_own: object, context: bpy.types.Context) -> None:
+    scans.show_cloud(context.scene)
+
+
+def _follow(_own: object, _context: bpy.types.Context) -> None:
+    scans.keep_following()
+
+
+class SEIP_PG_view(bpy.types.PropertyGroup):
+    """How what was found is shown."""
+
+    cloud_colour: EnumProperty(
+        name="Point Colours",
+        description="What the colours of the point cloud mean",
+        items=(
+            ("sensor", "Sensor", "Which sensor measured the point"),
+            ("intensity", "Intensity", "How strong the return is"),
+            ("instance", "Road User", "Which road user returned it"),
+        ),
+        update=_recolour,
+    )
+    picture: StringProperty(
+        name="Picture",
+        description="PNG to write; where one of that name is there already, the next gets a number",
+        subtype="FILE_PATH",
+        default="//placement.png",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    picture_of: EnumProperty(
+        name="View",
+        description="What stands beside the plan",
+        items=(
+            ("VIEW", "This View", "What this viewport shows, with all that is drawn in it and its legend"),
+            (
+                "RENDER",
+                "Rendered",
+                "The rendered view that the batch command makes; Blender does not answer for up to half a minute",
+            ),
+        ),
+    )
+
+
+class SEIP_PG_traffic(bpy.types.PropertyGroup):
+    """Where the traffic comes from, and how it is scanned."""
+
+    file: StringProperty(
+        name="Traffic",
+        description="Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
+        "empty for objects that are animated in the scene",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    routes: StringProperty(
+        name="Routes",
+        description="SUMO's file with the vehicle types, which knows their sizes",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    net: StringProperty(
+        name="Network",
+        description="SUMO's .net.xml, which knows the offset from the map",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    loaded: StringProperty(name="Loaded", description="What was found in the file, one fact a line")
+    seed: IntProperty(name="Seed", description="Of noise and lost returns", default=0, min=0)
+    noise: BoolProperty(
+        name="Noise", description="Ranges are noisy and returns get lost, as in the sensors' data sheets", default=True
+    )
+    rolling_shutter: BoolProperty(
+        name="Rolling Shutter", description="Traffic moves while a sensor turns", default=False
+    )
+    follow: BoolProperty(
+        name="Follow the Timeline",
+        description="Scan again whenever the frame changes",
+        default=False,
+        update=_follow,
+    )
+    whole: BoolProperty(name="All of the Traffic", description="From its first moment to its last", default=True)
+    start: FloatProperty(
+        name="Start",
+        description="Time of the first frame, in seconds",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        min=0.0,
+    )
+    duration: FloatProperty(
+        name="Duration",
+        description="To the last frame, in seconds",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        default=10.0,
+        min=0.0,
+    )
+    rate: FloatProperty(
+        name="Rate (Hz)",
+        description="Frames a second; at 0 as often as the slowest sensor turns",
+        default=0.0,
+        min=0.0,
+        soft_max=20.0,
+        step=100,
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Of the run: its frames and its datasets; a run that was stopped goes on there",
+        subtype="DIR_PATH",
+        default="//scans",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    formats: EnumProperty(
+        name="Formats",
+        description="Datasets to write beside the frames",
+        items=tuple((key, kind.name, f"Write the dataset as {kind.name}") for key, kind in FORMATS.items()),
+        options={"ENUM_FLAG"},
+    )
+    split: EnumProperty(
+        name="Split",
+        description="Of the dataset that the run belongs to, whole",
+        items=tuple((split, split.capitalize(), f"The run belongs to the split {split!r}") for split in SPLITS),
+    )
+
+    def files(self) -> TrafficFiles | None:
+        """Return the files that traffic is read from, None where it is animated in the scene."""
+        if not self.file:
+            return None
+        routes = (_path(self.routes),) if self.routes else ()
+        return TrafficFiles(_path(self.file), routes, _path(self.net) if self.net else None)
+
+    def recording(self) -> RecordingSettings:
+        """Return what is asked of scans, as the core takes it."""
+        return RecordingSettings(
+            scan=ScanSettings(self.seed, self.noise, self.rolling_shutter, self.id_data.seip.survey.engine),
+            start=None if self.whole else _written(self.start),
+            duration=None if self.whole else _written(self.duration),
+            rate=_written(self.rate) or None,
+            formats=tuple(key for key in FORMATS if key in self.formats),
+            split=self.split,
+        )
+
+
 class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
@@ -340,6 +486,12 @@ class SEIP_PG_scene(bpy.types.PropertyGroup):
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)
     result: PointerProperty(type=SEIP_PG_result)
+    view: PointerProperty(type=SEIP_PG_view)
+    traffic: PointerProperty(type=SEIP_PG_traffic)
+
+
+def _path(text: str) -> Path:
+    return Path(bpy.path.abspath(text))
 
 
 def _written(value: float) -> float:
@@ -357,6 +509,8 @@ CLASSES = (
     SEIP_PG_position_rule,
     SEIP_PG_goal,
     SEIP_PG_result,
+    SEIP_PG_view,
+    SEIP_PG_traffic,
     SEIP_PG_scene,
 )
 

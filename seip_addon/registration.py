@@ -12,16 +12,22 @@ PARTS = (
     "properties",
     "state",
     "sensor_types",
+    "scans",
     "viewport.beam_preview",
+    "viewport.layers",
     "operators.work",
     "operators.site",
     "operators.sensors",
     "operators.visibility",
     "operators.placement",
+    "operators.view",
+    "operators.traffic",
     "panels.site",
     "panels.sensors",
     "panels.visibility",
     "panels.placement",
+    "panels.view",
+    "panels.traffic",
 )
 """Modules with ``CLASSES``, and with ``attach`` and ``detach`` for what is no class: handlers, properties, menus."""
 

@@ -37,6 +37,8 @@ class LongWork(Generic[Result]):
     """
 
     bl_options = {"REGISTER", "UNDO"}
+    stopped = "stopped; nothing was changed"
+    """What is reported of work that was stopped."""
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
         """Read what is needed from the scene and return the work, which must not touch Blender's data."""
@@ -62,7 +64,7 @@ class LongWork(Generic[Result]):
         """Look how far the work is, and write its result once it is done."""
         if self._running is not state.running or self._running.stop or event.type == "ESC":
             self._end(context)
-            self.report({"INFO"}, "stopped; nothing was changed")
+            self.report({"INFO"}, self.stopped)
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
@@ -104,11 +106,12 @@ class LongWork(Generic[Result]):
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    """Have all viewports drawn anew, their sidebars with them."""
+    """Have the sidebars of all viewports drawn anew; the views themselves may be slow to draw, and have not changed."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+            for region in area.regions if area.type == "VIEW_3D" else ():
+                if region.type == "UI":
+                    region.tag_redraw()
 
 
 class SEIP_OT_stop(bpy.types.Operator):

@@ -13,9 +13,11 @@ def held_interrupts() -> Iterator[None]:
     """Hold Ctrl-C back until the block ends, and raise it then.
 
     Rendering and saving call back into Python and swallow an interrupt that is
-    raised there: the run would go on as if nobody had asked it to stop.
+    raised there: the run would go on as if nobody had asked it to stop. Where
+    Blender itself has taken the signal, its handler stays: Python knows no way
+    to put it back.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
         yield
         return
     caught: list[int] = []

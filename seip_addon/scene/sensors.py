@@ -54,6 +54,15 @@ def read_sensors(scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel]) ->
     return tuple(sorted(sensors, key=lambda sensor: _natural(sensor.label)))
 
 
+def placed_sensors(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Return the empties of sensors by their labels, S2 before S10; those without a label are not among them."""
+    collection = contract.find(scene, contract.SENSORS)
+    things = [] if collection is None else [thing for thing in collection.objects if contract.LABEL in thing]
+    return {
+        str(thing[contract.LABEL]): thing for thing in sorted(things, key=lambda one: _natural(one[contract.LABEL]))
+    }
+
+
 def _mounted(thing: bpy.types.Object, label: str, catalogue: Mapping[str, LidarModel]) -> MountedSensor:
     key = thing.get(contract.SENSOR)
     if not isinstance(key, str):

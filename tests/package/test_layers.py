@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "addon_utils", "bpy_extras", "gpu", "gpu_extras", "bl_ext", "bl_operators"}
+BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "addon_utils", "bpy_extras", "gpu", "gpu_extras", "blf", "bl_ext"} | {
+    "bl_operators"
+}
 
 WITHOUT_BLENDER = """
 import importlib, pkgutil, sys

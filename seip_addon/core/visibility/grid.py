@@ -83,6 +83,10 @@ class VisibilityGrid:
         """V as (c, t) bool."""
         return np.unpackbits(self.packed, axis=1, count=self.shape[1]).astype(bool)
 
+    def sees(self, pose: int) -> Boolean:
+        """Return which targets a pose sees, (t,) bool."""
+        return np.unpackbits(self.packed[pose], count=self.shape[1]).astype(bool)
+
     def times_seen(self, poses: Integer) -> Integer:
         """Return by how many of the given poses each target is seen, (t,) int64."""
         rows = np.unpackbits(self.packed[poses], axis=1, count=self.shape[1])

@@ -1,0 +1,59 @@
+"""Colours of the points of a cloud, on a dark ground or on a street, and what they mean."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float
+from ..scans.frame import STATIC, Frame
+from .palette import SENSOR_COLOURS, STRENGTH_COLOURS, STRONGEST, rgb
+
+By = Literal["sensor", "intensity", "instance"]
+
+STANDING = "#7d8790"
+"""Of points on what stands still, where road users have colours."""
+GOLDEN = 0.618033988749895
+"""Of the colour circle, between a road user and the next: neighbours in number differ most."""
+
+
+def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:
+    """Return red, green, blue and opacity (n, 4) of each point, sRGB."""
+    colours = np.ones((len(frame), 4), dtype=np.float32)
+    colours[:, :3] = _BY[by](frame)
+    return colours
+
+
+def strength_ramp(share: Float) -> Float:
+    """Return colours (…, 3) along the scale of intensities, from 0 to 1."""
+    stops = np.array([rgb(colour) for colour in STRENGTH_COLOURS])
+    places = np.linspace(0.0, 1.0, len(stops))
+    return np.stack([np.interp(share, places, channel) for channel in stops.T], axis=-1)
+
+
+def sensor_colour(number: int) -> str:
+    """Return the web colour of a sensor's points."""
+    return SENSOR_COLOURS[number % len(SENSOR_COLOURS)]
+
+
+def _by_sensor(frame: Frame) -> Float:
+    palette = np.array([rgb(colour) for colour in SENSOR_COLOURS])
+    coloured: Float = palette[frame.sensor % len(palette)]
+    return coloured
+
+
+def _by_intensity(frame: Frame) -> Float:
+    return strength_ramp(np.sqrt(np.minimum(frame.intensity / STRONGEST, 1.0)))
+
+
+def _by_instance(frame: Frame) -> Float:
+    hue = (frame.instance * GOLDEN) % 1.0
+    wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, full saturation
+    bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
+    coloured: Float = np.where((frame.instance == STATIC)[:, None], np.array(rgb(STANDING)), bright)
+    return coloured
+
+
+_BY = {"sensor": _by_sensor, "intensity": _by_intensity, "instance": _by_instance}

@@ -1,0 +1,156 @@
+"""Traffic for a scene, out of a user's files: trajectories, or SUMO's floating car data put on the road."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..progress import Progress
+from ..scene_geometry import SceneGeometry, joined
+from .floating_car_data import Window, read_floating_car_data, read_trajectories
+from .overlaps import find_overlaps
+from .road_fit import fit_to_road
+from .sumo_files import read_net_offset
+from .trajectories import CATEGORIES, Trajectories
+from .vehicle_types import read_vehicle_types
+
+FAR = 500.0
+"""Metres from the region beyond which traffic is another place's."""
+
+MARGIN = 20.0
+"""Metres beyond the road of the scene within which traffic is read."""
+
+LOOKS = 1.0
+"""Seconds between two looks for road users in one place, where a file is read."""
+
+
+@dataclass(frozen=True)
+class TrafficFiles:
+    """Where traffic is read from.
+
+    Parameters
+    ----------
+    path : path
+        Trajectories (``.npz``), or floating car data of SUMO.
+    routes : tuple of path
+        Files with the vehicle types, for floating car data.
+    net : path, optional
+        The ``.net.xml``, which knows the offset from the map.
+    begin, end : float, seconds
+        What lies outside is left out of floating car data.
+    """
+
+    path: Path
+    routes: tuple[Path, ...] = ()
+    net: Path | None = None
+    begin: float = -math.inf
+    end: float = math.inf
+
+    @property
+    def trajectories(self) -> bool:
+        """Whether they are trajectories already."""
+        return self.path.suffix.lower() == ".npz"
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedTraffic:
+    """Traffic in a scene's axes, and what a user should know of it.
+
+    Parameters
+    ----------
+    trajectories : Trajectories
+    warnings : tuple of str
+        One sentence each.
+    """
+
+    trajectories: Trajectories
+    warnings: tuple[str, ...]
+
+
+def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Progress, None, LoadedTraffic]:
+    """Read traffic for a scene.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, or is of another place.
+    """
+    if files.trajectories:
+        yield Progress(0, 0, "trajectories")
+        return LoadedTraffic(load_trajectories(files.path, geometry), ())
+    window = Window(files.begin, files.end, road_bounds(geometry, MARGIN))
+    read = yield from read_sumo(files, window, geometry.origin, files.path.name)
+    fit = fit_to_road(read.trajectories, geometry)
+    overlaps = yield from overlap_warnings(fit.trajectories)
+    return LoadedTraffic(fit.trajectories, (*read.warnings, *fit.warnings, *overlaps))
+
+
+def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
+    """Read trajectories into a scene's axes.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read, or nobody in it comes near.
+    """
+    trajectories = Trajectories.load(path).moved_to(geometry.origin)
+    left, bottom, right, top = geometry.region.bounds
+    low, high = np.array([left, bottom]) - FAR, np.array([right, top]) + FAR
+    plan = trajectories.position[:, :2]
+    if not ((plan >= low) & (plan <= high)).all(axis=1).any():
+        raise SeipError(f"all traffic of {path} is far from this scene: name traffic that was made for its map")
+    return trajectories
+
+
+def read_sumo(
+    files: TrafficFiles, window: Window, origin: Float, source: str
+) -> Generator[Progress, None, LoadedTraffic]:
+    """Read floating car data with the sizes of its vehicles; not put on the road yet.
+
+    Parameters
+    ----------
+    files : TrafficFiles
+    window : Window
+    origin : (3,) float64, metres
+        Map coordinates of the local origin.
+    source : str
+        What the trajectories come from, for people.
+    """
+    offset = None if files.net is None else read_net_offset(files.net)
+    data = yield from read_floating_car_data(files.path, offset, window)
+    types = yield from read_vehicle_types(files.routes)
+    return LoadedTraffic(*read_trajectories(data, types, origin, source))
+
+
+def overlap_warnings(trajectories: Trajectories) -> Generator[Progress, None, tuple[str, ...]]:
+    """Return a sentence where road users stand in one another."""
+    overlaps = yield from find_overlaps(trajectories, LOOKS)
+    if not len(overlaps):
+        return ()
+    worst = int(overlaps.area.argmax())
+    one, other = (trajectories.users[number].name for number in overlaps.pair[worst])
+    sentence = (
+        f"{len(overlaps)} pairs of road users stand in one another; {one} and {other} "
+        f"share {overlaps.area[worst]:.1f} m² at {overlaps.time[worst]:g} s"
+    )
+    return (sentence,)
+
+
+def road_bounds(geometry: SceneGeometry, margin: float) -> tuple[float, float, float, float]:
+    """Return the rectangle of the scene's road, and so many metres around it, in map coordinates."""
+    road = joined(geometry.roads)[:, :, :2].reshape(-1, 2) + geometry.origin[:2]
+    (left, low), (right, high) = road.min(axis=0) - margin, road.max(axis=0) + margin
+    return float(left), float(low), float(right), float(high)
+
+
+def kinds_in_words(trajectories: Trajectories) -> str:
+    """Return how many road users there are of each category."""
+    counts = Counter(user.category for user in trajectories.users)
+    return ", ".join(f"{counts[category]} {category}" for category in CATEGORIES if counts[category])

@@ -1,0 +1,230 @@
+"""Traffic in the scene, what the sensors measure of it, and datasets of that."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator
+from pathlib import Path
+
+import bpy
+
+from .. import preferences, scans
+from ..core.errors import SeipError
+from ..core.progress import Progress, finish
+from ..core.recording import RecordingSettings, make_run, record, simulation_of
+from ..core.results.placement_record import versions
+from ..core.scans import MountedSensor
+from ..core.scans.run_folder import Record, Run, check_run_folder
+from ..core.scene_geometry import SceneGeometry
+from ..core.traffic import CATEGORIES, Trajectories
+from ..core.traffic.source import LoadedTraffic, TrafficFiles, load_traffic
+from ..scene import contract
+from ..scene.read import read_scene
+from ..scene.sensors import read_sensors
+from ..scene.traffic import animate, clear_traffic, read_traffic
+from .work import LongWork, Outcome, Result
+
+NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
+NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
+NO_SENSORS = "There is no sensor to scan with: place sensors first."
+
+
+def why_no_scan(scene: bpy.types.Scene) -> str:
+    """Return why nothing can be scanned; nothing where it can."""
+    sensors = contract.find(scene, contract.SENSORS)
+    if sensors is None or not len(sensors.all_objects):
+        return NO_SENSORS
+    there = scene.seip.traffic.file or contract.find(scene, contract.TRAFFIC) is not None
+    return "" if there else NO_TRAFFIC
+
+
+class _Scanning(LongWork[Result]):
+    """A mixin: a button that works where there are sensors and traffic."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is anything to scan."""
+        sentence = why_no_scan(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+
+class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
+    """Read the traffic file and put its road users on the road, to press play on"""
+
+    bl_idname = "seip.load_traffic"
+    bl_label = "Load Traffic"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is a file to read."""
+        if not context.scene.seip.traffic.file:
+            cls.poll_message_set(NO_FILE)
+        return bool(context.scene.seip.traffic.file)
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
+        """Read the scene that the traffic is to stand on."""
+        self._files = scene.seip.traffic.files()
+        self._changed = scans.changes(self._files)
+        return load_traffic(self._files, read_scene(scene).geometry)
+
+    def conclude(self, scene: bpy.types.Scene, result: LoadedTraffic) -> None:
+        """Animate the road users."""
+        animate(scene, result.trajectories)
+        scans.traffic[scene.session_uid] = scans.HeldTraffic(self._files, self._changed, result.trajectories)
+        scene.seip.traffic.loaded = "\n".join((*_facts(result.trajectories), *result.warnings))
+        for sentence in result.warnings:
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"{len(result.trajectories)} road users; press play")
+
+
+class SEIP_OT_clear_traffic(bpy.types.Operator):
+    """Take the loaded road users out of the scene; objects of your own stay"""
+
+    bl_idname = "seip.clear_traffic"
+    bl_label = "Clear Traffic"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is traffic."""
+        there = contract.find(context.scene, contract.TRAFFIC) is not None
+        if not there:
+            cls.poll_message_set("there is no traffic in the scene")
+        return there
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Take it out."""
+        scene = context.scene
+        clear_traffic(scene)
+        scans.traffic.pop(scene.session_uid, None)
+        scans.hide_cloud(scene)
+        scene.seip.traffic.loaded = ""
+        return {"FINISHED"}
+
+
+class SEIP_OT_scan_frame(_Scanning[scans.HeldScan], bpy.types.Operator):
+    """Show what the placed sensors measure at the current frame of the timeline"""
+
+    bl_idname = "seip.scan_frame"
+    bl_label = "Scan This Frame"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, scans.HeldScan]:
+        """Read what is scanned."""
+        self._scene_read = _SceneRead(scene)
+        return self._work(scans.now(scene), scans.find(scene))
+
+    def _work(self, at: float, before: scans.HeldScan | None) -> Generator[Progress, None, scans.HeldScan]:
+        run = yield from self._scene_read.run()
+        if before is not None and before.run.key == run.key:
+            run, simulation = before.run, before.simulation
+        else:
+            simulation = yield from simulation_of(run)
+        yield Progress(0, 0, "scan")
+        return scans.measure(run, simulation, at)
+
+    def conclude(self, scene: bpy.types.Scene, result: scans.HeldScan) -> None:
+        """Show the points."""
+        self._scene_read.keep_traffic(scene)
+        scans.keep(scene, result)
+        for sentence in result.simulation.warnings:
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"{len(result.frame):,} points in {1e3 * result.seconds:.0f} ms")
+
+
+class SEIP_OT_hide_scan(bpy.types.Operator):
+    """Hide the point cloud"""
+
+    bl_idname = "seip.hide_scan"
+    bl_label = "Hide Point Cloud"
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Hide it."""
+        scans.hide_cloud(context.scene)
+        return {"FINISHED"}
+
+
+class SEIP_OT_write_dataset(_Scanning[Record], bpy.types.Operator):
+    """Scan frame after frame and write them, with the boxes of all road users, as datasets to train detectors on"""
+
+    bl_idname = "seip.write_dataset"
+    bl_label = "Write Dataset"
+    bl_options = {"REGISTER"}  # as above
+    stopped = "stopped; what is written stays, and the same run goes on from there"
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Record]:
+        """Read what is recorded."""
+        self._scene_read = _SceneRead(scene)
+        self._folder = _folder(scene)
+        return self._work()
+
+    def _work(self) -> Generator[Progress, None, Record]:
+        run = yield from self._scene_read.run()
+        check_run_folder(self._folder, run)
+        simulation = yield from simulation_of(run)
+        self._warnings = simulation.warnings
+        return (yield from record(self._folder, run, simulation, self._scene_read.settings))
+
+    def conclude(self, scene: bpy.types.Scene, result: Record) -> None:
+        """Say what was written."""
+        self._scene_read.keep_traffic(scene)
+        for sentence in self._warnings:
+            self.report({"WARNING"}, sentence)
+        self.report({"INFO"}, f"{len(result['frames']):,} frames in {self._folder}")
+
+
+class _SceneRead:
+    """All that scans follow from, as the scene is now."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self.settings: RecordingSettings = scene.seip.traffic.recording()
+        self._geometry: SceneGeometry = read_scene(scene).geometry
+        self._sensors: tuple[MountedSensor, ...] = read_sensors(scene, preferences.catalogue())
+        self._files: TrafficFiles | None = scene.seip.traffic.files()
+        self._changed: tuple[float, ...] = ()
+        self._trajectories: Trajectories | None = None
+        if self._files is None:
+            self._trajectories = finish(read_traffic(scene))
+        else:
+            self._changed = scans.changes(self._files)
+            self._trajectories = scans.known_traffic(scene, self._files, self._geometry.origin)
+
+    def run(self) -> Generator[Progress, None, Run]:
+        """Read the traffic, where that is still to be done, and gather everything."""
+        if self._trajectories is None and self._files is not None:
+            self._trajectories = (yield from load_traffic(self._files, self._geometry)).trajectories
+        assert self._trajectories is not None  # noqa: S101  # one of the two has given it
+        made = versions(blender=bpy.app.version_string)
+        return make_run(self._geometry, self._sensors, self._trajectories, self.settings, made)
+
+    def keep_traffic(self, scene: bpy.types.Scene) -> None:
+        """Hold what was read from files, so that the next scan need not."""
+        if self._files is not None and self._trajectories is not None:
+            scans.traffic[scene.session_uid] = scans.HeldTraffic(self._files, self._changed, self._trajectories)
+
+
+def _folder(scene: bpy.types.Scene) -> Path:
+    named = scene.seip.traffic.folder
+    if not named:
+        raise SeipError("name a folder to write the scans to")
+    if named.startswith("//") and not bpy.data.filepath:
+        raise SeipError(f"the folder {named} is beside the file, and the file has not been saved: save it first")
+    return Path(bpy.path.abspath(named))
+
+
+def _facts(trajectories: Trajectories) -> list[str]:
+    begin, end = trajectories.span
+    counts = Counter(user.category for user in trajectories.users)
+    kinds = [f"{counts[category]} {category}" for category in CATEGORIES if counts[category]]
+    return [f"{len(trajectories)} road users, {begin:g} to {end:g} s", ", ".join(kinds)]
+
+
+CLASSES = (
+    SEIP_OT_load_traffic,
+    SEIP_OT_clear_traffic,
+    SEIP_OT_scan_frame,
+    SEIP_OT_hide_scan,
+    SEIP_OT_write_dataset,
+)

@@ -1,0 +1,272 @@
+"""What the viewport shows of a placement: coverage, sight lines, a legend, and pictures of it."""
+
+from __future__ import annotations
+
+from itertools import chain, count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import bpy
+
+from .. import state
+from ..core.errors import SeipError
+from ..core.sight_lines import pose_at, sight_lines
+from ..scene import contract
+from ..scene.sensors import placed_sensors
+from ..scene.write import colour_coverage, coverage_of
+from ..viewport import coverage, layers
+from ..viewport.sight_lines import NAME as SIGHT
+from ..viewport.sight_lines import sight_overlay
+from .work import Outcome, attempt
+
+NO_COVERAGE = "There is no coverage to show: place sensors first."
+NO_GRID = "It is not known who sees what: compute visibility first."
+NO_PLAN = "There is nothing to take a picture of: place sensors first."
+NO_SENSORS = "There is no sensor to look from: place sensors first."
+
+
+def why_no_coverage(scene: bpy.types.Scene) -> str:
+    """Return why coverage cannot be coloured; nothing where it can."""
+    return NO_COVERAGE if coverage_of(scene) is None else ""
+
+
+def why_no_sight(scene: bpy.types.Scene) -> str:
+    """Return why no sight lines can be drawn; nothing where they can."""
+    if not placed_sensors(scene):
+        return NO_SENSORS
+    held = state.find(scene)
+    return NO_GRID if held is None or held.grid is None else ""
+
+
+class SEIP_OT_colour_coverage(bpy.types.Operator):
+    """Colour the coverage on the road, with a legend"""
+
+    bl_idname = "seip.colour_coverage"
+    bl_label = "Colour Coverage"
+    bl_options = {"REGISTER", "UNDO"}
+
+    aspect: bpy.props.EnumProperty(
+        name="Show",
+        description="What the colours of the road mean",
+        items=(
+            ("seen", "Seen", "Whether some sensor sees the target"),
+            ("times", "Times", "How many sensors see the target"),
+            ("weights", "Weights", "How much the target counts"),
+        ),
+        default="times",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is coverage to colour."""
+        return _can(cls, why_no_coverage(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Colour it."""
+        outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
+        if outcome == {"FINISHED"}:
+            layers.show(context.scene, coverage.NAME, coverage.coverage_overlay())
+        return outcome
+
+
+class SEIP_OT_show_coverage_colours(bpy.types.Operator):
+    """Set this view to Solid shading in the materials' colours, which shows the coverage"""
+
+    bl_idname = "seip.show_coverage_colours"
+    bl_label = "Show Colours in This View"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether this is a view."""
+        return isinstance(context.space_data, bpy.types.SpaceView3D)
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Set the shading."""
+        coverage.set_shading(context.space_data)
+        return {"FINISHED"}
+
+
+class SEIP_OT_toggle_legend(bpy.types.Operator):
+    """Show or hide the legend of the coverage"""
+
+    bl_idname = "seip.toggle_legend"
+    bl_label = "Legend"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is coverage to explain."""
+        return _can(cls, why_no_coverage(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Show it where it is hidden, and the other way round."""
+        if layers.find(context.scene, coverage.NAME) is None:
+            layers.show(context.scene, coverage.NAME, coverage.coverage_overlay())
+        else:
+            layers.hide(context.scene, coverage.NAME)
+        return {"FINISHED"}
+
+
+_items: list[tuple[str, str, str]] = []
+"""Blender keeps no strings of a list that is made anew: they must live on here."""
+
+
+def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
+    there = placed_sensors(context.scene) if context else {}
+    _items[:] = [(label, label, thing.name) for label, thing in there.items()] or [("", "None", NO_SENSORS)]
+    return _items
+
+
+class SEIP_OT_show_sight_lines(bpy.types.Operator):
+    """Draw lines from a sensor to the targets that it sees, and dark squares on those in its range that it does not"""
+
+    bl_idname = "seip.show_sight_lines"
+    bl_label = "Show Sight Lines"
+
+    sensor: bpy.props.EnumProperty(name="Sensor", description="From which the lines start", items=_sensors)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it is known who sees what."""
+        return _can(cls, why_no_sight(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Draw them."""
+        return attempt(self, lambda: _show_sight(context.scene, self.sensor))
+
+
+def _show_sight(scene: bpy.types.Scene, label: str) -> None:
+    held = state.find(scene)
+    thing = placed_sensors(scene).get(label)
+    if held is None or held.grid is None or thing is None:
+        raise SeipError(why_no_sight(scene) or f"there is no sensor {label!r} any more")
+    key = str(thing.get(contract.SENSOR))
+    pose = pose_at(held.layout.site.candidates, key, thing.matrix_world.translation)
+    if pose is None:
+        raise SeipError(f"{label} hangs at no candidate pose of the visibility that is known: compute and place again")
+    sight = sight_lines(held.layout.site, pose, held.layout.models[key], held.grid.sees(pose))
+    layers.show(scene, SIGHT, sight_overlay(sight, label))
+
+
+class SEIP_OT_hide_sight_lines(bpy.types.Operator):
+    """Draw no sight lines"""
+
+    bl_idname = "seip.hide_sight_lines"
+    bl_label = "Hide Sight Lines"
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Hide them."""
+        layers.hide(context.scene, SIGHT)
+        return {"FINISHED"}
+
+
+def why_no_picture(scene: bpy.types.Scene) -> str:
+    """Return why no picture can be taken; nothing where one can."""
+    held = state.find(scene)
+    return NO_PLAN if held is None or held.plan is None else ""
+
+
+class SEIP_OT_save_picture(bpy.types.Operator):
+    """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
+
+    bl_idname = "seip.save_picture"
+    bl_label = "Save Picture"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is a placement to show."""
+        return _can(cls, why_no_picture(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Take it."""
+        return attempt(self, lambda: self._save(context))
+
+    def _save(self, context: bpy.types.Context) -> None:
+        settings = context.scene.seip.view
+        path = _free(_named(settings.picture))
+        if settings.picture_of == "VIEW":
+            save_viewport_sheet(path, context.scene, _viewport(context))
+        else:
+            save_rendered_sheet(path, context.scene)
+        self.report({"INFO"}, f"written {path}")
+
+
+def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+    """Write what a viewport shows, and the plan beside it."""
+    from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
+
+    from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
+
+    _save_sheet(path, scene, Image.fromarray(view_pixels(scene, area)))
+
+
+def save_rendered_sheet(path: Path, scene: bpy.types.Scene) -> None:
+    """Write the rendered view that batch commands make, and the plan beside it."""
+    from PIL import Image  # noqa: PLC0415  # as above
+
+    from ..scene.render import save_rendered_view  # noqa: PLC0415  # as above
+
+    held = _placed(scene)
+    with TemporaryDirectory(prefix="seip-") as folder:
+        view = Path(folder) / "view.png"
+        save_rendered_view(view, scene, held.layout.site, held.plan.deployment)
+        with Image.open(view) as picture:
+            _save_sheet(path, scene, picture)
+
+
+def _save_sheet(path: Path, scene: bpy.types.Scene, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
+    from PIL import Image  # noqa: PLC0415  # as above
+
+    from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
+    from ..core.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
+
+    held = _placed(scene)
+    layout, plan = held.layout, held.plan
+    with TemporaryDirectory(prefix="seip-") as folder:
+        drawn = Path(folder) / "plan.png"
+        notes = [plan.certificate, *layout.warnings]
+        save_plan_view(drawn, layout.geometry, layout.site, plan.deployment, notes)
+        with Image.open(drawn) as picture:
+            save_sheet(path, view, picture)
+
+
+def _placed(scene: bpy.types.Scene) -> Any:  # noqa: ANN401  # what is held, with its plan
+    held = state.find(scene)
+    if held is None or held.plan is None:
+        raise SeipError(NO_PLAN)
+    return held
+
+
+def _viewport(context: bpy.types.Context) -> bpy.types.Area:
+    area = context.area
+    if bpy.app.background or area is None or area.type != "VIEW_3D":
+        raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
+    return area
+
+
+def _named(text: str) -> Path:
+    if text.startswith("//") and not bpy.data.filepath:
+        raise SeipError(f"the picture {text} is beside the file, and the file has not been saved: save it first")
+    return Path(bpy.path.abspath(text)).with_suffix(".png")
+
+
+def _free(path: Path) -> Path:
+    """Return the name, with the first number that is free where there is a picture of that name."""
+    numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    return next(name for name in chain([path], numbered) if not name.exists())
+
+
+def _can(operator: type[bpy.types.Operator], why_not: str) -> bool:
+    if why_not:
+        operator.poll_message_set(why_not)
+    return not why_not
+
+
+CLASSES = (
+    SEIP_OT_colour_coverage,
+    SEIP_OT_show_coverage_colours,
+    SEIP_OT_toggle_legend,
+    SEIP_OT_show_sight_lines,
+    SEIP_OT_hide_sight_lines,
+    SEIP_OT_save_picture,
+)

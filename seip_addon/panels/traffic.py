@@ -1,0 +1,103 @@
+"""The panel of traffic and scans."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import scans
+from ..operators.traffic import (
+    NO_FILE,
+    SEIP_OT_clear_traffic,
+    SEIP_OT_load_traffic,
+    SEIP_OT_scan_frame,
+    SEIP_OT_write_dataset,
+    why_no_scan,
+)
+from .run_button import draw_run
+from .sentence import draw_sentence
+from .sidebar import Sidebar
+
+
+class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
+    """Traffic in the scene."""
+
+    bl_idname = "SEIP_PT_traffic"
+    bl_label = "Traffic and Scans"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw where traffic comes from."""
+        traffic = context.scene.seip.traffic
+        layout = self.layout
+        column = layout.column(align=True)
+        column.prop(traffic, "file", text="")
+        if traffic.file and not traffic.file.lower().endswith(".npz"):
+            column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
+            column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
+        if not traffic.file:
+            draw_sentence(layout, NO_FILE, icon="INFO")
+        row = layout.row(align=True)
+        draw_run(row, SEIP_OT_load_traffic.bl_idname)
+        row.operator(SEIP_OT_clear_traffic.bl_idname, text="", icon="TRASH")
+        row.operator("screen.animation_play", text="", icon="PLAY")
+        for line in traffic.loaded.splitlines():
+            draw_sentence(layout, line)
+
+
+class SEIP_PT_scan(Sidebar, bpy.types.Panel):
+    """One frame."""
+
+    bl_idname = "SEIP_PT_scan"
+    bl_label = "Scan"
+    bl_parent_id = SEIP_PT_traffic.bl_idname
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw how scans are made, and the last."""
+        traffic = context.scene.seip.traffic
+        layout = self.layout
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(traffic, "noise")
+        column.prop(traffic, "seed")
+        column.prop(traffic, "rolling_shutter")
+        column.prop(traffic, "follow")
+        draw_run(layout, SEIP_OT_scan_frame.bl_idname)
+        why_not = why_no_scan(context.scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
+        scan = scans.find(context.scene)
+        for line in scan.in_words if scan is not None else ():
+            draw_sentence(layout, line)
+
+
+class SEIP_PT_dataset(Sidebar, bpy.types.Panel):
+    """Many frames."""
+
+    bl_idname = "SEIP_PT_dataset"
+    bl_label = "Dataset"
+    bl_parent_id = SEIP_PT_traffic.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what is written where."""
+        traffic = context.scene.seip.traffic
+        layout = self.layout
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        column.prop(traffic, "folder")
+        column.prop(traffic, "whole")
+        if not traffic.whole:
+            column.prop(traffic, "start")
+            column.prop(traffic, "duration")
+        column.prop(traffic, "rate")
+        column.prop(traffic, "split")
+        layout.label(text="Formats")
+        layout.column(align=True).prop(traffic, "formats")
+        draw_run(layout, SEIP_OT_write_dataset.bl_idname)
+        why_not = why_no_scan(context.scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
+
+
+CLASSES = (SEIP_PT_traffic, SEIP_PT_scan, SEIP_PT_dataset)

@@ -1,0 +1,97 @@
+"""The panel of what the viewport shows."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import scans
+from ..operators.view import (
+    SEIP_OT_colour_coverage,
+    SEIP_OT_hide_sight_lines,
+    SEIP_OT_save_picture,
+    SEIP_OT_show_coverage_colours,
+    SEIP_OT_show_sight_lines,
+    SEIP_OT_toggle_legend,
+    why_no_coverage,
+    why_no_picture,
+    why_no_sight,
+)
+from ..scene.write import ASPECT, coverage_of
+from ..viewport import coverage, layers
+from ..viewport.sight_lines import NAME as SIGHT
+from .sentence import draw_sentence
+from .sidebar import Sidebar
+
+ASPECTS = ("seen", "times", "weights")
+
+
+class SEIP_PT_view(Sidebar, bpy.types.Panel):
+    """Seeing it."""
+
+    bl_idname = "SEIP_PT_view"
+    bl_label = "View"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what can be shown."""
+        self._draw_coverage(context)
+        self._draw_sight(context)
+        self._draw_cloud(context)
+        self._draw_picture(context)
+
+    def _draw_coverage(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        head = column.row()
+        head.label(text="Coverage")
+        shown = layers.find(context.scene, coverage.NAME) is not None
+        head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
+        thing = coverage_of(context.scene)
+        row = column.row(align=True)
+        for aspect in ASPECTS:
+            now = thing is not None and thing.get(ASPECT) == aspect
+            button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=aspect.capitalize(), depress=now)
+            button.aspect = aspect
+        why_not = why_no_coverage(context.scene)
+        if why_not:
+            draw_sentence(column, why_not, icon="INFO")
+        elif not coverage.shows_coverage(context.space_data):
+            draw_sentence(column, "This view's shading does not show the colours.", icon="ERROR")
+            column.operator(SEIP_OT_show_coverage_colours.bl_idname)
+
+    def _draw_sight(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.label(text="Sight Lines")
+        overlay = layers.find(context.scene, SIGHT)
+        row = column.row(align=True)
+        words = "From Sensor" if overlay is None else overlay.about
+        row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
+        if overlay is not None:
+            row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
+        why_not = why_no_sight(context.scene)
+        if why_not:
+            draw_sentence(column, why_not, icon="INFO")
+
+    def _draw_cloud(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.label(text="Point Cloud")
+        row = column.row(align=True)
+        there = scans.find(context.scene) is not None
+        row.enabled = there
+        row.prop(context.scene.seip.view, "cloud_colour", expand=True)
+        if there:
+            column.operator("seip.hide_scan", icon="X")
+        else:
+            draw_sentence(column, "There is no scan yet: scan a frame, under Traffic and Scans.", icon="INFO")
+
+    def _draw_picture(self, context: bpy.types.Context) -> None:
+        view = context.scene.seip.view
+        column = self.layout.column(align=True)
+        column.label(text="Picture for a Report")
+        column.row(align=True).prop(view, "picture_of", expand=True)
+        column.prop(view, "picture", text="")
+        column.operator(SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
+        why_not = why_no_picture(context.scene)
+        if why_not:
+            draw_sentence(column, why_not, icon="INFO")
+
+
+CLASSES = (SEIP_PT_view,)

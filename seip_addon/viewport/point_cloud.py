@@ -1,0 +1,46 @@
+"""The points that all sensors measure of one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ..core.pictures.cloud_colours import STANDING, By, cloud_colours, sensor_colour, strength_ramp
+from ..core.pictures.palette import STRONGEST, rgb
+from ..core.scans import Frame, MountedSensor
+from .layers import Block, Colour, Entry, Layer, Overlay
+
+NAME = "point cloud"
+RAMP_STEPS = 8
+
+
+def cloud_overlay(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> Overlay:
+    """Return a frame's points, coloured by sensor, intensity or instance."""
+    layer = Layer("POINTS", np.ascontiguousarray(frame.points), cloud_colours(frame, by))
+    block = Block(f"{len(frame):,} points at {frame.time:.2f} s", _entries(frame, sensors, by))
+
+    def legend(_scene: bpy.types.Scene) -> Block:
+        return block
+
+    return Overlay((layer,), legend, by)
+
+
+def _entries(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> tuple[Entry, ...]:
+    if by == "sensor":
+        counts = np.bincount(frame.sensor, minlength=len(sensors))
+        return tuple(
+            Entry(f"{sensor.label}  {sensor.model.key}  {count:,}", (_opaque(rgb(sensor_colour(number))),))
+            for number, (sensor, count) in enumerate(zip(sensors, counts.tolist(), strict=True))
+        )
+    if by == "intensity":
+        ramp = tuple(_opaque(colour) for colour in strength_ramp(np.linspace(0.0, 1.0, RAMP_STEPS)).tolist())
+        return (Entry(f"intensity 0 to {STRONGEST:g} and more", ramp),)
+    users = tuple(_opaque(colour) for colour in ((1.0, 0.4, 0.4), (0.4, 1.0, 0.6), (0.4, 0.6, 1.0)))
+    return (Entry("one colour for each road user", users), Entry("standing still", (_opaque(rgb(STANDING)),)))
+
+
+def _opaque(colour: Sequence[float]) -> Colour:
+    red, green, blue = colour
+    return red, green, blue, 1.0

@@ -1,0 +1,175 @@
+"""Traffic and scans: the operators do what the batch command does, byte for byte."""
+
+from pathlib import Path
+
+from headless import simulate
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon import scans
+from seip_addon.core.scans import Frame
+from seip_addon.scene.write import write_result
+from seip_addon.viewport import layers
+from seip_addon.viewport.point_cloud import NAME as CLOUD
+from tests.scene_by_hand import make_scene
+from tests.small_junction import make_example
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+TRAFFIC = SCENES / "junction_traffic" / "run-1.npz"
+
+
+@pytest.fixture
+def placed(add_on):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / "junction.blend"))
+    scene = bpy.context.scene
+    scene.seip.survey.heights = "8"
+    scene.seip.survey.grid = 4.0
+    scene.seip.survey.spacing = 12.0
+    scene.seip.goal.count = 2
+    bpy.ops.seip.solve_placement()
+    scene.seip.traffic.file = str(TRAFFIC)
+    return scene
+
+
+def files(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_traffic_is_loaded_animated_and_cleared(placed):
+    assert bpy.ops.seip.load_traffic() == {"FINISHED"}
+    things = bpy.data.collections["SEIP Traffic"].objects
+    assert placed.seip.traffic.loaded.startswith(f"{len(things)} road users, 0 to ")
+    assert bpy.ops.seip.clear_traffic() == {"FINISHED"}
+    assert "SEIP Traffic" not in bpy.data.collections
+    assert not placed.seip.traffic.loaded
+
+
+def test_a_dataset_is_that_of_the_batch_command(placed, tmp_path):
+    traffic = placed.seip.traffic
+    traffic.whole, traffic.start, traffic.duration, traffic.rate, traffic.seed = False, 20.0, 0.2, 5.0, 7
+    traffic.formats = {"kitti", "pcd"}
+    traffic.split = "val"
+    traffic.folder = str(tmp_path / "panel" / "run")
+    assert bpy.ops.seip.write_dataset() == {"FINISHED"}
+    blend = tmp_path / "placed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+    simulate.main(
+        [
+            *(str(blend), "--traffic", str(TRAFFIC), "-o", str(tmp_path / "batch" / "run"), "--start", "20"),
+            *("--duration", "0.2", "--rate", "5", "--seed", "7", "--format", "kitti", "pcd", "--split", "val"),
+        ]
+    )
+    one, other = files(tmp_path / "panel"), files(tmp_path / "batch")
+    assert one.keys() == other.keys()
+    assert len(list((tmp_path / "panel" / "run" / "frames").iterdir())) == 2
+    for name in one:
+        assert one[name] == other[name], name
+
+
+def test_a_scan_at_a_time_of_the_run_is_the_runs_frame(placed, tmp_path):
+    traffic = placed.seip.traffic
+    traffic.whole, traffic.start, traffic.duration, traffic.rate = False, 20.0, 1.0, 1.0
+    traffic.folder = str(tmp_path / "run")
+    bpy.ops.seip.write_dataset()
+    placed.frame_set(21 * placed.render.fps)
+    bpy.ops.seip.scan_frame()
+    recorded, shown = Frame.load(tmp_path / "run" / "frames" / "000001.npz"), scans.find(placed).frame
+    assert shown.points.tobytes() == recorded.points.tobytes()
+    assert shown.labels.points.tolist() == recorded.labels.points.tolist()
+
+
+def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
+    bpy.ops.seip.scan_frame()
+    frame = scans.find(placed).frame
+    seen = []
+    for by in ("sensor", "intensity", "instance"):
+        placed.seip.view.cloud_colour = by
+        (layer,) = layers.find(placed, CLOUD).layers
+        assert layer.colours.shape == (len(frame), 4)
+        assert layer.colours.dtype == np.float32
+        seen.append(layer.colours)
+    assert not np.array_equal(seen[0], seen[1])
+    assert len(np.unique(seen[0], axis=0)) == 2
+    bpy.ops.seip.hide_scan()
+    assert layers.drawing() == 0
+
+
+def test_animated_objects_are_scanned_as_the_file_is(placed):
+    bpy.ops.seip.load_traffic()
+    placed.frame_set(480)
+    bpy.ops.seip.scan_frame()
+    from_file = scans.find(placed).frame
+    placed.seip.traffic.file = ""
+    placed.frame_start, placed.frame_end = 479, 481
+    bpy.ops.seip.scan_frame()
+    animated = scans.find(placed).frame
+    assert len(animated.labels) == len(from_file.labels)
+    assert np.allclose(np.sort(animated.labels.centre[:, 0]), np.sort(from_file.labels.centre[:, 0]), atol=0.01)
+
+
+def test_following_scans_at_each_frame_and_leaves_no_handler(placed):
+    before = len(bpy.app.handlers.frame_change_post)
+    bpy.ops.seip.scan_frame()
+    placed.seip.traffic.follow = True
+    assert len(bpy.app.handlers.frame_change_post) == before + 1
+    placed.frame_set(480)
+    assert scans.find(placed).frame.time == pytest.approx(480 / placed.render.fps)
+    placed.seip.traffic.follow = False
+    placed.frame_set(490)
+    assert scans.find(placed).frame.time == pytest.approx(480 / placed.render.fps)
+    assert len(bpy.app.handlers.frame_change_post) == before
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda scene: setattr(scene.seip.traffic, "file", "/nowhere/run.npz"), "there is no .*run.npz"),
+        (lambda scene: setattr(scene.seip.traffic, "file", ""), "There is nothing to scan: name a traffic file"),
+        (
+            lambda scene: bpy.data.batch_remove(bpy.data.collections["SEIP Sensors"].objects),
+            "There is no sensor to scan with",
+        ),
+        (lambda scene: setattr(scene.seip.traffic, "folder", ""), "name a folder"),
+    ],
+)
+def test_each_mistake_has_its_sentence(placed, tmp_path, wrong, words):
+    placed.seip.traffic.folder = str(tmp_path / "run")
+    wrong(placed)
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.seip.write_dataset()
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_beside_a_file_that_was_never_saved_has_its_sentence(add_on):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = make_scene(make_example().geometry)
+    write_result(scene, make_example().site, make_example().deployment)
+    scene.seip.traffic.file = str(TRAFFIC)
+    with pytest.raises(RuntimeError, match="the file has not been saved: save it first"):
+        bpy.ops.seip.write_dataset()
+
+
+def test_a_second_scan_of_the_same_scene_needs_no_preparation(placed):
+    bpy.ops.seip.scan_frame()
+    first = scans.find(placed).simulation
+    placed.frame_set(300)
+    bpy.ops.seip.scan_frame()
+    assert scans.find(placed).simulation is first
+    empty = next(thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY")
+    empty.location.z += 1.0
+    bpy.ops.seip.scan_frame()
+    assert scans.find(placed).simulation is not first
+
+
+def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
+    car = '<vehicle id="a" x="{}" y="-1.75" angle="90" type="car" speed="5"/>'
+    lines = [f'<timestep time="{time}">{car.format(5 * time - 40)}</timestep>' for time in range(6)]
+    fcd = tmp_path / "run.fcd.xml"
+    fcd.write_text(f"<fcd-export>{''.join(lines)}</fcd-export>", encoding="utf-8")
+    placed.seip.traffic.file = str(fcd)
+    assert bpy.ops.seip.load_traffic() == {"FINISHED"}
+    assert placed.seip.traffic.loaded.startswith("1 road users, 0 to 5 s\n1 car")
+    bpy.ops.seip.scan_frame()
+    assert scans.find(placed).run.trajectories.source == "run.fcd.xml"

@@ -1,0 +1,139 @@
+"""What the viewport shows: colours of the coverage, sight lines, and layers that are always removed."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from PIL import Image
+
+import seip_addon
+from seip_addon import state
+from seip_addon.scene import render
+from seip_addon.viewport import layers
+from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
+from seip_addon.viewport.sight_lines import NAME as SIGHT
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+
+
+@pytest.fixture
+def junction(add_on):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
+    scene = bpy.context.scene
+    scene.seip.survey.heights = "8"
+    scene.seip.survey.grid = 4.0
+    scene.seip.survey.spacing = 12.0
+    scene.seip.goal.count = 2
+    return scene
+
+
+@pytest.fixture
+def placed(junction):
+    bpy.ops.seip.solve_placement()
+    return junction
+
+
+def test_nothing_can_be_shown_before_a_placement(junction):
+    with pytest.raises(RuntimeError, match="There is no coverage to show: place sensors first"):
+        bpy.ops.seip.colour_coverage()
+    with pytest.raises(RuntimeError, match="There is no sensor to look from: place sensors first"):
+        bpy.ops.seip.show_sight_lines()
+    assert layers.drawing() == 0
+
+
+@pytest.mark.parametrize("aspect", ["seen", "times", "weights"])
+def test_coverage_is_coloured_with_a_legend(placed, aspect):
+    assert bpy.ops.seip.colour_coverage(aspect=aspect) == {"FINISHED"}
+    block = legend_of_coverage(placed)
+    shares = [float(entry.words.split()[-1].rstrip("%")) for entry in block.entries]
+    assert sum(shares) == pytest.approx(100.0, abs=0.3)
+    assert layers.drawing() == 2
+
+
+def test_sight_lines_are_the_row_of_the_grid(placed):
+    held = state.find(placed)
+    sensor = held.plan.deployment.sensors[1]
+    assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
+    overlay = layers.find(placed, SIGHT)
+    faces, lines = overlay.layers
+    row = held.grid.visible[sensor.pose]
+    assert len(lines.positions) == 2 * row.sum()
+    assert np.allclose(lines.positions[::2], sensor.xyz, atol=1e-3)
+    assert np.allclose(lines.positions[1::2, :2], held.layout.site.targets.xyz[row, :2], atol=1e-3)
+    distance = np.linalg.norm(held.layout.site.targets.xyz - sensor.xyz, axis=1)
+    assert len(faces.positions) == 6 * (~row & (distance <= sensor.model.max_range)).sum()
+    assert overlay.about == sensor.label
+
+
+def test_a_sensor_that_was_moved_has_no_sight_lines(placed):
+    thing = next(thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.get("seip_label") == "S1")
+    thing.location.x += 0.5
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
+        bpy.ops.seip.show_sight_lines(sensor="S1")
+
+
+def test_undo_takes_colours_and_legend_back(placed):
+    bpy.ops.ed.undo_push(message="placed")
+    bpy.ops.seip.colour_coverage(aspect="seen")
+    bpy.ops.ed.undo_push(message="coloured")
+    bpy.ops.ed.undo()
+    assert [entry.words.split("  ")[0] for entry in legend_of_coverage(bpy.context.scene).entries][-1].endswith("more")
+
+
+@pytest.mark.parametrize("ending", ["toggle", "another file", "unregister", "delete the scene"])
+def test_draw_handlers_are_always_removed(placed, ending):
+    bpy.ops.seip.colour_coverage(aspect="times")
+    bpy.ops.seip.show_sight_lines(sensor="S1")
+    assert layers.drawing() == 2
+    if ending == "toggle":
+        bpy.ops.seip.toggle_legend()
+        assert layers.drawing() == 2
+        bpy.ops.seip.hide_sight_lines()
+    elif ending == "another file":
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    elif ending == "unregister":
+        seip_addon.unregister()
+    else:
+        other = bpy.data.scenes.new("other")
+        bpy.data.scenes.remove(placed)
+        layers.hide(other, SIGHT)
+    assert layers.drawing() == 0
+    if ending == "unregister":
+        seip_addon.register()
+
+
+def test_a_picture_has_the_rendered_view_and_the_plan(placed, tmp_path, monkeypatch):
+    for name, value in (("WIDTH", 320), ("HEIGHT", 180), ("SAMPLES", 1)):
+        monkeypatch.setattr(render, name, value)
+    placed.seip.view.picture, placed.seip.view.picture_of = str(tmp_path / "report.png"), "RENDER"
+    assert bpy.ops.seip.save_picture() == {"FINISHED"}
+    assert bpy.ops.seip.save_picture() == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["report-2.png", "report.png"]
+    with Image.open(tmp_path / "report.png") as picture:
+        assert picture.width > 2 * picture.height
+
+
+def test_a_picture_of_a_viewport_needs_one(placed, tmp_path):
+    placed.seip.view.picture = str(tmp_path / "report.png")
+    with pytest.raises(RuntimeError, match="there is no viewport here to take a picture of"):
+        bpy.ops.seip.save_picture()
+
+
+def test_another_scene_shows_nothing_of_this_one(placed):
+    bpy.ops.seip.colour_coverage(aspect="times")
+    other = bpy.data.scenes.new("other")
+    assert layers.overlays(other) == []
+    assert len(layers.overlays(placed)) == 1
+
+
+def test_a_view_that_hides_the_colours_is_set_in_one_click(placed):
+    screen = bpy.context.window_manager.windows[0].screen
+    area = next(area for area in screen.areas if area.type == "VIEW_3D")
+    space = area.spaces.active
+    space.shading.type, space.shading.color_type = "SOLID", "OBJECT"
+    assert not shows_coverage(space)
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area):
+        bpy.ops.seip.show_coverage_colours()
+    assert shows_coverage(space)
