@@ -37,7 +37,7 @@ class SurveySettings:
     engine : {"auto", "bvh", "embree"}
         What casts the rays.
     solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
+        ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
     time_limit : float, seconds
         For each answer.
     """
@@ -47,7 +47,7 @@ class SurveySettings:
     grid_spacing: float = 1.0
     catalogue: tuple[Path, ...] = ()
     engine: Engine = "auto"
-    solver: str = "highs"
+    solver: str = "auto"
     time_limit: float = 60.0
 
     def models(self) -> dict[str, LidarModel]:
@@ -124,7 +124,9 @@ def grid_key(layout: Layout) -> str:
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
-def see(layout: Layout, path: Path, scheduler: str | None = None) -> Generator[Progress, None, VisibilityGrid]:
+def see(
+    layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
+) -> Generator[Progress, None, VisibilityGrid]:
     """Find which pose sees which target, or read it from a file where an earlier survey found the same.
 
     Parameters
@@ -134,9 +136,11 @@ def see(layout: Layout, path: Path, scheduler: str | None = None) -> Generator[P
         The grid's file, read and written.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work.
+    threads : int, optional
+        How many cast at once at most.
     """
     settings = layout.settings
-    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler)
+    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads)
 
 
 def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:

@@ -66,6 +66,7 @@ def stored_visibility(
     settings: VisibilitySettings,
     engine: Engine = "auto",
     scheduler: str | None = None,
+    threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Return the grid of a file where it follows from the same inputs; else compute it and write the file.
 
@@ -82,6 +83,8 @@ def stored_visibility(
         What casts the rays.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work.
+    threads : int, optional
+        How many of this process work at once at most.
 
     Returns
     -------
@@ -93,7 +96,7 @@ def stored_visibility(
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
     pieces = PieceFolder(path, key)
-    grid = yield from compute_visibility(site, models, settings, engine, pieces, scheduler)
+    grid = yield from compute_visibility(site, models, settings, engine, pieces, scheduler, threads)
     grid.save(path)
     pieces.remove()
     return grid
