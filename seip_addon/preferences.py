@@ -49,6 +49,11 @@ def cache_folder() -> Path:
     return Path(bpy.utils.resource_path("USER")) / "seip" / "visibility"  # run from a checkout
 
 
+def cores() -> int | None:
+    """Return how many threads may work at once, or None where Blender's own number holds."""
+    return getattr(_preferences(), "cores", 0) or None
+
+
 def catalogue_files() -> tuple[Path, ...]:
     """Return the user's own catalogues."""
     own = _preferences()

@@ -16,13 +16,11 @@ from bpy.props import (
 )
 
 from .core.candidates import CandidateSettings, heights_of
+from . import pointing, state
 from .core.goal import DEFAULT_COUNT, Goal
 from .core.survey import SurveySettings
 from .core.visibility.grid import VisibilitySettings
 from .preferences import catalogue_files
-
-VERSION = 1
-"""Of the layout of these properties: a file with a higher one was saved by a newer add-on."""
 
 _LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
 
@@ -120,11 +118,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         name="Solver",
         description="What solves the integer program",
         items=(
+            ("auto", "Automatic", "HiGHS where it is installed, else CBC"),
             ("highs", "HiGHS", "Comes with the extension"),
             ("cbc", "CBC", "Comes with PuLP"),
             ("gurobi", "Gurobi", "Needs your own installation and licence"),
         ),
-        default="highs",
+        default="auto",
     )
     time_limit: FloatProperty(
         name="Time Limit",
@@ -214,6 +213,11 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
+    position: StringProperty(
+        name="Position",
+        description="Name of a position, as laid out: type to search",
+        search=lambda self, context, edit_text: pointing.position_names(context.scene, edit_text),  # noqa: ARG005
+    )
 
     def goal(self) -> Goal:
         """Return what is asked, as the core takes it.
@@ -239,21 +243,68 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         return _written(self.central_weight) if self.weighting == "VALUE" else None
 
 
-class SEIP_PG_result(bpy.types.PropertyGroup):
+class SEIP_PG_chosen(bpy.types.PropertyGroup):
+    """A sensor of the placement; its name is its label."""
+
+
+class SEIP_PG_ranked(bpy.types.PropertyGroup):
+    """A candidate pose in a ranking; its name says where it is."""
+
+    pose: IntProperty(name="Pose", description="Number of the candidate pose")
+    share: FloatProperty(name="Share", description="Of the targets' weight that it sees, or adds", subtype="FACTOR")
+
+
+class SEIP_PG_placement(bpy.types.PropertyGroup):
     """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
 
-    key: StringProperty(name="Visibility", description="Digest of the visibility that it was chosen from")
-    chosen: StringProperty(name="Poses", description="Numbers of the chosen candidate poses")
     record: StringProperty(name="Record", description="The placement as placement.json holds it")
+    targets: StringProperty(name="Targets", description="Digest of the targets that it was made on")
+    seen: StringProperty(name="Seen", description="By how many sensors each target is seen, packed")
+
+
+class SEIP_PG_result(SEIP_PG_placement):
+    """The placement that stands in the scene, and what is looked at of it."""
+
+    sensors: CollectionProperty(type=SEIP_PG_chosen)
+    active_sensor: IntProperty(
+        name="Sensor",
+        description="Click to select the sensor in the scene",
+        update=lambda self, context: pointing.select_sensor(context, self),
+    )
+    order: EnumProperty(
+        name="Order",
+        description="By what candidates are ranked",
+        items=(
+            ("ADDED", "Added", "What a pose would add to the placement, at positions that are free"),
+            ("ALONE", "Alone", "What a pose sees by itself"),
+        ),
+    )
+    ranking: CollectionProperty(type=SEIP_PG_ranked)
+    active_ranked: IntProperty(
+        name="Candidate",
+        description="Click to put the 3D cursor at the candidate",
+        update=lambda self, context: pointing.show_candidate(context, self),
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Where the result is written; // is the folder of the .blend",
+        subtype="DIR_PATH",
+        default="//seip-result/",
+    )
+    render: BoolProperty(
+        name="Rendered View", description="Render a view of the scene as well, which takes a minute", default=False
+    )
 
 
 class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
-    version: IntProperty(name="Version", default=VERSION, options={"HIDDEN"})
+    version: IntProperty(name="Version", default=state.VERSION, options={"HIDDEN"})
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)
     result: PointerProperty(type=SEIP_PG_result)
+    kept: CollectionProperty(type=SEIP_PG_placement)
+    active_kept: IntProperty(name="Kept Placement", description="The one that the present placement is compared with")
 
 
 def _written(value: float) -> float:
@@ -266,6 +317,9 @@ CLASSES = (
     SEIP_PG_survey,
     SEIP_PG_position_rule,
     SEIP_PG_goal,
+    SEIP_PG_chosen,
+    SEIP_PG_ranked,
+    SEIP_PG_placement,
     SEIP_PG_result,
     SEIP_PG_scene,
 )

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .candidates import CandidateSettings
-from .goal import Goal, Plan, make_plan
+from .deployment import deploy
+from .errors import SeipError
+from .goal import Goal, Plan, make_plan, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
+from .placement import Placement
 from .placement.integer_program import check_solver
 from .progress import Progress
 from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
+from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
 from .visibility.ring_resolution import resolution_warnings
@@ -143,6 +150,12 @@ def see(
     return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads)
 
 
+def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
+    """Estimate what `see` will take where nothing is known yet; see `estimate_visibility`."""
+    settings = layout.settings
+    return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
+
+
 def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
     """Answer a goal on a survey; see `make_plan`."""
     settings = layout.settings
@@ -183,3 +196,41 @@ def record_of(
         warnings=layout.warnings,
     )
     return placement_record(layout.site, plan, run)
+
+
+def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
+    """Return the plan that a record of `record_of` tells of, without asking a solver again.
+
+    Parameters
+    ----------
+    layout : Layout
+        That it was made on.
+    grid : VisibilityGrid
+        That it was made from.
+    record : dict
+        The greedy answer that it may hold is left out.
+
+    Raises
+    ------
+    SeipError
+        The record is of another grid, or lacks something.
+    """
+    if record.get("inputs", {}).get("visibility") != grid.key:
+        raise SeipError("the placement was made for another state of the scene or its settings: place again")
+    asked, objective = record["settings"]["goal"], record["objective"]
+    goal = Goal(**{name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()})
+    chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
+    value = objective["value"]
+    placement = Placement(
+        chosen=chosen,
+        objective=value,
+        bound=math.nan if objective["bound"] is None else objective["bound"],
+        gap=math.inf if objective["gap"] is None else objective["gap"],
+        status=objective["status"],
+        solver=objective["solver"],
+        seconds=record["times"]["durations_s"].get("placement", 0.0),
+        covered=float(target_weights(layout.site, goal)[grid.times_seen(chosen) > 0].sum()),
+        price=record["price_usd"],
+        notes=tuple(record["notes"]),
+    )
+    return Plan(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import bpy
 
 from .. import state
+from ..core.background import Background
 from ..core.errors import SeipError
-from ..core.progress import Progress, finish, side_by_side
+from ..core.progress import Progress, finish
 
 Result = TypeVar("Result")
 Outcome = set[str]
@@ -26,6 +27,18 @@ def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
     return {"FINISHED"}
+
+
+class ForReadyScene:
+    """A mixin: a button that works where the scene has what any computation needs."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it works, and why not."""
+        sentence = state.obstacle(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of the operator that this is mixed into
+        return not sentence
 
 
 class LongWork(Generic[Result]):
@@ -66,14 +79,11 @@ class LongWork(Generic[Result]):
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        done: list[Any] = []
-        outcome = attempt(self, lambda: self._look(done))
-        if outcome == {"CANCELLED"} or done:
-            self._end(context)
-        if not done:
+        if not self._running.work.ended:
             _redraw(context)
-            return outcome if outcome == {"CANCELLED"} else {"PASS_THROUGH"}
-        return attempt(self, lambda: self.conclude(state.scene_of(self._scene), done[0]))
+            return {"PASS_THROUGH"}
+        self._end(context)
+        return attempt(self, lambda: self.conclude(state.scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop because Blender ends or opens another file."""
@@ -82,21 +92,13 @@ class LongWork(Generic[Result]):
     def _begin(self, context: bpy.types.Context) -> None:
         if state.running is not None:
             raise SeipError("other work is under way: wait for it, or stop it with Esc")
-        self._steps = side_by_side([self.prepare(context.scene)], 1)
         self._scene = context.scene.session_uid
-        self._running = state.running = state.Running(self.bl_idname, Progress(0, 0, "begin"))
+        self._running = state.running = state.Running(self.bl_idname, Background(self.prepare(context.scene)))
         self._timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
         context.window_manager.modal_handler_add(self)
 
-    def _look(self, done: list[Any]) -> None:
-        """Take one report of the thread; put the result into the list once there is one."""
-        try:
-            self._running.progress = next(self._steps)
-        except StopIteration as stop:
-            done += stop.value
-
     def _end(self, context: bpy.types.Context) -> None:
-        self._steps.close()
+        self._running.work.stop()
         context.window_manager.event_timer_remove(self._timer)
         if state.running is self._running:
             state.running = None
