@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ..core.errors import SeipError
-from ..core.pictures.palette import INK, SEEN_COLOURS, SEEN_WORDS
+from ..core.pictures.palette import INK, rgb
 from ..core.scene_geometry import DEFAULT_REFLECTIVITY
 from . import contract
 
@@ -100,8 +101,8 @@ VEIL_OPACITY = 0.25
 ROUGHNESS = {"glass": 0.15, "steel": 0.4, "rim": 0.35, "headlamp": 0.2, "tail lamp": 0.3}
 ROUGHNESS |= {f"paint {name}": 0.35 for name in PAINT_COLOURS}
 
-RESULT_COLOURS = {"sensor": "#f2c230", "post": INK, **dict(zip(SEEN_WORDS, SEEN_COLOURS, strict=True))}
-"""Web colour of each material of a result: matt, and the same in the viewport and in the legends of pictures."""
+RESULT_COLOURS = {"sensor": "#f2c230", "post": INK}
+"""Web colour of the materials of sensors: matt, and the same in the viewport and in renders."""
 
 
 def material(name: str) -> bpy.types.Material:
@@ -110,11 +111,23 @@ def material(name: str) -> bpy.types.Material:
     if existing is not None:
         return existing
     if name in RESULT_COLOURS:
-        colour = linear(RESULT_COLOURS[name])
-        return _made(name, colour, colour, roughness=1.0, specular=0.0)
+        return matt(name, RESULT_COLOURS[name])
     opacity = VEIL_OPACITY if name.endswith("veil") else 1.0
     shown = (*(value**VIEWPORT_GAMMA for value in COLOURS[name]), opacity)
     return _made(name, (*COLOURS[name], 1.0), shown, roughness=ROUGHNESS.get(name, 0.9), specular=0.5)
+
+
+def matt(name: str, web_colour: str) -> bpy.types.Material:
+    """Return a matt material of that name and colour, the same in the viewport and in the legends of pictures.
+
+    One material serves each name and colour: a name with another colour gets a material with the number that Blender
+    adds.
+    """
+    colour = linear(web_colour)
+    for existing in bpy.data.materials:
+        if contract.NUMBER.sub("", existing.name) == PREFIX + name and np.allclose(existing.diffuse_color, colour):
+            return existing
+    return _made(name, colour, colour, roughness=1.0, specular=0.0)
 
 
 def reflectivity(of: bpy.types.Material | None) -> float:
@@ -140,8 +153,7 @@ def reflectivity(of: bpy.types.Material | None) -> float:
 
 def linear(colour: str) -> tuple[float, float, float, float]:
     """Return a web colour (sRGB) as Blender's linear RGBA (IEC 61966-2-1)."""
-    srgb = [int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
-    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in rgb(colour))
     return red, green, blue, 1.0
 
 

@@ -9,18 +9,24 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Float, Integer
+from ..core.colouring import Aspect, Colouring, as_placed, colouring
 from ..core.deployment import Deployment, Sensor
-from ..core.pictures.palette import SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS
+from ..core.errors import SeipError
 from ..core.site import Site, Targets
 from ..core.streetscape.model import VEILS
 from ..core.streetscape.street_furniture import Solid, join, prism, tube
 from ..core.target_squares import target_squares
 from . import contract
-from .materials import linear, material
+from .materials import linear, matt
 from .meshes import mesh_of
 
 MARK = "seip_result"
 """Custom property of every object made here, so that the next result replaces it and nothing else."""
+
+SEEN_BY, TARGET_WEIGHT, COLOUR = "seip_seen", "seip_weight", "seip_colour"
+"""Attributes of the coverage mesh, the first two of each target's square."""
+CLASSES, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
+"""Custom properties of the coverage: what its colours mean; the aspect is empty where they are another's."""
 
 LIFT = max(height for height, _ in VEILS.values()) + 0.02
 """Metres of the coverage above the road: over the veils of areas, under the top of a kerb, which cuts it off."""
@@ -125,9 +131,83 @@ def _turned(vector: Float, angle: float) -> Float:
     return np.array((cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1], vector[2]))
 
 
+def coverage_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the mesh that shows the coverage, None where no result has been written."""
+    collection = contract.find(scene, contract.COVERAGE)
+    own = [] if collection is None else [thing for thing in collection.objects if MARK in thing]
+    return own[0] if own else None
+
+
+def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
+    """Colour the squares of the coverage by classes of one's own.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    colours : Colouring
+        Of the targets that the coverage was written for, in their order.
+
+    Raises
+    ------
+    SeipError
+        There is no coverage, or it is of other targets.
+    """
+    thing = _shown_coverage(scene)
+    if len(thing.data.polygons) != len(colours.of):
+        raise SeipError(f"scene {scene.name!r} shows the coverage of other targets: place sensors again")
+    _paint(thing, colours)
+
+
+def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
+    """Colour the coverage by one aspect, from what the mesh itself knows of its targets.
+
+    Raises
+    ------
+    SeipError
+        There is no coverage.
+    """
+    thing = _shown_coverage(scene)
+    attributes = thing.data.attributes
+    seen_by = np.empty(len(thing.data.polygons), dtype=np.int32)
+    weight = np.ones(len(seen_by), dtype=np.float32)  # a mesh of an earlier version has none
+    attributes[SEEN_BY].data.foreach_get("value", seen_by)
+    if TARGET_WEIGHT in attributes:
+        attributes[TARGET_WEIGHT].data.foreach_get("value", weight)
+    _paint(thing, colouring(aspect, seen_by.astype(np.int64), weight.astype(np.float64)))
+    thing[ASPECT] = aspect
+
+
+def _shown_coverage(scene: bpy.types.Scene) -> bpy.types.Object:
+    thing = coverage_of(scene)
+    if thing is None:
+        raise SeipError(f"scene {scene.name!r} shows no coverage: place sensors first")
+    return thing
+
+
+def _paint(thing: bpy.types.Object, colours: Colouring) -> None:
+    """Colour squares: ``seip_colour`` serves the viewport's Attribute colours, materials serve all others.
+
+    The words and the shares of the classes stay with the object, for the legend.
+    """
+    mesh = thing.data
+    palette = np.array([linear(colour) for colour in colours.colours], dtype=np.float32)
+    attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "CORNER")
+    attribute.data.foreach_set("color", np.repeat(palette[colours.of], 4, axis=0).ravel())
+    mesh.color_attributes.active_color_name = COLOUR
+    mesh.materials.clear()
+    for words, colour in zip(colours.words, colours.colours, strict=True):
+        mesh.materials.append(matt(words, colour))
+    mesh.polygons.foreach_set("material_index", colours.of.astype(np.int32))
+    mesh.update()
+    thing[CLASSES], thing[CLASS_COLOURS] = list(colours.words), list(colours.colours)
+    thing[SHARES] = colours.shares.tolist()
+    thing[ASPECT] = ""
+
+
 def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment) -> None:
     thing = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment.seen_by))
     thing[MARK] = True
+    _paint(thing, as_placed(deployment.seen_by))
     thing["seip_coverage"] = deployment.coverage
     thing["seip_seen_twice"] = deployment.seen_twice
     thing["seip_coverage_weighted"] = deployment.weighted
@@ -139,22 +219,10 @@ def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployme
 
 
 def _coverage_mesh(targets: Targets, seen_by: Integer) -> bpy.types.Mesh:
-    """Return one square per target, with how many sensors see it and the colour of that.
-
-    The integers are the attribute ``seip_seen`` of the faces, in the order of
-    the targets; ``seip_colour`` serves the viewport's Attribute colours, and a
-    material for each class its Material colours and renders.
-    """
+    """Return one square per target, in their order, with how many sensors see it and how much it weighs."""
     mesh = bpy.data.meshes.new("Coverage")
     corners = target_squares(targets).reshape(-1, 3) + np.array((0.0, 0.0, LIFT))
     mesh.from_pydata(corners.tolist(), [], np.arange(4 * len(targets)).reshape(-1, 4).tolist())
-    classes = np.minimum(seen_by, SEEN_TWICE).astype(np.int32)
-    mesh.attributes.new("seip_seen", "INT", "FACE").data.foreach_set("value", seen_by.astype(np.int32))
-    palette = np.array([linear(colour) for colour in SEEN_COLOURS], dtype=np.float32)
-    colours = mesh.color_attributes.new("seip_colour", "FLOAT_COLOR", "CORNER")
-    colours.data.foreach_set("color", np.repeat(palette[classes], 4, axis=0).ravel())
-    mesh.color_attributes.active_color_name = colours.name
-    for words in SEEN_WORDS:
-        mesh.materials.append(material(words))
-    mesh.polygons.foreach_set("material_index", classes)
+    mesh.attributes.new(SEEN_BY, "INT", "FACE").data.foreach_set("value", seen_by.astype(np.int32))
+    mesh.attributes.new(TARGET_WEIGHT, "FLOAT", "FACE").data.foreach_set("value", targets.weight.astype(np.float32))
     return mesh

@@ -5,12 +5,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from seip_addon.core.colouring import Colouring, colouring
 from seip_addon.core.deployment import deploy
+from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene import contract
+from seip_addon.scene.materials import linear
 from seip_addon.scene.render import save_rendered_view
 from seip_addon.scene.traffic import animate
-from seip_addon.scene.write import LIFT, clear_result, write_result
+from seip_addon.scene.write import LIFT, clear_result, colour_coverage, recolour, write_result
 from tests.scene_by_hand import make_scene
 from tests.small_junction import make_example
 
@@ -206,3 +209,44 @@ def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path
     save_rendered_view(tmp_path / "view.png", scene, example.site, deployment)
     hidden = dict(zip([sensor.pose for sensor in deployment.sensors], seen["sight"].hidden.tolist(), strict=True))
     assert hidden == {poses[0]: False, poses[1]: True}
+
+
+def colours_of(thing):
+    """Return the colour of each square by its material, and that of its first corner by the attribute."""
+    mesh = thing.data
+    material = np.array([mesh.materials[face.material_index].diffuse_color for face in mesh.polygons])
+    corner = np.empty(len(mesh.loops) * 4, dtype=np.float32)
+    mesh.color_attributes["seip_colour"].data.foreach_get("color", corner)
+    return material, corner.reshape(-1, 4, 4)[:, 0]
+
+
+@pytest.mark.parametrize("aspect", ["seen", "times", "weights"])
+def test_coverage_is_recoloured_from_the_mesh_alone(example, scene, aspect):
+    write_result(scene, example.site, example.deployment)
+    colour_coverage(scene, aspect)
+    thing = coverage(scene)
+    expected = colouring(aspect, example.deployment.seen_by, example.site.targets.weight)
+    wanted = np.array([linear(colour) for colour in expected.colours])[expected.of]
+    for shown in colours_of(thing):
+        assert np.allclose(shown, wanted, atol=1e-6)
+    assert list(thing["seip_classes"]) == list(expected.words)
+    assert np.allclose(thing["seip_shares"], expected.shares)
+    assert thing["seip_aspect"] == aspect
+
+
+def test_one_name_in_two_colours_is_two_materials(example, scene):
+    write_result(scene, example.site, example.deployment)
+    half = np.arange(len(example.site.targets)) % 2
+    recolour(scene, Colouring(("not seen", "else"), ("#000000", "#ffffff"), half))
+    assert np.allclose(colours_of(coverage(scene))[0][half == 0], (0, 0, 0, 1))
+    colour_coverage(scene, "seen")
+    colour_coverage(scene, "times")
+    assert len([one for one in bpy.data.materials if one.name.startswith("SEIP not seen")]) == 2
+
+
+def test_colours_of_other_targets_have_their_sentence(example, scene):
+    with pytest.raises(SeipError, match="shows no coverage"):
+        colour_coverage(scene, "seen")
+    write_result(scene, example.site, example.deployment)
+    with pytest.raises(SeipError, match="other targets"):
+        recolour(scene, Colouring(("all",), ("#000000",), np.zeros(3, dtype=np.int64)))

@@ -18,7 +18,7 @@ from ..arrays import Float
 from ..scans.frame import Frame, Labels
 from ..scans.sensor import MountedSensor
 from .drawing import LABEL_SIZE, SENSOR_MARK, save_png
-from .palette import INK, PAPER, SOFT_INK
+from .palette import INK, PAPER, SENSOR_COLOURS, SOFT_INK, STRENGTH_COLOURS, STRONGEST
 from .plan_view import draw_area, draw_scale
 
 DPI = 160
@@ -26,11 +26,7 @@ MAP, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches
 AROUND = 0.04  # of the region's size, shown around it
 PIXELS = 1100  # of a cloud's picture, along a side
 NIGHT = "#101820"
-SENSOR_COLOURS = ("#56b4e9", "#e69f00", "#3cc99b", "#f07ac0", "#f0e442", "#d55e00", "#8f9bff", "#cfd8dc")
-"""Told apart by colour-blind people, on a dark ground (after Okabe and Ito 2008)."""
-STRENGTH = LinearSegmentedColormap.from_list("strength", ("#27408b", "#1fa187", "#fde725", "#ffffff"))
-STRONGEST = 0.6
-"""Intensity from which on returns have the last colour; below, colours go by its square root."""
+STRENGTH = LinearSegmentedColormap.from_list("strength", STRENGTH_COLOURS)
 SEEN, UNSEEN = "#ffffff", "#ff5a4f"
 
 
