@@ -24,8 +24,8 @@ def select_sensor(context: bpy.types.Context, result: bpy.types.PropertyGroup) -
     if empty is None or empty.name not in context.view_layer.objects:
         return
     for thing in context.selected_objects:
-        thing.select_set(False)
-    empty.select_set(True)
+        thing.select_set(state=False)
+    empty.select_set(state=True)
     context.view_layer.objects.active = empty
 
 

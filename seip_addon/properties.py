@@ -15,8 +15,8 @@ from bpy.props import (
     StringProperty,
 )
 
-from .core.candidates import CandidateSettings, heights_of
 from . import pointing, state
+from .core.candidates import CandidateSettings, heights_of
 from .core.goal import DEFAULT_COUNT, Goal
 from .core.survey import SurveySettings
 from .core.visibility.grid import VisibilitySettings

@@ -14,8 +14,11 @@ PARTS = (
     "operators.work",
     "operators.visibility",
     "operators.placement",
+    "live",
+    "operators.results",
     "panels.visibility",
     "panels.placement",
+    "panels.results",
 )
 """Modules with ``CLASSES``, and with ``attach`` and ``detach`` for what is no class: handlers, properties, menus."""
 

@@ -10,10 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Integer
+from .colouring import Colouring
 from .errors import SeipError
 
 NEITHER, BOTH, GAINED, LOST = range(4)
 COMPARED_WORDS = ("seen in neither", "seen in both", "gained", "lost")
+COMPARED_COLOURS = ("#8a8f94", "#cfd6db", "#1f6fb4", "#e0662f")
+"""What stays as it is is grey; gains are blue and losses orange, of other lightness each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,10 @@ class Comparison:
     def lost(self) -> int:
         """How many targets the one sees and the other does not."""
         return int(np.count_nonzero(self.classes == LOST))
+
+    def colouring(self) -> Colouring:
+        """Return the classes as the road shows them."""
+        return Colouring(COMPARED_WORDS, COMPARED_COLOURS, self.classes)
 
 
 def compare(one: Integer, other: Integer) -> Comparison:

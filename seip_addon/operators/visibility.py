@@ -27,7 +27,9 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[state.Held], bpy.types.
         """Hold the grid."""
         state.held[scene.session_uid] = result
         site = result.layout.site
-        self.report({"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known")
+        self.report(
+            {"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known"
+        )
 
 
 class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[state.Held], bpy.types.Operator):

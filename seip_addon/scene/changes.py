@@ -86,7 +86,9 @@ def _sources(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 def _fingerprint(sources: Iterable[bpy.types.Object], scene: bpy.types.Scene) -> str:
     layer = scene.view_layers[0]
     roles = contract.members(scene)
-    lines = sorted(repr((_traits(thing, layer), [n for n, things in roles.items() if thing in things])) for thing in sources)
+    lines = sorted(
+        repr((_traits(thing, layer), [n for n, things in roles.items() if thing in things])) for thing in sources
+    )
     return digest(repr(scene.get(contract.ORIGIN)), repr(scene.get(contract.TITLE, scene.name)), *lines)
 
 

@@ -145,7 +145,7 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     )
 
 
-def compute_visibility(
+def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,

@@ -59,7 +59,7 @@ class PieceFolder:
         return self._folder / f"{self._prefix}-{number:06d}.npz"
 
 
-def stored_visibility(
+def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
     path: Path,
     site: Site,
     models: Mapping[str, LidarModel],
