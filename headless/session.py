@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import check_folder  # noqa: F401  # for the commands: before their work
+from seip_addon.core.storage import check_folder as check_folder  # noqa: PLC0414  # the commands find it here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -18,7 +18,7 @@ def sensor_empties(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     return {str(thing[contract.LABEL]): thing for thing in things if contract.LABEL in thing}
 
 
-def select_sensor(context: bpy.types.Context, result: bpy.types.PropertyGroup) -> None:
+def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """Select the sensor that was clicked on in the list, and nothing else."""
     empty = sensor_empties(context.scene).get(result.sensors[result.active_sensor].name)
     if empty is None or empty.name not in context.view_layer.objects:
@@ -29,7 +29,7 @@ def select_sensor(context: bpy.types.Context, result: bpy.types.PropertyGroup) -
     context.view_layer.objects.active = empty
 
 
-def show_candidate(context: bpy.types.Context, result: bpy.types.PropertyGroup) -> None:
+def show_candidate(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """Put the 3D cursor at the candidate that was clicked on in the ranking."""
     known = state.find(context.scene)
     pose = result.ranking[result.active_ranked].pose
@@ -37,8 +37,9 @@ def show_candidate(context: bpy.types.Context, result: bpy.types.PropertyGroup) 
         context.scene.cursor.location = Vector(known.layout.site.candidates.xyz[pose])
 
 
-def position_names(scene: bpy.types.Scene, text: str) -> Iterator[str]:
+def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:
     """Yield the names of positions that hold a text: those that were laid out, or else the poles."""
+    scene = context.scene
     known = state.find(scene)
     if known is not None:
         names = known.layout.site.candidates.position_name.tolist()

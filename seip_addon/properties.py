@@ -216,7 +216,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     position: StringProperty(
         name="Position",
         description="Name of a position, as laid out: type to search",
-        search=lambda self, context, edit_text: pointing.position_names(context.scene, edit_text),  # noqa: ARG005
+        search=pointing.search_positions,
     )
 
     def goal(self) -> Goal:
@@ -269,7 +269,7 @@ class SEIP_PG_result(SEIP_PG_placement):
     active_sensor: IntProperty(
         name="Sensor",
         description="Click to select the sensor in the scene",
-        update=lambda self, context: pointing.select_sensor(context, self),
+        update=pointing.select_sensor,
     )
     order: EnumProperty(
         name="Order",
@@ -283,7 +283,7 @@ class SEIP_PG_result(SEIP_PG_placement):
     active_ranked: IntProperty(
         name="Candidate",
         description="Click to put the 3D cursor at the candidate",
-        update=lambda self, context: pointing.show_candidate(context, self),
+        update=pointing.show_candidate,
     )
     folder: StringProperty(
         name="Folder",

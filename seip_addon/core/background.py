@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Generator
-from concurrent.futures import CancelledError
+from collections.abc import Generator
+from concurrent.futures import CancelledError, Future
 from contextlib import closing
 from typing import Generic, TypeVar
 
@@ -32,14 +32,14 @@ class Background(Generic[Result]):
         self.progress = Progress(0, 0, "begin")
         self._stop = threading.Event()
         self._pace = Pace()
-        self._end: Callable[[], Result] | None = None
+        self._end: Future[Result] = Future()
         self._thread = threading.Thread(target=self._run, args=(steps,), daemon=True)
         self._thread.start()
 
     @property
     def ended(self) -> bool:
         """Whether there is a result, or an error in its place."""
-        return self._end is not None
+        return self._end.done()
 
     @property
     def seconds_left(self) -> float | None:
@@ -47,27 +47,26 @@ class Background(Generic[Result]):
         return self._pace.seconds_left
 
     def result(self) -> Result:
-        """Return the result, or raise what went wrong; only after the end."""
-        if self._end is None:
-            raise RuntimeError("the work has not ended")
-        return self._end()
+        """Return the result, or raise what went wrong; waits for the end."""
+        return self._end.result()
 
     def stop(self) -> None:
         """Ask the work to end at its next report, and return at once."""
         self._stop.set()
 
-    def join(self) -> None:
-        """Wait until the thread has ended."""
-        self._thread.join()
+    def join(self, seconds: float) -> bool:
+        """Wait for the thread to end, no longer than some seconds; return whether it did."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
 
     def _run(self, steps: Generator[Progress, None, Result]) -> None:
         try:
             with closing(steps):
                 result = self._step_through(steps)
         except BaseException as error:  # noqa: BLE001  # raised again where the result is asked for
-            self._end = _raising(error)
+            self._end.set_exception(error)
         else:
-            self._end = lambda: result
+            self._end.set_result(result)
 
     def _step_through(self, steps: Generator[Progress, None, Result]) -> Result:
         while not self._stop.is_set():
@@ -102,10 +101,3 @@ class Pace:
         gained = progress.done - self._first.done
         if gained > 0:
             self.seconds_left = (progress.total - progress.done) * (now - self._since) / gained
-
-
-def _raising(error: BaseException) -> Callable[[], Result]:  # type: ignore[type-var]  # it never returns one
-    def raise_it() -> Result:
-        raise error
-
-    return raise_it

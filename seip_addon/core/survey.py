@@ -218,7 +218,8 @@ def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
     if record.get("inputs", {}).get("visibility") != grid.key:
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
     asked, objective = record["settings"]["goal"], record["objective"]
-    goal = Goal(**{name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()})
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
+    goal = Goal(**named)
     chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
     value = objective["value"]
     placement = Placement(

@@ -101,7 +101,7 @@ class SEIP_OT_remove_rule(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether there is a rule to remove."""
         goal = context.scene.seip.goal
-        return 0 <= goal.active_rule < len(goal.rules)
+        return goal.active_rule in range(len(goal.rules))
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Remove the active one."""

@@ -34,7 +34,7 @@ class ForPlacement:
         """Tell whether it works, and why not."""
         sentence = state.obstacle(context.scene) or no_placement(context.scene)
         if sentence:
-            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of the operator that this is mixed into
+            cls.poll_message_set(sentence)
         return not sentence
 
 
@@ -166,7 +166,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether there is one."""
         seip = context.scene.seip
-        return 0 <= seip.active_kept < len(seip.kept)
+        return seip.active_kept in range(len(seip.kept))
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Remove it from the list."""

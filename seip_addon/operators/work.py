@@ -37,7 +37,7 @@ class ForReadyScene:
         """Tell whether it works, and why not."""
         sentence = state.obstacle(context.scene)
         if sentence:
-            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of the operator that this is mixed into
+            cls.poll_message_set(sentence)
         return not sentence
 
 
