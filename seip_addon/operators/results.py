@@ -105,7 +105,7 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[list[Ranked]], bpy.types.Op
             line = ranking.add()
             line.pose, line.share = one.pose, one.share
             position = candidates.position_name[candidates.position_of[one.pose]]
-            line.name = f"{position} · {candidates.sensor[one.pose]} at {candidates.height[one.pose]:g} m"
+            line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m {position}"
 
     def _ranked(
         self, finding: Generator[Progress, None, state.Held], order: str

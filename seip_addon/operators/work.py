@@ -106,11 +106,11 @@ class LongWork(Generic[Result]):
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    """Have all viewports drawn anew, their sidebars with them."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    """Have the sidebars of all viewports drawn anew, and not what the viewports show: that may take long."""
+    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
+    for region in (region for area in areas if area.type == "VIEW_3D" for region in area.regions):
+        if region.type == "UI":
+            region.tag_redraw()
 
 
 class SEIP_OT_stop(bpy.types.Operator):

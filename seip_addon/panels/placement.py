@@ -46,7 +46,9 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.row().prop(goal, "limit", expand=True)
+        row = layout.row()
+        row.use_property_split = False  # else there is no room for three words
+        row.prop(goal, "limit", expand=True)
         column = layout.column()
         column.prop(goal, goal.limit.lower())
         column.prop(goal, "weighting")
@@ -111,7 +113,7 @@ def _draw_answer(layout: bpy.types.UILayout, record: Record, doubt: str) -> None
     objective = record["objective"]
     proven = objective["status"] == "optimal"
     draw_sentence(box, certificate(record), icon="CHECKMARK" if proven else "INFO")
-    for note in (*record["notes"], *record["warnings"]):
+    for note in (*record["notes"], *warnings_of_chosen(record)):
         draw_sentence(box, note, icon="INFO")
 
 
@@ -130,6 +132,12 @@ def figures(record: Record) -> list[tuple[str, str]]:
         lines.append(("Bound", unit.format(objective["bound"])))
         lines.append(("Gap", f"{objective['gap']:.2%}"))
     return lines
+
+
+def warnings_of_chosen(record: Record) -> list[str]:
+    """Return the warnings but those of sensor types that are not among the chosen."""
+    others = {*record["settings"]["candidates"]["sensors"]} - {sensor["sensor"] for sensor in record["sensors"]}
+    return [warning for warning in record["warnings"] if warning.partition(":")[0] not in others]
 
 
 def certificate(record: Record) -> str:

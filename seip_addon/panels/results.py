@@ -34,8 +34,7 @@ class SEIP_UL_chosen(bpy.types.UIList):
             layout.label(text=item.name)
             return
         row = layout.split(factor=0.75)
-        where = f"{sensor['sensor']} at {sensor['height_m']:g} m · {sensor['position']}"
-        row.label(text=f"{item.name}  {where}")
+        row.label(text=f"{item.name}  {sensor['sensor']} {sensor['height_m']:g} m {sensor['position']}")
         row.label(text=f"{sensor['coverage_alone']:.1%}")
 
 
