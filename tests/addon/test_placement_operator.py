@@ -1,11 +1,12 @@
-"""From a click to placed sensors: the operators do what the batch command does, and what they find outlives the file."""
+"""From a click to placed sensors: operators do what the batch command does, and what they find outlives the file."""
 
 import json
 from pathlib import Path
 
+from headless import place
+
 import bpy
 import pytest
-from headless import place
 
 from seip_addon import pointing, state
 from seip_addon.core.results.placement_record import comparable, load_placement_record
@@ -169,7 +170,7 @@ def test_a_scene_without_region_has_its_sentence(junction):
 def test_a_region_without_targets_has_its_sentence(junction):
     for thing in bpy.data.collections["SEIP Region"].objects:
         thing.location.x += 5000.0
-    with pytest.raises(RuntimeError, match="Error: .*target"):
+    with pytest.raises(RuntimeError, match=r"Error: .*target"):
         bpy.ops.seip.solve_placement()
 
 

@@ -14,7 +14,7 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
-SITE = junction_site(positions=200, heights=[4.0, 6.0, 8.0], spacing=1.0)
+SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)
 MODELS = load_catalogue()
 
 

@@ -47,16 +47,24 @@ class Onlooker:
         return row
 
     def _by_all_rays(self, sensor: MountedSensor) -> Boolean:
-        """Cast the whole scan of a tilted sensor: which of its rays matter is known of level ones alone."""
+        """Cast all rays of a tilted sensor that reach the heights of targets: more is known of level ones alone."""
         model = sensor.model
         rays = np.arange(model.channels * model.azimuth_count)
         directions: Float = BeamPattern(model).directions(rays) @ sensor.orientation.T
+        directions = directions[self._reaches_targets(sensor.xyz[2], directions[:, 2] * model.max_range)]
         distance, triangle = self._caster.cast(sensor.xyz, directions, model.max_range)
         counts = self._place(sensor, 0.0).counting(model, directions, distance, triangle)
         points = sensor.xyz + distance[counts, None] * directions[counts]
         seen = np.zeros(len(self._surfaces.xyz), dtype=bool)
         seen[self._index.within_delta(points)] = True
         return seen
+
+    def _reaches_targets(self, height: float, rise: Float) -> Boolean:
+        """Tell which rays come to where a return could be near a target, given where they begin and how they rise."""
+        xyz, delta = self._surfaces.xyz, self._settings.delta
+        lowest, highest = xyz[:, 2].min() - delta, xyz[:, 2].max() + delta
+        reaches: Boolean = (height + np.minimum(rise, 0.0) <= highest) & (height + np.maximum(rise, 0.0) >= lowest)
+        return reaches
 
     def _place(self, sensor: MountedSensor, yaw: float) -> Place:
         delta, least = self._settings.delta, self._settings.min_intensity
