@@ -85,37 +85,39 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     return sum(corners, Vector()) / len(corners) if corners else Vector()
 
 
-class SEIP_OT_rank_candidates(ForPlacement, LongWork[list[Ranked]], bpy.types.Operator):
+class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Ranked]]], bpy.types.Operator):
     """List the candidates that are worth most, alone or in addition to the placement"""
 
     bl_idname = "seip.rank_candidates"
     bl_label = "Rank Candidates"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, list[Ranked]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, list[Ranked]]]:
         """Find the placement again."""
-        return self._ranked(state.answered(scene), scene.seip.result.order)
+        return _ranked(state.answered(scene), scene.seip.result.order)
 
-    def conclude(self, scene: bpy.types.Scene, result: list[Ranked]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, list[Ranked]]) -> None:
         """Fill the list."""
-        state.held[scene.session_uid] = self._known
-        candidates = self._known.layout.site.candidates
+        state.held[scene.session_uid], lines = result
+        candidates = state.held[scene.session_uid].layout.site.candidates
         ranking = scene.seip.result.ranking
         ranking.clear()
-        for one in result:
+        for one in lines:
             line = ranking.add()
             line.pose, line.share = one.pose, one.share
             position = candidates.position_name[candidates.position_of[one.pose]]
             line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m {position}"
 
-    def _ranked(
-        self, finding: Generator[Progress, None, state.Held], order: str
-    ) -> Generator[Progress, None, list[Ranked]]:
-        self._known = known = yield from finding
-        plan, grid, site = *_plan_and_grid(known), known.layout.site
-        weight = target_weights(site, plan.goal)
-        if order == "ALONE":
-            return rank_alone(grid.visible, weight, MOST_RANKED)
-        return rank_added(grid.visible, weight, plan.placement.chosen, site.candidates.position_of, MOST_RANKED)
+
+def _ranked(
+    finding: Generator[Progress, None, state.Held], order: str
+) -> Generator[Progress, None, tuple[state.Held, list[Ranked]]]:
+    known = yield from finding
+    plan, grid = _plan_and_grid(known)
+    site, visible = known.layout.site, grid.visible
+    weight = target_weights(site, plan.goal)
+    if order == "ALONE":
+        return known, rank_alone(visible, weight, MOST_RANKED)
+    return known, rank_added(visible, weight, plan.placement.chosen, site.candidates.position_of, MOST_RANKED)
 
 
 def _plan_and_grid(known: state.Held) -> tuple[Plan, VisibilityGrid]:
@@ -208,7 +210,7 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[Onlooker], bpy.types.Operator):
+class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[state.Held, Onlooker]], bpy.types.Operator):
     """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
 
     bl_idname = "seip.follow_sensors"
@@ -226,20 +228,23 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[Onlooker], bpy.types.Operato
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Onlooker]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, Onlooker]]:
         """Find the placement again."""
-        return self._set_up(state.answered(scene))
+        return _set_up(state.answered(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: Onlooker) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, Onlooker]) -> None:
         """Begin to follow."""
-        state.held[scene.session_uid] = self._known
-        live.start(scene, self._known, result)
+        state.held[scene.session_uid], onlooker = result
+        live.start(scene, state.held[scene.session_uid], onlooker)
 
-    def _set_up(self, finding: Generator[Progress, None, state.Held]) -> Generator[Progress, None, Onlooker]:
-        self._known = known = yield from finding
-        settings = known.layout.settings
-        yield Progress(0, 0, "getting ready to cast")
-        return Onlooker(known.layout.site, settings.visibility, settings.engine)
+
+def _set_up(
+    finding: Generator[Progress, None, state.Held],
+) -> Generator[Progress, None, tuple[state.Held, Onlooker]]:
+    known = yield from finding
+    settings = known.layout.settings
+    yield Progress(0, 0, "getting ready to cast")
+    return known, Onlooker(known.layout.site, settings.visibility, settings.engine)
 
 
 class SEIP_OT_export_result(ForPlacement, LongWork[state.Held], bpy.types.Operator):

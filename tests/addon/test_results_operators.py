@@ -8,6 +8,7 @@ import pytest
 
 from seip_addon import live, pointing, state
 from seip_addon.core.comparison import unpacked_counts
+from seip_addon.core.errors import SeipError
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 
@@ -152,3 +153,11 @@ def test_following_stops_where_the_scene_has_changed(placed):
     bpy.context.view_layer.update()
     live.look()
     assert "the scene has changed" in live.following.problem
+
+
+def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
+    number = placed.session_uid
+    bpy.ops.scene.new(type="NEW")
+    bpy.data.scenes.remove(placed)
+    with pytest.raises(SeipError, match="is gone: nothing was written"):
+        state.scene_of(number)
