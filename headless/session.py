@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import signal
 import sys
-import tempfile
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.storage import check_folder as check_folder  # noqa: PLC0414  # the commands find it here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -72,23 +72,6 @@ def open_scene(path: Path | None) -> None:
         open_blend(path)
     elif not (in_blender() and bpy.data.filepath):
         raise SeipError("no scene: name a .blend")
-
-
-def check_folder(folder: Path) -> None:
-    """Make a folder for results and see that it can be written, before the work rather than after.
-
-    Raises
-    ------
-    SeipError
-        The folder cannot be made or written.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
 
 
 @contextmanager

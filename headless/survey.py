@@ -86,7 +86,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     work.add_argument("--engine", choices=("auto", "bvh", "embree"), default="auto", help="ray caster")
     work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers cast, like tcp://host:8786")
-    work.add_argument("--solver", default="highs", help="highs, cbc or gurobi")
+    work.add_argument(
+        "--solver", default="auto", help="auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi"
+    )
     work.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for each answer, in seconds")
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import bpy
 
 from .core.errors import SeipError
 from .core.lidar import LidarModel, load_catalogue
-from .core.visibility import ray_casting
+from .core.visibility.ray_casting import MOST_THREADS
 from .core.visibility.store import GridFolder
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
@@ -24,10 +23,6 @@ class SEIP_PG_catalogue_file(bpy.types.PropertyGroup):
     )
 
 
-def _use_cores(preferences: SEIP_AP_preferences, _context: bpy.types.Context) -> None:
-    ray_casting.use_threads(preferences.cores)
-
-
 class SEIP_AP_preferences(bpy.types.AddonPreferences):
     """Preferences of the add-on."""
 
@@ -35,11 +30,10 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
 
     cores: bpy.props.IntProperty(
         name="Cores",
-        description="Processor cores that cast rays at once; more than four rarely help",
-        default=ray_casting.most_threads(),
+        description="Processor cores that compute visibility at once; more than four rarely help",
+        default=MOST_THREADS,
         min=1,
-        max=max(1, os.cpu_count() or 1),
-        update=_use_cores,
+        max=MOST_THREADS,
     )
     cache: bpy.props.StringProperty(
         name="Cache",
@@ -75,6 +69,12 @@ def cache_folder() -> Path:
     if ADDON_ID.startswith("bl_ext."):
         return Path(bpy.utils.extension_path_user(ADDON_ID, path="visibility", create=True))
     return Path(bpy.utils.resource_path("USER")) / "seip" / "visibility"  # run from a checkout
+
+
+def cores() -> int | None:
+    """Return how many threads may compute visibility at once, or None where nobody has said."""
+    preferences = own()
+    return None if preferences is None else preferences.cores
 
 
 def catalogue_files() -> tuple[Path, ...]:
@@ -138,10 +138,3 @@ def own() -> SEIP_AP_preferences | None:
 
 
 CLASSES = (SEIP_PG_catalogue_file, SEIP_AP_preferences)
-
-
-def attach() -> None:
-    """Use as many cores as the user allows."""
-    preferences = own()
-    if preferences is not None:
-        ray_casting.use_threads(preferences.cores)

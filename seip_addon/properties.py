@@ -16,7 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import scans
+from . import pointing, scans, state
 from .core.candidates import HIGHEST, CandidateSettings, heights_of
 from .core.datasets import FORMATS, SPLITS
 from .core.goal import DEFAULT_COUNT, Goal
@@ -29,9 +29,6 @@ from .core.traffic.source import TrafficFiles
 from .core.visibility.grid import VisibilitySettings
 from .preferences import catalogue_files
 from .scene import contract, roles
-
-VERSION = 1
-"""Of the layout of these properties: a file with a higher one was saved by a newer add-on."""
 
 _LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
 
@@ -211,11 +208,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         name="Solver",
         description="What solves the integer program",
         items=(
+            ("auto", "Automatic", "HiGHS where it is installed, else CBC"),
             ("highs", "HiGHS", "Comes with the extension"),
             ("cbc", "CBC", "Comes with PuLP"),
             ("gurobi", "Gurobi", "Needs your own installation and licence"),
         ),
-        default="highs",
+        default="auto",
     )
     time_limit: FloatProperty(
         name="Time Limit",
@@ -305,6 +303,11 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
+    position: StringProperty(
+        name="Position",
+        description="Name of a position, as laid out: type to search",
+        search=pointing.search_positions,
+    )
 
     def goal(self) -> Goal:
         """Return what is asked, as the core takes it.
@@ -330,12 +333,57 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         return _written(self.central_weight) if self.weighting == "VALUE" else None
 
 
-class SEIP_PG_result(bpy.types.PropertyGroup):
+class SEIP_PG_chosen(bpy.types.PropertyGroup):
+    """A sensor of the placement; its name is its label."""
+
+
+class SEIP_PG_ranked(bpy.types.PropertyGroup):
+    """A candidate pose in a ranking; its name says where it is."""
+
+    pose: IntProperty(name="Pose", description="Number of the candidate pose")
+    share: FloatProperty(name="Share", description="Of the targets' weight that it sees, or adds", subtype="FACTOR")
+
+
+class SEIP_PG_placement(bpy.types.PropertyGroup):
     """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
 
-    key: StringProperty(name="Visibility", description="Digest of the visibility that it was chosen from")
-    chosen: StringProperty(name="Poses", description="Numbers of the chosen candidate poses")
     record: StringProperty(name="Record", description="The placement as placement.json holds it")
+    targets: StringProperty(name="Targets", description="Digest of the targets that it was made on")
+    seen: StringProperty(name="Seen", description="By how many sensors each target is seen, packed")
+
+
+class SEIP_PG_result(SEIP_PG_placement):
+    """The placement that stands in the scene, and what is looked at of it."""
+
+    sensors: CollectionProperty(type=SEIP_PG_chosen)
+    active_sensor: IntProperty(
+        name="Sensor",
+        description="Click to select the sensor in the scene",
+        update=pointing.select_sensor,
+    )
+    order: EnumProperty(
+        name="Order",
+        description="By what candidates are ranked",
+        items=(
+            ("ADDED", "Added", "What a pose would add to the placement, at positions that are free"),
+            ("ALONE", "Alone", "What a pose sees by itself"),
+        ),
+    )
+    ranking: CollectionProperty(type=SEIP_PG_ranked)
+    active_ranked: IntProperty(
+        name="Candidate",
+        description="Click to put the 3D cursor at the candidate",
+        update=pointing.show_candidate,
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Where the result is written; // is the folder of the .blend",
+        subtype="DIR_PATH",
+        default="//seip-result/",
+    )
+    render: BoolProperty(
+        name="Rendered View", description="Render a view of the scene as well, which takes a minute", default=False
+    )
 
 
 def _recolour(_own: object, context: bpy.types.Context) -> None:
@@ -481,11 +529,13 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
 class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
-    version: IntProperty(name="Version", default=VERSION, options={"HIDDEN"})
+    version: IntProperty(name="Version", default=state.VERSION, options={"HIDDEN"})
     site: PointerProperty(type=SEIP_PG_site)
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)
     result: PointerProperty(type=SEIP_PG_result)
+    kept: CollectionProperty(type=SEIP_PG_placement)
+    active_kept: IntProperty(name="Kept Placement", description="The one that the present placement is compared with")
     view: PointerProperty(type=SEIP_PG_view)
     traffic: PointerProperty(type=SEIP_PG_traffic)
 
@@ -508,6 +558,9 @@ CLASSES = (
     SEIP_PG_survey,
     SEIP_PG_position_rule,
     SEIP_PG_goal,
+    SEIP_PG_chosen,
+    SEIP_PG_ranked,
+    SEIP_PG_placement,
     SEIP_PG_result,
     SEIP_PG_view,
     SEIP_PG_traffic,

@@ -7,17 +7,31 @@ redo put another Python object in place of each.
 
 from __future__ import annotations
 
+import json
 import time
-from dataclasses import dataclass, field
+from collections.abc import Generator
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 import bpy
 
+from . import preferences
+from .core.background import Background
 from .core.errors import SeipError
 from .core.goal import Plan
 from .core.progress import Progress
-from .core.survey import Layout, lay_out
+from .core.results.placement_record import Record
+from .core.survey import Layout, SurveySettings, grid_key, lay_out, restored_plan, see
+from .core.visibility.estimate import Estimate
 from .core.visibility.grid import VisibilityGrid
-from .scene.read import read_scene
+from .scene import contract
+from .scene.changes import Watch, on_update, watch
+from .scene.read import SceneReading, read_scene
+
+VERSION = 1
+"""Of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
 
 
 @dataclass
@@ -28,17 +42,32 @@ class Held:
     ----------
     layout : Layout
         As the scene was when it was last read.
+    watch : Watch
+        Whether the scene has changed since.
+    catalogues : tuple
+        The user's catalogue files and when each was last written.
+    said : tuple of str
+        Warnings of the scene's reading.
     grid : VisibilityGrid or None
         Of that layout.
+    estimate : Estimate or None
+        Of what the grid will take.
     plan : Plan or None
-        Of that grid, where it was made since the file was opened.
+        Of that grid: the one that the scene's result tells of.
+    record : str
+        The result that the plan was taken from.
     durations : dict of str to float, seconds
         How long each step took.
     """
 
     layout: Layout
+    watch: Watch
+    catalogues: tuple[tuple[Path, int], ...]
+    said: tuple[str, ...] = ()
     grid: VisibilityGrid | None = None
+    estimate: Estimate | None = None
     plan: Plan | None = None
+    record: str = ""
     durations: dict[str, float] = field(default_factory=dict)
 
 
@@ -50,7 +79,7 @@ class Running:
     ----------
     operator : str
         Its ``bl_idname``.
-    progress : Progress
+    work : Background
     began : float
         Reading of `time.monotonic`.
     stop : bool
@@ -58,7 +87,7 @@ class Running:
     """
 
     operator: str
-    progress: Progress
+    work: Background[Any]
     began: float = field(default_factory=time.monotonic)
     stop: bool = False
 
@@ -88,19 +117,82 @@ def scene_of(number: int) -> bpy.types.Scene:
     raise SeipError("the scene that this was computed for is gone: nothing was written")
 
 
-def read(scene: bpy.types.Scene) -> Held:
-    """Read and lay out a scene as its panel asks, and hold that in place of what was held.
+def obstacle(scene: bpy.types.Scene) -> str:
+    """Return why nothing can be computed for a scene, in a sentence for panels and buttons alike; empty if it can."""
+    if scene.seip.version > VERSION:
+        return "This file was saved by a newer version of SEIP: install that version to go on."
+    for name, what in ((contract.REGION, "region"), (contract.ROADS, "road")):
+        if not contract.has_members(scene, name):
+            return f"There is no {what}: put a mesh into the collection {name!r}."
+    return ""
+
+
+def doubt(scene: bpy.types.Scene) -> str:
+    """Return why what is held does not tell of the scene as it is, in a sentence; empty if it does."""
+    known = find(scene)
+    if known is None:
+        return ""
+    if known.watch.changed:
+        return "The scene has changed since it was computed."
+    try:
+        same = _same_grid(scene.seip.survey.settings(), known.layout.settings)
+    except SeipError as error:
+        return str(error)
+    return "" if same else "The settings have changed since it was computed."
+
+
+def survey(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
+    """Return the work that lays out a scene as its panel asks; the scene is read at once, if it must be read at all.
 
     Raises
     ------
     SeipError
         The scene lacks something, or the panel asks for what makes no sense.
     """
+    settings = scene.seip.survey.settings()
+    settings.models()  # refuses before the scene is read
+    catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
+    known = find(scene)
+    if known is not None and not known.watch.look(scene) and known.catalogues == catalogues:
+        if _same_grid(settings, known.layout.settings):
+            known.layout = replace(known.layout, settings=settings)
+            return _nothing_to_do(known)
+        reading = SceneReading(known.layout.geometry, known.said)
+        return _laid_out(reading, settings, known.watch, catalogues)
     began = time.perf_counter()
+    watching = watch(scene)
     reading = read_scene(scene)
-    layout = lay_out(reading.geometry, scene.seip.survey.settings(), reading.warnings)
-    held[scene.session_uid] = Held(layout, durations={"read the scene": time.perf_counter() - began})
-    return held[scene.session_uid]
+    return _laid_out(reading, settings, watching, catalogues, time.perf_counter() - began)
+
+
+def seen(known: Held) -> Generator[Progress, None, VisibilityGrid]:
+    """Find who sees what in a scene that was laid out, or take it from the cache, and hold it."""
+    began = time.perf_counter()
+    key = grid_key(known.layout)
+    if known.grid is None or known.grid.key != key:
+        known.grid = yield from see(known.layout, grid_file(key), threads=preferences.cores())
+        known.durations["visibility"] = time.perf_counter() - began
+    return known.grid
+
+
+def answered(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
+    """Return the work that finds all about a scene's placement again, from what the file and the cache keep.
+
+    Raises
+    ------
+    SeipError
+        There is no placement. When the work runs: the scene or its settings are not what they were, or the cache is
+        empty.
+    """
+    text = scene.seip.result.record
+    if not text:
+        raise SeipError("there is no placement yet: place sensors first")
+    return _answered(survey(scene), text)
+
+
+def grid_file(key: str) -> Path:
+    """Return where the cache keeps a visibility grid."""
+    return preferences.cache_folder() / f"{key[:32]}.npz"
 
 
 def forget() -> None:
@@ -109,7 +201,53 @@ def forget() -> None:
     held.clear()
     if running is not None:
         running.stop = True
+        running.work.stop()
     running = None
+
+
+@lru_cache(maxsize=8)
+def record_of(text: str) -> Record:
+    """Return the record that a scene keeps as a text; panels ask for it at every redraw."""
+    record: Record = json.loads(text)
+    return record
+
+
+def _same_grid(one: SurveySettings, other: SurveySettings) -> bool:
+    """Return whether settings differ in how a placement is searched at most."""
+    return replace(one, solver=other.solver, time_limit=other.time_limit) == other
+
+
+def _nothing_to_do(known: Held) -> Generator[Progress, None, Held]:
+    yield from ()
+    return known
+
+
+def _laid_out(
+    reading: SceneReading,
+    settings: SurveySettings,
+    watching: Watch,
+    catalogues: tuple[tuple[Path, int], ...],
+    seconds: float = 0.0,
+) -> Generator[Progress, None, Held]:
+    yield Progress(0, 0, "laying out the site")
+    began = time.perf_counter()
+    layout = lay_out(reading.geometry, settings, reading.warnings)
+    durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
+    return Held(layout, watching, catalogues, reading.warnings, durations=durations)
+
+
+def _answered(surveying: Generator[Progress, None, Held], text: str) -> Generator[Progress, None, Held]:
+    known = yield from surveying
+    if known.record == text and known.plan is not None:
+        return known
+    record, key = record_of(text), grid_key(known.layout)
+    if record["inputs"]["visibility"] != key:
+        raise SeipError("the scene or its settings have changed since the placement: place again")
+    if known.grid is None and not grid_file(key).exists():
+        raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
+    grid = yield from seen(known)
+    known.plan, known.record = restored_plan(known.layout, grid, record), text
+    return known
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
@@ -117,15 +255,31 @@ def _before_load(*_: object) -> None:
     forget()
 
 
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _before_save(*_: object) -> None:
+    """Say in the file by which layout its properties are to be read: Blender saves no defaults."""
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.seip.version <= VERSION and scene.is_property_set("seip"):
+            scene.seip.version = VERSION
+
+
+HANDLERS = (
+    ("load_pre", _before_load),
+    ("save_pre", _before_save),
+    ("depsgraph_update_post", on_update),
+)
+
 CLASSES: tuple[type, ...] = ()
 
 
 def attach() -> None:
-    """Let go of everything whenever another file is opened."""
-    bpy.app.handlers.load_pre.append(_before_load)
+    """Watch scenes, and let go of everything whenever another file is opened."""
+    for event, handler in HANDLERS:
+        getattr(bpy.app.handlers, event).append(handler)
 
 
 def detach() -> None:
     """Let go of everything."""
-    bpy.app.handlers.load_pre.remove(_before_load)
+    for event, handler in HANDLERS:
+        getattr(bpy.app.handlers, event).remove(handler)
     forget()

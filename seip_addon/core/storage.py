@@ -57,6 +57,23 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def check_folder(folder: Path) -> None:
+    """Make a folder for results and see that it can be written, before the work rather than after.
+
+    Raises
+    ------
+    SeipError
+        The folder cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
+
+
 def save_json(path: str | os.PathLike[str], value: object) -> None:
     """Write a value as JSON for people and programs: indented, UTF-8, and without NaN or infinity.
 

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .candidates import CandidateSettings
-from .goal import Goal, Plan, make_plan
+from .deployment import deploy
+from .errors import SeipError
+from .goal import Goal, Plan, make_plan, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
+from .placement import Placement
 from .placement.integer_program import check_solver
 from .progress import Progress
 from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
+from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
 from .visibility.ring_resolution import resolution_warnings
@@ -37,7 +44,7 @@ class SurveySettings:
     engine : {"auto", "bvh", "embree"}
         What casts the rays.
     solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
+        ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
     time_limit : float, seconds
         For each answer.
     """
@@ -47,7 +54,7 @@ class SurveySettings:
     grid_spacing: float = 1.0
     catalogue: tuple[Path, ...] = ()
     engine: Engine = "auto"
-    solver: str = "highs"
+    solver: str = "auto"
     time_limit: float = 60.0
 
     def models(self) -> dict[str, LidarModel]:
@@ -124,7 +131,9 @@ def grid_key(layout: Layout) -> str:
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
-def see(layout: Layout, path: Path, scheduler: str | None = None) -> Generator[Progress, None, VisibilityGrid]:
+def see(
+    layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
+) -> Generator[Progress, None, VisibilityGrid]:
     """Find which pose sees which target, or read it from a file where an earlier survey found the same.
 
     Parameters
@@ -134,9 +143,17 @@ def see(layout: Layout, path: Path, scheduler: str | None = None) -> Generator[P
         The grid's file, read and written.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work.
+    threads : int, optional
+        How many cast at once at most.
     """
     settings = layout.settings
-    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler)
+    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads)
+
+
+def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
+    """Estimate what `see` will take where nothing is known yet; see `estimate_visibility`."""
+    settings = layout.settings
+    return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
 def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
@@ -179,3 +196,42 @@ def record_of(
         warnings=layout.warnings,
     )
     return placement_record(layout.site, plan, run)
+
+
+def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
+    """Return the plan that a record of `record_of` tells of, without asking a solver again.
+
+    Parameters
+    ----------
+    layout : Layout
+        That it was made on.
+    grid : VisibilityGrid
+        That it was made from.
+    record : dict
+        The greedy answer that it may hold is left out.
+
+    Raises
+    ------
+    SeipError
+        The record is of another grid, or lacks something.
+    """
+    if record.get("inputs", {}).get("visibility") != grid.key:
+        raise SeipError("the placement was made for another state of the scene or its settings: place again")
+    asked, objective = record["settings"]["goal"], record["objective"]
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
+    goal = Goal(**named)
+    chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
+    value = objective["value"]
+    placement = Placement(
+        chosen=chosen,
+        objective=value,
+        bound=math.nan if objective["bound"] is None else objective["bound"],
+        gap=math.inf if objective["gap"] is None else objective["gap"],
+        status=objective["status"],
+        solver=objective["solver"],
+        seconds=record["times"]["durations_s"].get("placement", 0.0),
+        covered=float(target_weights(layout.site, goal)[grid.times_seen(chosen) > 0].sum()),
+        price=record["price_usd"],
+        notes=tuple(record["notes"]),
+    )
+    return Plan(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))

@@ -1,45 +1,114 @@
-"""The choice of sensors."""
+"""The choice of sensors, and what must or must not be among them."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Generator
+from datetime import UTC, datetime
+from typing import Literal
 
 import bpy
 
-from .. import state
-from ..core.goal import Goal, Plan, check_goal
+from .. import pointing, state
+from ..core.comparison import packed_counts
+from ..core.errors import SeipError
+from ..core.goal import Goal, check_goal
 from ..core.progress import Progress
-from ..core.survey import place
+from ..core.results.placement_record import versions
+from ..core.storage import digest
+from ..core.survey import Circumstances, place, record_of
 from ..scene.write import write_result
-from .visibility import seen
-from .work import LongWork
+from .work import ForReadyScene, LongWork, Outcome, attempt
 
 
-class SEIP_OT_solve_placement(LongWork[Plan], bpy.types.Operator):
+class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Operator):
     """Choose the sensors that cover most, or the cheapest that cover enough, and put them into the scene"""
 
     bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Plan]:
-        """Read the scene as it is now, and state the goal."""
-        goal = scene.seip.goal.goal()
-        self._held = state.read(scene)
-        check_goal(self._held.layout.site, self._held.layout.models, goal)
-        return self._work(goal)
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Read the scene where it has changed, and state the goal."""
+        return _placed(state.survey(scene), scene.seip.goal.goal())
 
-    def _work(self, goal: Goal) -> Generator[Progress, None, Plan]:
-        grid = yield from seen(self._held)
-        self._began = time.perf_counter()
-        return (yield from place(self._held.layout, grid, goal))
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+        """Put the sensors into the scene, and all that is needed to go on later into the file."""
+        if result.plan is None or result.grid is None:
+            raise RuntimeError("the work ended without a placement")
+        deployment = result.plan.deployment
+        circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        record = record_of(result.layout, result.grid, result.plan, circumstances, render=False)
+        write_result(scene, result.layout.site, deployment)
+        kept = scene.seip.result
+        kept.record = result.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+        kept.targets = digest(result.layout.site.targets.xyz)
+        kept.seen = packed_counts(deployment.seen_by)
+        kept.sensors.clear()
+        for sensor in deployment.sensors:
+            kept.sensors.add().name = sensor.label
+        kept.ranking.clear()
+        state.held[scene.session_uid] = result
+        self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
-    def conclude(self, scene: bpy.types.Scene, result: Plan) -> None:
-        """Put the sensors into the scene."""
-        self._held.plan = result
-        self._held.durations["placement"] = time.perf_counter() - self._began
-        write_result(scene, self._held.layout.site, result.deployment)
-        self.report({"INFO"}, f"coverage {result.deployment.coverage:.2%}")
+
+def _placed(surveying: Generator[Progress, None, state.Held], goal: Goal) -> Generator[Progress, None, state.Held]:
+    known = yield from surveying
+    check_goal(known.layout.site, known.layout.models, goal)
+    grid = yield from state.seen(known)
+    began = time.perf_counter()
+    known.plan = yield from place(known.layout, grid, goal)
+    known.durations["placement"] = time.perf_counter() - began
+    return known
 
 
-CLASSES = (SEIP_OT_solve_placement,)
+class SEIP_OT_add_rule(bpy.types.Operator):
+    """Demand, or forbid, a sensor at the position of the selected pole or sensor, or at the one that is named"""
+
+    bl_idname = "seip.add_rule"
+    bl_label = "Add Rule"
+    bl_options = {"REGISTER", "UNDO"}
+
+    rule: bpy.props.EnumProperty(
+        name="Rule",
+        description="What must be at the position",
+        items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
+    )
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Add it, or change the one that is there."""
+        return attempt(self, lambda: self._add(context, self.rule))
+
+    def _add(self, context: bpy.types.Context, rule: Literal["MANDATORY", "FORBIDDEN"]) -> None:
+        goal = context.scene.seip.goal
+        name = goal.position or pointing.position_of(context.scene, context.object)
+        if not name:
+            raise SeipError("name a position, or select a pole or a sensor")
+        entry = goal.rules.get(name) or goal.rules.add()
+        entry.name, entry.rule = name, rule
+        goal.active_rule = goal.rules.find(name)
+        goal.position = ""
+
+
+class SEIP_OT_remove_rule(bpy.types.Operator):
+    """Take a rule off the list"""
+
+    bl_idname = "seip.remove_rule"
+    bl_label = "Remove Rule"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is a rule to remove."""
+        goal = context.scene.seip.goal
+        return goal.active_rule in range(len(goal.rules))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Remove the active one."""
+        goal = context.scene.seip.goal
+        goal.rules.remove(goal.active_rule)
+        goal.active_rule = max(0, goal.active_rule - 1)
+        return {"FINISHED"}
+
+
+CLASSES = (SEIP_OT_solve_placement, SEIP_OT_add_rule, SEIP_OT_remove_rule)

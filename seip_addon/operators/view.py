@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,6 +12,8 @@ import bpy
 
 from .. import state
 from ..core.errors import SeipError
+from ..core.goal import Plan
+from ..core.progress import Progress
 from ..core.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.sensors import placed_sensors
@@ -18,25 +21,15 @@ from ..scene.write import colour_coverage, coverage_of
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .work import Outcome, attempt
+from .results import ForPlacement
+from .work import LongWork, Outcome, attempt
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
-NO_GRID = "It is not known who sees what: compute visibility first."
-NO_PLAN = "There is nothing to take a picture of: place sensors first."
-NO_SENSORS = "There is no sensor to look from: place sensors first."
 
 
 def why_no_coverage(scene: bpy.types.Scene) -> str:
     """Return why coverage cannot be coloured; nothing where it can."""
     return NO_COVERAGE if coverage_of(scene) is None else ""
-
-
-def why_no_sight(scene: bpy.types.Scene) -> str:
-    """Return why no sight lines can be drawn; nothing where they can."""
-    if not placed_sensors(scene):
-        return NO_SENSORS
-    held = state.find(scene)
-    return NO_GRID if held is None or held.grid is None else ""
 
 
 class SEIP_OT_colour_coverage(bpy.types.Operator):
@@ -113,39 +106,36 @@ _items: list[tuple[str, str, str]] = []
 
 def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
     there = placed_sensors(context.scene) if context else {}
-    _items[:] = [(label, label, thing.name) for label, thing in there.items()] or [("", "None", NO_SENSORS)]
+    _items[:] = [(label, label, thing.name) for label, thing in there.items()] or [("", "None", "Place sensors first")]
     return _items
 
 
-class SEIP_OT_show_sight_lines(bpy.types.Operator):
+class SEIP_OT_show_sight_lines(ForPlacement, LongWork[state.Held], bpy.types.Operator):
     """Draw lines from a sensor to the targets that it sees, and dark squares on those in its range that it does not"""
 
     bl_idname = "seip.show_sight_lines"
     bl_label = "Show Sight Lines"
+    bl_options = {"REGISTER"}  # nothing in the file changes
 
     sensor: bpy.props.EnumProperty(name="Sensor", description="From which the lines start", items=_sensors)
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it is known who sees what."""
-        return _can(cls, why_no_sight(context.scene))
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Find the placement again."""
+        return state.answered(scene)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Draw them."""
-        return attempt(self, lambda: _show_sight(context.scene, self.sensor))
-
-
-def _show_sight(scene: bpy.types.Scene, label: str) -> None:
-    held = state.find(scene)
-    thing = placed_sensors(scene).get(label)
-    if held is None or held.grid is None or thing is None:
-        raise SeipError(why_no_sight(scene) or f"there is no sensor {label!r} any more")
-    key = str(thing.get(contract.SENSOR))
-    pose = pose_at(held.layout.site.candidates, key, thing.matrix_world.translation)
-    if pose is None:
-        raise SeipError(f"{label} hangs at no candidate pose of the visibility that is known: compute and place again")
-    sight = sight_lines(held.layout.site, pose, held.layout.models[key], held.grid.sees(pose))
-    layers.show(scene, SIGHT, sight_overlay(sight, label))
+        state.held[scene.session_uid] = result
+        thing = placed_sensors(scene).get(self.sensor)
+        if result.grid is None or thing is None:
+            raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
+        key = str(thing.get(contract.SENSOR))
+        site = result.layout.site
+        pose = pose_at(site.candidates, key, thing.matrix_world.translation)
+        if pose is None:
+            raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
+        sight = sight_lines(site, pose, result.layout.models[key], result.grid.sees(pose))
+        layers.show(scene, SIGHT, sight_overlay(sight, self.sensor))
 
 
 class SEIP_OT_hide_sight_lines(bpy.types.Operator):
@@ -160,68 +150,67 @@ class SEIP_OT_hide_sight_lines(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def why_no_picture(scene: bpy.types.Scene) -> str:
-    """Return why no picture can be taken; nothing where one can."""
-    held = state.find(scene)
-    return NO_PLAN if held is None or held.plan is None else ""
-
-
-class SEIP_OT_save_picture(bpy.types.Operator):
+class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operator):
     """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
 
     bl_idname = "seip.save_picture"
     bl_label = "Save Picture"
+    bl_options = {"REGISTER"}  # nothing in the file changes
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is a placement to show."""
-        return _can(cls, why_no_picture(context.scene))
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """Remember which viewport was meant."""
+        self._area = context.area
+        return super().invoke(context, event)
 
-    def execute(self, context: bpy.types.Context) -> Outcome:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Find the placement again."""
+        _named(scene.seip.view.picture)
+        return state.answered(scene)
+
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Take it."""
-        return attempt(self, lambda: self._save(context))
-
-    def _save(self, context: bpy.types.Context) -> None:
-        settings = context.scene.seip.view
+        state.held[scene.session_uid] = result
+        settings = scene.seip.view
         path = _free(_named(settings.picture))
         if settings.picture_of == "VIEW":
-            save_viewport_sheet(path, context.scene, _viewport(context))
+            area = getattr(self, "_area", None) or bpy.context.area
+            if bpy.app.background or area is None or area.type != "VIEW_3D":
+                raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
+            save_viewport_sheet(path, scene, area, result)
         else:
-            save_rendered_sheet(path, context.scene)
+            save_rendered_sheet(path, scene, result)
         self.report({"INFO"}, f"written {path}")
 
 
-def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, held: state.Held) -> None:
     """Write what a viewport shows, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
 
     from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
 
-    _save_sheet(path, scene, Image.fromarray(view_pixels(scene, area)))
+    _save_sheet(path, held, Image.fromarray(view_pixels(scene, area)))
 
 
-def save_rendered_sheet(path: Path, scene: bpy.types.Scene) -> None:
+def save_rendered_sheet(path: Path, scene: bpy.types.Scene, held: state.Held) -> None:
     """Write the rendered view that batch commands make, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # as above
 
     from ..scene.render import save_rendered_view  # noqa: PLC0415  # as above
 
-    held = _placed(scene)
     with TemporaryDirectory(prefix="seip-") as folder:
         view = Path(folder) / "view.png"
-        save_rendered_view(view, scene, held.layout.site, held.plan.deployment)
+        save_rendered_view(view, scene, held.layout.site, _plan(held).deployment)
         with Image.open(view) as picture:
-            _save_sheet(path, scene, picture)
+            _save_sheet(path, held, picture)
 
 
-def _save_sheet(path: Path, scene: bpy.types.Scene, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
+def _save_sheet(path: Path, held: state.Held, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
     from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
     from ..core.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
 
-    held = _placed(scene)
-    layout, plan = held.layout, held.plan
+    layout, plan = held.layout, _plan(held)
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
         notes = [plan.certificate, *layout.warnings]
@@ -230,18 +219,10 @@ def _save_sheet(path: Path, scene: bpy.types.Scene, view: Any) -> None:  # noqa:
             save_sheet(path, view, picture)
 
 
-def _placed(scene: bpy.types.Scene) -> Any:  # noqa: ANN401  # what is held, with its plan
-    held = state.find(scene)
-    if held is None or held.plan is None:
-        raise SeipError(NO_PLAN)
-    return held
-
-
-def _viewport(context: bpy.types.Context) -> bpy.types.Area:
-    area = context.area
-    if bpy.app.background or area is None or area.type != "VIEW_3D":
-        raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
-    return area
+def _plan(held: state.Held) -> Plan:
+    if held.plan is None:
+        raise RuntimeError("a placement was found without its plan")
+    return held.plan
 
 
 def _named(text: str) -> Path:

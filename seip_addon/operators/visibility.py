@@ -1,43 +1,63 @@
-"""Visibility of the scene: who sees what."""
+"""Visibility of the scene: who sees what, and how long it takes to find out."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Generator
 
 import bpy
 
 from .. import preferences, state
 from ..core.progress import Progress
-from ..core.survey import grid_key, see
-from ..core.visibility.grid import VisibilityGrid
-from .work import LongWork
+from ..core.survey import estimate
+from .work import ForReadyScene, LongWork
 
 
-class SEIP_OT_compute_visibility(LongWork[VisibilityGrid], bpy.types.Operator):
+class SEIP_OT_compute_visibility(ForReadyScene, LongWork[state.Held], bpy.types.Operator):
     """Find out which candidate pose sees which target on the road"""
 
     bl_idname = "seip.compute_visibility"
     bl_label = "Compute Visibility"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, VisibilityGrid]:
-        """Lay out the scene."""
-        self._held = state.read(scene)
-        return seen(self._held)
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Read the scene where it has changed."""
+        return _seen(state.survey(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: VisibilityGrid) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Hold the grid."""
-        state.held[scene.session_uid] = self._held
-        self.report({"INFO"}, f"{result.shape[0]:,} poses, {result.shape[1]:,} targets")
+        state.held[scene.session_uid] = result
+        site = result.layout.site
+        self.report(
+            {"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known"
+        )
 
 
-def seen(held: state.Held) -> Generator[Progress, None, VisibilityGrid]:
-    """Find who sees what in a scene that was read, or take it from the cache, and hold it."""
-    began = time.perf_counter()
-    held.grid = yield from see(held.layout, preferences.cache_folder() / f"{grid_key(held.layout)[:32]}.npz")
-    held.durations["visibility"] = time.perf_counter() - began
-    return held.grid
+class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[state.Held], bpy.types.Operator):
+    """Estimate how long visibility will take and how much memory, by beginning with it for about a second"""
+
+    bl_idname = "seip.estimate_visibility"
+    bl_label = "Estimate"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Read the scene where it has changed."""
+        return _estimated(state.survey(scene))
+
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+        """Hold the estimate."""
+        state.held[scene.session_uid] = result
 
 
-CLASSES = (SEIP_OT_compute_visibility,)
+def _seen(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
+    known = yield from surveying
+    yield from state.seen(known)
+    return known
+
+
+def _estimated(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
+    known = yield from surveying
+    known.estimate = yield from estimate(known.layout, preferences.cores())
+    return known
+
+
+CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility)

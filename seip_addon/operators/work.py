@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import bpy
 
 from .. import state
+from ..core.background import Background
 from ..core.errors import SeipError
-from ..core.progress import Progress, finish, side_by_side
+from ..core.progress import Progress, finish
 
 Result = TypeVar("Result")
 Outcome = set[str]
@@ -26,6 +27,18 @@ def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
     return {"FINISHED"}
+
+
+class ForReadyScene:
+    """A mixin: a button that works where the scene has what any computation needs."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it works, and why not."""
+        sentence = state.obstacle(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
 
 
 class LongWork(Generic[Result]):
@@ -68,14 +81,11 @@ class LongWork(Generic[Result]):
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        done: list[Any] = []
-        outcome = attempt(self, lambda: self._look(done))
-        if outcome == {"CANCELLED"} or done:
-            self._end(context)
-        if not done:
+        if not self._running.work.ended:
             _redraw(context)
-            return outcome if outcome == {"CANCELLED"} else {"PASS_THROUGH"}
-        return attempt(self, lambda: self.conclude(state.scene_of(self._scene), done[0]))
+            return {"PASS_THROUGH"}
+        self._end(context)
+        return attempt(self, lambda: self.conclude(state.scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop because Blender ends or opens another file."""
@@ -84,21 +94,13 @@ class LongWork(Generic[Result]):
     def _begin(self, context: bpy.types.Context) -> None:
         if state.running is not None:
             raise SeipError("other work is under way: wait for it, or stop it with Esc")
-        self._steps = side_by_side([self.prepare(context.scene)], 1)
         self._scene = context.scene.session_uid
-        self._running = state.running = state.Running(self.bl_idname, Progress(0, 0, "begin"))
+        self._running = state.running = state.Running(self.bl_idname, Background(self.prepare(context.scene)))
         self._timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
         context.window_manager.modal_handler_add(self)
 
-    def _look(self, done: list[Any]) -> None:
-        """Take one report of the thread; put the result into the list once there is one."""
-        try:
-            self._running.progress = next(self._steps)
-        except StopIteration as stop:
-            done += stop.value
-
     def _end(self, context: bpy.types.Context) -> None:
-        self._steps.close()
+        self._running.work.stop()
         context.window_manager.event_timer_remove(self._timer)
         if state.running is self._running:
             state.running = None
@@ -106,12 +108,11 @@ class LongWork(Generic[Result]):
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    """Have the sidebars of all viewports drawn anew; the views themselves may be slow to draw, and have not changed."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            for region in area.regions if area.type == "VIEW_3D" else ():
-                if region.type == "UI":
-                    region.tag_redraw()
+    """Have the sidebars of all viewports drawn anew, and not what the viewports show: that may take long."""
+    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
+    for region in (region for area in areas if area.type == "VIEW_3D" for region in area.regions):
+        if region.type == "UI":
+            region.tag_redraw()
 
 
 class SEIP_OT_stop(bpy.types.Operator):

@@ -4,9 +4,33 @@ from __future__ import annotations
 
 import bpy
 
+from .. import state
+from ..core.results.placement_record import Record
 from ..operators.placement import SEIP_OT_solve_placement
 from .run_button import draw_run
+from .sentence import draw_sentence
 from .sidebar import Sidebar
+
+
+class SEIP_UL_rules(bpy.types.UIList):
+    """Positions with a demand of their own."""
+
+    bl_idname = "SEIP_UL_rules"
+
+    def draw_item(  # as Blender calls it
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: object,
+        item: bpy.types.PropertyGroup,
+        _icon: int,
+        _active_data: object,
+        _active_property: str,
+    ) -> None:
+        """Draw a position and what must be there."""
+        row = layout.row()
+        row.label(text=item.name, icon="CHECKMARK" if item.rule == "MANDATORY" else "CANCEL")
+        row.prop(item, "rule", text="")
 
 
 class SEIP_PT_placement(Sidebar, bpy.types.Panel):
@@ -17,12 +41,113 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the goal and the button."""
-        goal = context.scene.seip.goal
+        scene = context.scene
+        goal = scene.seip.goal
         layout = self.layout
         layout.use_property_split = True
-        layout.prop(goal, "limit", expand=True)
-        layout.prop(goal, goal.limit.lower())
+        layout.use_property_decorate = False
+        row = layout.row()
+        row.use_property_split = False  # else there is no room for three words
+        row.prop(goal, "limit", expand=True)
+        column = layout.column()
+        column.prop(goal, goal.limit.lower())
+        column.prop(goal, "weighting")
+        if goal.weighting == "VALUE":
+            column.prop(goal, "central_weight")
+        column.prop(goal, "min_distance")
+        obstacle = state.obstacle(scene)
+        if obstacle:
+            draw_sentence(layout, obstacle, icon="ERROR")
         draw_run(layout, SEIP_OT_solve_placement.bl_idname)
+        if scene.seip.result.record:
+            _draw_answer(layout, state.record_of(scene.seip.result.record), state.doubt(scene))
 
 
-CLASSES = (SEIP_PT_placement,)
+class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
+    """Positions that must, and must not, carry a sensor."""
+
+    bl_idname = "SEIP_PT_placement_rules"
+    bl_parent_id = "SEIP_PT_placement"
+    bl_label = "Fixed and Forbidden Positions"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the list, and what adds to it."""
+        goal = context.scene.seip.goal
+        layout = self.layout
+        row = layout.row()
+        row.template_list(SEIP_UL_rules.bl_idname, "", goal, "rules", goal, "active_rule", rows=3)
+        row.operator("seip.remove_rule", text="", icon="REMOVE")
+        layout.prop(goal, "position", text="", icon="VIEWZOOM", placeholder="Position, or the selected pole")
+        row = layout.row(align=True)
+        row.operator("seip.add_rule", text="Sensor", icon="CHECKMARK").rule = "MANDATORY"
+        row.operator("seip.add_rule", text="No Sensor", icon="CANCEL").rule = "FORBIDDEN"
+
+
+class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
+    """How a placement is searched."""
+
+    bl_idname = "SEIP_PT_placement_solver"
+    bl_parent_id = "SEIP_PT_placement"
+    bl_label = "Solver"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the solver and its time."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(context.scene.seip.survey, "solver")
+        layout.prop(context.scene.seip.survey, "time_limit")
+
+
+def _draw_answer(layout: bpy.types.UILayout, record: Record, doubt: str) -> None:
+    box = layout.box()
+    if doubt:
+        draw_sentence(box, doubt, icon="ERROR")
+    column = box.column(align=True)
+    for name, value in figures(record):
+        row = column.split(factor=0.5)
+        row.label(text=name)
+        row.label(text=value)
+    objective = record["objective"]
+    proven = objective["status"] == "optimal"
+    draw_sentence(box, certificate(record), icon="CHECKMARK" if proven else "INFO")
+    for note in (*record["notes"], *warnings_of_chosen(record)):
+        draw_sentence(box, note, icon="INFO")
+
+
+def figures(record: Record) -> list[tuple[str, str]]:
+    """Return what a placement is judged by, in words."""
+    coverage, objective = record["coverage"], record["objective"]
+    lines = [("Coverage", f"{coverage['whole']:.2%}")]
+    if coverage["central"] is not None:
+        lines.append(("Central coverage", f"{coverage['central']:.2%}"))
+    if objective["kind"] == "weighted":
+        lines.append(("Weighted coverage", f"{coverage['weighted']:.2%}"))
+    lines += [("Price", f"${record['price_usd']:,.0f}"), ("Sensors", str(len(record["sensors"])))]
+    if objective["bound"] is not None and objective["gap"] is not None:
+        unit = "${:,.0f}" if objective["sought"] == "least price" else "{:,.6g}"
+        lines.append(("Objective", unit.format(objective["value"])))
+        lines.append(("Bound", unit.format(objective["bound"])))
+        lines.append(("Gap", f"{objective['gap']:.2%}"))
+    return lines
+
+
+def warnings_of_chosen(record: Record) -> list[str]:
+    """Return the warnings but those of sensor types that are not among the chosen."""
+    others = {*record["settings"]["candidates"]["sensors"]} - {sensor["sensor"] for sensor in record["sensors"]}
+    return [warning for warning in record["warnings"] if warning.partition(":")[0] not in others]
+
+
+def certificate(record: Record) -> str:
+    """Say how good the placement provably is."""
+    objective = record["objective"]
+    best = "cheapest" if objective["sought"] == "least price" else "best"
+    if objective["status"] == "optimal":
+        return f"Proven: the {best} placement that there is among these candidates."
+    gap = "an unknown share" if objective["gap"] is None else f"{objective['gap']:.2%}"
+    return f"Within {gap} of the {best} placement possible among these candidates."
+
+
+CLASSES = (SEIP_UL_rules, SEIP_PT_placement, SEIP_PT_placement_rules, SEIP_PT_placement_solver)

@@ -9,15 +9,28 @@ import bpy
 from .. import state
 
 
-def draw_run(layout: bpy.types.UILayout, operator: str) -> None:
+def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> None:
     """Draw an operator's button, or how far its work is with a button to stop it."""
     running = state.running
     if running is None or running.operator != operator:
-        layout.operator(operator)
+        layout.operator(operator, icon=icon)
         return
-    row = layout.row(align=True)
-    progress = running.progress
-    factor = progress.done / progress.total if progress.total else 0.0
-    seconds = time.monotonic() - running.began
-    row.progress(factor=factor, text=f"{progress.what} · {seconds:.0f} s")
+    progress = running.work.progress
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=progress.what)
     row.operator("seip.stop", text="", icon="X")
+    column.label(text=_times(time.monotonic() - running.began, running.work.seconds_left))
+
+
+def in_words(seconds: float) -> str:
+    """Return a time as people say it, no more precisely than they care."""
+    if seconds < 100:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+def _times(passed: float, left: float | None) -> str:
+    return (
+        f"{in_words(passed)} · Esc stops" if left is None else f"{in_words(passed)}, {in_words(left)} left · Esc stops"
+    )

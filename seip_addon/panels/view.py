@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import scans
+from ..operators.results import no_placement
 from ..operators.view import (
     SEIP_OT_colour_coverage,
     SEIP_OT_hide_sight_lines,
@@ -13,8 +14,6 @@ from ..operators.view import (
     SEIP_OT_show_sight_lines,
     SEIP_OT_toggle_legend,
     why_no_coverage,
-    why_no_picture,
-    why_no_sight,
 )
 from ..scene.write import ASPECT, coverage_of
 from ..viewport import coverage, layers
@@ -66,7 +65,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
         if overlay is not None:
             row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
-        why_not = why_no_sight(context.scene)
+        why_not = no_placement(context.scene)
         if why_not:
             draw_sentence(column, why_not, icon="INFO")
 
@@ -89,7 +88,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column.row(align=True).prop(view, "picture_of", expand=True)
         column.prop(view, "picture", text="")
         column.operator(SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
-        why_not = why_no_picture(context.scene)
+        why_not = no_placement(context.scene)
         if why_not:
             draw_sentence(column, why_not, icon="INFO")
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.visibility import SEIP_OT_compute_visibility
-from .run_button import draw_run
+from .. import state
+from ..core.visibility.estimate import Estimate
+from ..operators.visibility import SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility
+from .run_button import draw_run, in_words
+from .sentence import draw_sentence
 from .sidebar import Sidebar
 
 
@@ -16,13 +19,67 @@ class SEIP_PT_visibility(Sidebar, bpy.types.Panel):
     bl_label = "Visibility"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw settings and the button."""
-        survey = context.scene.seip.survey
+        """Draw settings, what they will take, and the button."""
+        scene = context.scene
+        survey = scene.seip.survey
         layout = self.layout
         layout.use_property_split = True
-        layout.prop(survey, "grid")
-        layout.prop(survey, "delta")
+        layout.use_property_decorate = False
+        column = layout.column()
+        for name in ("grid", "delta"):
+            column.prop(survey, name)
+        _draw_state(layout, scene)
+        draw_run(layout, SEIP_OT_estimate_visibility.bl_idname)
         draw_run(layout, SEIP_OT_compute_visibility.bl_idname)
 
 
-CLASSES = (SEIP_PT_visibility,)
+class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
+    """How the site is laid out and looked at."""
+
+    bl_idname = "SEIP_PT_visibility_details"
+    bl_parent_id = "SEIP_PT_visibility"
+    bl_label = "Layout and Rays"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings that mostly stay as they are."""
+        survey = context.scene.seip.survey
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(heading="Positions")
+        for name in ("spacing", "setback", "clearance", "bracket"):
+            column.prop(survey, name)
+        column = layout.column()
+        for name in ("min_intensity", "engine"):
+            column.prop(survey, name)
+
+
+def _draw_state(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Say what is missing, or what is known and whether it still holds."""
+    obstacle = state.obstacle(scene)
+    if obstacle:
+        draw_sentence(layout, obstacle, icon="ERROR")
+        return
+    known = state.find(scene)
+    if known is None:
+        return
+    doubt = state.doubt(scene)
+    if doubt:
+        draw_sentence(layout, doubt, icon="ERROR")
+        return
+    site = known.layout.site
+    column = layout.column(align=True)
+    column.label(text=f"{len(site.targets):,} targets, {len(site.candidates.position):,} positions")
+    if known.grid is not None:
+        column.label(text=f"Known from {len(site.candidates):,} poses", icon="CHECKMARK")
+    elif known.estimate is not None:
+        _draw_estimate(column, known.estimate)
+
+
+def _draw_estimate(column: bpy.types.UILayout, estimate: Estimate) -> None:
+    column.label(text=f"{estimate.poses:,} poses, {estimate.triangles:,} triangles")
+    column.label(text=f"About {in_words(estimate.seconds)}, {estimate.memory / 1e9:.2g} GB", icon="TIME")
+
+
+CLASSES = (SEIP_PT_visibility, SEIP_PT_visibility_details)

@@ -43,7 +43,9 @@ def check_name(path: Path) -> None:
 
 
 def save_blend(path: Path) -> None:
-    """Write the open scene to a .blend, compressed; its 3D views look through the camera, in the materials' colours.
+    """Write the open scene to a .blend, compressed.
+
+    Saved in the background, its 3D views look through the camera, in the materials' colours.
 
     Raises
     ------
@@ -51,7 +53,8 @@ def save_blend(path: Path) -> None:
         The name does not end in .blend, or the file cannot be written.
     """
     check_name(path)
-    _set_up_views()
+    if bpy.app.background:  # else the views are those that somebody is looking through
+        _set_up_views()
     with whole_file(path) as temporary:
         temporary.unlink()  # Blender would keep a backup of a file that is there
         with held_interrupts():

@@ -62,6 +62,11 @@ def find_or_make(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return collection
 
 
+def has_members(scene: bpy.types.Scene, name: str) -> bool:
+    """Return whether a collection that is read holds any object."""
+    return any(kind(collection) == name and len(collection.all_objects) > 0 for collection in _reached(scene))
+
+
 def members(scene: bpy.types.Scene) -> dict[str, set[bpy.types.Object]]:
     """Return the objects of each collection that is read.
 

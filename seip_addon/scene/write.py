@@ -158,6 +158,28 @@ def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
     _paint(thing, colours)
 
 
+def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
+    """Show other counts than those of the placement, under the aspect that is shown.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    seen_by : (t,) int64
+        How many sensors see each target, in the order of those that the coverage was written for.
+
+    Raises
+    ------
+    SeipError
+        There is no coverage, or it is of other targets.
+    """
+    aspect = _shown_coverage(scene).get(ASPECT)
+    recolour(scene, as_placed(seen_by))
+    thing = _shown_coverage(scene)
+    thing.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
+    if aspect:
+        colour_coverage(scene, aspect)
+
+
 def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
     """Colour the coverage by one aspect, from what the mesh itself knows of its targets.
 

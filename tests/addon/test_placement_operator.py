@@ -1,17 +1,23 @@
-"""From a click to placed sensors: the operators do what the batch command does."""
+"""From a click to placed sensors: operators do what the batch command does, and what they find outlives the file."""
 
+import json
 from pathlib import Path
+
+from headless import place
 
 import bpy
 import pytest
 
+from seip_addon import pointing, state
+from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.core.visibility.grid import VisibilityGrid
+from seip_addon.scene.write import MARK
+
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--no-render"]
 
 
-@pytest.fixture
-def junction(add_on):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    scene = bpy.context.scene
+def ask(scene: bpy.types.Scene) -> bpy.types.Scene:
     scene.seip.survey.heights = "8"
     scene.seip.survey.grid = 4.0
     scene.seip.survey.spacing = 12.0
@@ -19,13 +25,168 @@ def junction(add_on):
     return scene
 
 
-def test_sensors_are_placed(junction):
+@pytest.fixture
+def junction(add_on):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
+    return ask(bpy.context.scene)
+
+
+def labels(scene: bpy.types.Scene) -> list[str]:
+    return sorted(pointing.sensor_empties(scene))
+
+
+def test_panel_and_batch_write_the_same_placement(junction, tmp_path):
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    empties = [thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY"]
-    assert len(empties) == 2
+    junction.seip.result.folder = str(tmp_path / "panel")
+    assert bpy.ops.seip.export_result() == {"FINISHED"}
+    key = state.find(junction).grid.key
+    place.main([str(SCENE), *OPTIONS, "-o", str(tmp_path / "batch")])
+    panel, batch = (load_placement_record(tmp_path / name / "placement.json") for name in ("panel", "batch"))
+    assert comparable(panel) == comparable(batch)
+    assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
+    for name in ("candidates.csv", "carla_spawn.json"):
+        assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
 
 
 def test_a_mistake_is_one_sentence(junction):
     junction.seip.survey.heights = "high"
     with pytest.raises(RuntimeError, match="'high' is neither a height in metres"):
         bpy.ops.seip.solve_placement()
+
+
+def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeypatch):
+    bpy.ops.seip.solve_placement()
+    before = json.loads(junction.seip.result.record)
+    path = tmp_path / "placed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scene = bpy.context.scene
+    assert state.find(scene) is None
+    assert json.loads(scene.seip.result.record) == before
+    for forbidden in ("compute_visibility", "make_plan"):
+        monkeypatch.setattr(f"seip_addon.core.visibility.store.{forbidden}", None, raising=False)
+        monkeypatch.setattr(f"seip_addon.core.survey.{forbidden}", None, raising=False)
+    assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
+    assert len(scene.seip.result.ranking) > 0
+    scene.seip.result.folder = "//out/"
+    assert bpy.ops.seip.export_result() == {"FINISHED"}
+    assert comparable(load_placement_record(tmp_path / "out" / "placement.json")) == comparable(before)
+
+
+def test_an_emptied_cache_is_said(junction, tmp_path):
+    bpy.ops.seip.solve_placement()
+    state.forget()
+    for file in (tmp_path / "cache").glob("*.npz"):
+        file.unlink()
+    with pytest.raises(RuntimeError, match="no longer holds the visibility of this placement: press Compute"):
+        bpy.ops.seip.rank_candidates()
+    bpy.ops.seip.compute_visibility()
+    assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
+
+
+def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
+    bpy.ops.ed.undo_push(message="begin")
+    bpy.ops.seip.solve_placement()
+    bpy.ops.ed.undo_push(message="two")
+    bpy.context.scene.seip.goal.count = 3
+    bpy.ops.seip.solve_placement()
+    bpy.ops.ed.undo_push(message="three")
+    scene = bpy.context.scene
+    assert labels(scene) == ["S1", "S2", "S3"]
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    assert labels(scene) == ["S1", "S2"]
+    assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
+    bpy.ops.seip.rank_candidates()
+    assert len(state.find(scene).plan.deployment.sensors) == 2
+    bpy.ops.ed.redo()
+    assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
+
+
+def test_each_scene_keeps_its_own(junction):
+    bpy.ops.seip.solve_placement()
+    bpy.ops.scene.new(type="FULL_COPY")
+    other = bpy.context.scene
+    other.seip.goal.count = 1
+    assert other != junction
+    bpy.ops.seip.solve_placement()
+    assert len(json.loads(other.seip.result.record)["sensors"]) == 1
+    assert len(json.loads(junction.seip.result.record)["sensors"]) == 2
+    assert labels(junction) == ["S1", "S2"]
+
+
+def test_nothing_of_the_users_is_changed(junction):
+    def users() -> dict[str, object]:
+        return {thing.name: thing.matrix_world.copy() for thing in bpy.data.objects if MARK not in thing}
+
+    before = users()
+    bpy.ops.seip.solve_placement()
+    assert users() == before
+
+
+def test_rules_come_from_what_is_selected_and_hold(junction):
+    bpy.ops.seip.solve_placement()
+    first = pointing.sensor_empties(junction)["S1"]
+    position = first["seip_position"]
+    bpy.context.view_layer.objects.active = first
+    assert bpy.ops.seip.add_rule(rule="FORBIDDEN") == {"FINISHED"}
+    bpy.ops.seip.solve_placement()
+    assert position not in {thing["seip_position"] for thing in pointing.sensor_empties(junction).values()}
+    junction.seip.goal.position = position
+    bpy.ops.seip.add_rule(rule="MANDATORY")
+    assert [(one.name, one.rule) for one in junction.seip.goal.rules] == [(position, "MANDATORY")]
+    bpy.ops.seip.solve_placement()
+    assert position in {thing["seip_position"] for thing in pointing.sensor_empties(junction).values()}
+    assert bpy.ops.seip.remove_rule() == {"FINISHED"}
+    assert not bpy.ops.seip.remove_rule.poll()
+
+
+def test_a_file_of_a_newer_version_is_refused(junction, tmp_path):
+    junction.seip.version = state.VERSION + 1
+    assert "newer version" in state.obstacle(junction)
+    with pytest.raises(RuntimeError, match="newer version of SEIP"):
+        bpy.ops.seip.solve_placement()
+    path = tmp_path / "newer.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert bpy.context.scene.seip.version == state.VERSION + 1
+
+
+def test_the_version_is_in_the_file(junction, tmp_path, monkeypatch):
+    path = tmp_path / "own.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert bpy.context.scene.seip.is_property_set("version")
+
+
+def test_a_scene_without_region_has_its_sentence(junction):
+    region = bpy.data.collections["SEIP Region"]
+    for thing in list(region.objects):
+        region.objects.unlink(thing)
+    with pytest.raises(RuntimeError, match="There is no region"):
+        bpy.ops.seip.solve_placement()
+
+
+def test_a_region_without_targets_has_its_sentence(junction):
+    for thing in bpy.data.collections["SEIP Region"].objects:
+        thing.location.x += 5000.0
+    with pytest.raises(RuntimeError, match=r"Error: .*target"):
+        bpy.ops.seip.solve_placement()
+
+
+def test_an_unsaved_file_says_where_it_would_write(junction, monkeypatch):
+    bpy.ops.seip.solve_placement()
+    junction.seip.result.folder = "//seip-result/"
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    from seip_addon.operators.results import no_folder  # noqa: PLC0415  # registered with the add-on
+
+    assert "Save the file first: the result is written to seip-result/ beside it." in no_folder(scene)
+
+
+def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
+    bpy.ops.seip.solve_placement()
+    (tmp_path / "file").write_text("")
+    junction.seip.result.folder = str(tmp_path / "file" / "out")
+    with pytest.raises(RuntimeError, match="choose a folder that you may write to"):
+        bpy.ops.seip.export_result()

@@ -7,6 +7,7 @@ import pytest
 from seip_addon import preferences, sensor_types
 from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.visibility.ray_casting import MOST_THREADS
 from seip_addon.viewport import beam_preview
 
 OWN = """
@@ -190,11 +191,8 @@ def test_the_cache_is_emptied_of_grids_alone(survey):
     assert [entry.name for entry in folder.iterdir()] == ["mine.txt"]
 
 
-def test_cores_are_used(own):
-    from seip_addon.core.visibility import ray_casting  # noqa: PLC0415  # beside what it is about
-
-    before = ray_casting.most_threads()
+def test_cores_are_those_that_the_user_allows(own):
     own.cores = 1
-    assert ray_casting.most_threads() == 1
-    own.cores = before
-    assert ray_casting.most_threads() == min(before, own.cores)
+    assert preferences.cores() == 1
+    own.cores = 1000
+    assert preferences.cores() == MOST_THREADS

@@ -37,7 +37,7 @@ def placed(junction):
 def test_nothing_can_be_shown_before_a_placement(junction):
     with pytest.raises(RuntimeError, match="There is no coverage to show: place sensors first"):
         bpy.ops.seip.colour_coverage()
-    with pytest.raises(RuntimeError, match="There is no sensor to look from: place sensors first"):
+    with pytest.raises(RuntimeError, match="There is no placement yet: place sensors first"):
         bpy.ops.seip.show_sight_lines()
     assert layers.drawing() == 0
 

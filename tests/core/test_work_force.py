@@ -15,9 +15,7 @@ from synthetic_junction import junction_site
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
-from seip_addon.core.visibility import ray_casting
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
-from seip_addon.core.visibility.ray_casting import EmbreeRayCaster
 from seip_addon.core.visibility.store import stored_visibility
 
 HAS_DASK = importlib.util.find_spec("distributed") is not None
@@ -74,12 +72,7 @@ def test_a_cluster_writes_the_same_bytes_though_a_worker_dies(cluster, tmp_path:
 
 
 @needs_embree
-def test_the_number_of_threads_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ray_casting, "_most_threads", ray_casting.most_threads())  # and put back at the end
-    grids = []
-    for threads in (1, 3):
-        ray_casting.use_threads(threads)
-        assert EmbreeRayCaster(SITE.triangles).threads == threads
-        grids.append(finish(compute_visibility(SITE, MODELS, SETTINGS, "embree")))
+def test_the_number_of_threads_changes_nothing() -> None:
+    grids = [finish(compute_visibility(SITE, MODELS, SETTINGS, "embree", threads=threads)) for threads in (1, 2)]
     assert (grids[0].packed == grids[1].packed).all()
     assert grids[0].parameters == grids[1].parameters

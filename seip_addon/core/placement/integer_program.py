@@ -34,6 +34,7 @@ TOLERANCE = 2e-6
 """Share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled."""
 
 SOLVERS = ("highs", "cbc", "gurobi")
+"""What `solver_name` knows beside ``auto``."""
 
 
 LONGEST = 1e7
@@ -249,6 +250,13 @@ def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
             yield members
 
 
+def solver_name(solver: str) -> str:
+    """Return the solver that a name means; for ``auto`` HiGHS where it is installed, else CBC."""
+    if solver == "auto":
+        return "highs" if is_available("highs") else "cbc"
+    return solver
+
+
 def check_solver(solver: str) -> str:
     """Return name and version of a solver, for the record.
 
@@ -257,6 +265,7 @@ def check_solver(solver: str) -> str:
     SeipError
         The solver is unknown or cannot run here; those that can are named.
     """
+    solver = solver_name(solver)
     if solver not in SOLVERS:
         raise SeipError(f"unknown solver {solver!r}; choose among {', '.join(_available())}")
     if not is_available(solver):
@@ -277,6 +286,7 @@ def _engine(solver: str, seconds: float, stop: threading.Event) -> Iterator[Any]
     HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
     """
     limit = min(seconds, LONGEST)
+    solver = solver_name(solver)
     if solver == "highs":
         import highspy  # noqa: PLC0415 -- only where it is asked for: another solver may be all there is
 
@@ -303,6 +313,7 @@ def _bound(model: pulp.LpProblem, solver: str) -> float:
     """Return the solver's own upper bound on the objective."""
     if model.sol_status == pulp.LpSolutionOptimal:
         return float(pulp.value(model.objective))
+    solver = solver_name(solver)
     if solver == "highs":
         return -float(model.solverModel.getInfo().mip_dual_bound)
     if solver == "gurobi":

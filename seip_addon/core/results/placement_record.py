@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import os
@@ -63,7 +64,8 @@ class Run:
 def versions(**more: str) -> dict[str, str]:
     """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``."""
     program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
-    libraries = {name: metadata.version(name) for name in LIBRARIES}
+    there = {name for name in LIBRARIES if importlib.util.find_spec(name)}  # HiGHS need not be
+    libraries = {name: metadata.version(name) for name in LIBRARIES if name in there}
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 

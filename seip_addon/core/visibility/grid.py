@@ -149,13 +149,14 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     )
 
 
-def compute_visibility(
+def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
     engine: Engine = "auto",
     kept: KeptPieces | None = None,
     scheduler: str | None = None,
+    threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Find which pose sees which target, casting only rays that can matter.
 
@@ -171,11 +172,13 @@ def compute_visibility(
         Pieces of an earlier run with the same key, to which those of this run are added.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work, instead of this process.
+    threads : int, optional
+        How many of this process work at once at most.
 
     Yields
     ------
     Progress
-        After each piece of the work.
+        Ten times a second, and after each piece of the work.
 
     Returns
     -------
@@ -194,7 +197,7 @@ def compute_visibility(
     needed = needed_triangles(site.triangles, site.candidates.xyz, site.targets.xyz, settings.delta, longest)
     task = ObserverTask(site, used, settings.delta, settings.min_intensity, engine_name(engine), needed.keep)
     pieces = pieces_of(site)
-    with threads_of(task) if scheduler is None else cluster(scheduler, task) as submit:
+    with threads_of(task, threads) if scheduler is None else cluster(scheduler, task) as submit:
         rows = yield from see_pieces(pieces, submit, kept)
     packed = np.zeros((len(site.candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
     packed[np.concatenate(pieces)] = np.concatenate([row.packed for row in rows])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..lidar import LidarModel
-from ..progress import Progress
+from ..progress import PAUSE, Progress
 from ..site import Site
 from .near_surfaces import near_surfaces
 from .ray_casting import RayCaster
@@ -146,7 +146,7 @@ def see_pieces(
     pending = set(numbers)
     try:
         while pending:
-            finished, pending = wait(pending, return_when=FIRST_COMPLETED)
+            finished, pending = wait(pending, PAUSE, FIRST_COMPLETED)  # so that whoever steps this can stop it soon
             for future in finished:
                 number = numbers[future]
                 rows[number] = future.result()

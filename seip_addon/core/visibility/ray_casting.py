@@ -25,18 +25,8 @@ Engine = Literal["auto", "bvh", "embree"]
 # Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray
 # is then the same as on a longer ray.
 _BEYOND = 1 + 1e-6
-_most_threads = min(4, os.cpu_count() or 1)  # the work between casts holds Python's lock for a part of the time
-
-
-def most_threads() -> int:
-    """Return how many threads cast rays at once."""
-    return _most_threads
-
-
-def use_threads(count: int) -> None:
-    """Set how many threads cast rays at once from now on in this process; results do not depend on it."""
-    global _most_threads  # noqa: PLW0603  # as the processor, the process has one
-    _most_threads = max(1, count)
+MOST_THREADS = min(4, os.cpu_count() or 1)
+"""That cast at once to advantage: the work between casts holds Python's lock for a part of the time."""
 
 
 class RayCaster(Protocol):
@@ -169,6 +159,7 @@ class EmbreeRayCaster:
     """
 
     name = "embree"
+    threads = MOST_THREADS
 
     def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
         try:
@@ -177,7 +168,6 @@ class EmbreeRayCaster:
         except ImportError as error:
             raise SeipError("the ray-casting engine embree is not installed; choose bvh or install embreex") from error
         self.triangles = triangles
-        self.threads = most_threads()
         self._index, self._centre, corners = _rebased(triangles, keep)
         self._scene = EmbreeScene(robust=True)  # no leaks along shared edges
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None

@@ -61,13 +61,14 @@ class PieceFolder:
         return self._folder / f"{self._prefix}-{number:06d}.npz"
 
 
-def stored_visibility(
+def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
     path: Path,
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
     engine: Engine = "auto",
     scheduler: str | None = None,
+    threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
     """Return the grid of a file where it follows from the same inputs; else compute it and write the file.
 
@@ -84,6 +85,8 @@ def stored_visibility(
         What casts the rays.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work.
+    threads : int, optional
+        How many of this process work at once at most.
 
     Returns
     -------
@@ -95,7 +98,7 @@ def stored_visibility(
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
     pieces = PieceFolder(path, key)
-    grid = yield from compute_visibility(site, models, settings, engine, pieces, scheduler)
+    grid = yield from compute_visibility(site, models, settings, engine, pieces, scheduler, threads)
     grid.save(path)
     pieces.remove()
     return grid

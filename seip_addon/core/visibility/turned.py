@@ -6,6 +6,7 @@ about z as those of an upright sensor are; only rays go out in the site's.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,9 @@ from .grid import VisibilitySettings
 from .near_surfaces import near_surfaces, turned_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
 from .scanning import Place, seen_by_near_rays
+
+_LEVEL = 1e-6
+"""Radians that an upright sensor's axis may be off: Blender turns objects in single precision."""
 
 
 class Onlooker:
@@ -50,9 +54,15 @@ class Onlooker:
         (t,) bool
             The same as a full scan's.
         """
-        turned = _TurnedCaster(self._caster, xyz, orientation)
-        place = Place(turned, np.zeros(3), 0.0, [model], self._settings.delta, self._settings.min_intensity)
-        seen, _ = seen_by_near_rays(place, turned_surfaces(self._surfaces, xyz, orientation))
+        delta, least = self._settings.delta, self._settings.min_intensity
+        if math.hypot(*orientation[2, :2]) < _LEVEL:
+            yaw = math.atan2(orientation[1, 0], orientation[0, 0])
+            place, surfaces = Place(self._caster, xyz, yaw, [model], delta, least), self._surfaces
+        else:
+            turned = _TurnedCaster(self._caster, xyz, orientation)
+            place = Place(turned, np.zeros(3), 0.0, [model], delta, least)
+            surfaces = turned_surfaces(self._surfaces, xyz, orientation)
+        seen, _ = seen_by_near_rays(place, surfaces)
         only: Boolean = seen[0]
         return only
 

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from ..arrays import Boolean, Integer
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..site import Site
 from .observer import Observer, Rows
-from .ray_casting import Engine, make_ray_caster
+from .ray_casting import Engine, RayCaster, make_ray_caster
 
 Submit = Callable[[Integer], Future[Rows]]
 
+_RAYS_BETWEEN_LOOKS = 1 << 15  # a tenth of a second's work or less
 _SECONDS_FOR_AN_ANSWER = 20
 _LOST_WORKERS = 3  # so many die over one piece before the piece is held to be the cause
 
@@ -45,15 +49,51 @@ class ObserverTask:
 
 
 @contextmanager
-def threads_of(task: ObserverTask) -> Iterator[Submit]:
-    """Yield what starts the work on a piece in a thread of this process."""
-    caster = make_ray_caster(task.site.triangles, task.engine, task.keep)
+def threads_of(task: ObserverTask, threads: int | None = None) -> Iterator[Submit]:
+    """Yield what starts the work on a piece in a thread of this process; unfinished work ends with the block, soon.
+
+    Parameters
+    ----------
+    task : ObserverTask
+    threads : int, optional
+        How many work at once at most.
+    """
+    stop = threading.Event()
+    caster = StoppableCaster(make_ray_caster(task.site.triangles, task.engine, task.keep), stop)
     observer = Observer(task.site, task.models, task.delta, task.min_intensity, caster)
-    pool = ThreadPoolExecutor(caster.threads)
+    pool = ThreadPoolExecutor(min(caster.threads, threads or caster.threads))
     try:
         yield lambda poses: pool.submit(observer.see, poses)
     finally:
+        stop.set()
         pool.shutdown(cancel_futures=True)
+
+
+class StoppableCaster:
+    """Casts rays until it is told to stop, some at a time: then nobody waits for the rest of them.
+
+    Parameters
+    ----------
+    caster : RayCaster
+        That does it.
+    stop : Event
+        Casting raises `CancelledError` once this is set.
+    """
+
+    def __init__(self, caster: RayCaster, stop: threading.Event) -> None:
+        self._caster, self._stop = caster, stop
+        self.name, self.triangles, self.threads = caster.name, caster.triangles, caster.threads
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays; see `RayCaster.cast`."""
+        hits = []
+        for begin in range(0, max(len(directions), 1), _RAYS_BETWEEN_LOOKS):
+            if self._stop.is_set():
+                raise CancelledError
+            some = slice(begin, begin + _RAYS_BETWEEN_LOOKS)
+            hits.append(self._caster.cast(origin if origin.ndim == 1 else origin[some], directions[some], max_range))
+        distance, triangle = zip(*hits, strict=True)
+        return np.concatenate(distance), np.concatenate(triangle)
 
 
 @contextmanager

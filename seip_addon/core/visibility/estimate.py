@@ -1,0 +1,173 @@
+"""How long a visibility grid will take, and how much memory, found by beginning it.
+
+What comes before the first ray is done and timed; then a few places drawn by lot
+are looked from, on as many threads as the whole would run on. Their pace is that
+of the whole: places differ by the rays that reach targets and by what stands about
+them, both of which the lot averages out.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Integer
+from ..lidar import LidarModel, find_models
+from ..progress import PAUSE, Progress
+from ..site import Site
+from .grid import VisibilitySettings
+from .needed_triangles import needed_triangles
+from .observer import Rows, places
+from .ray_casting import Engine, engine_name
+from .work_force import ObserverTask, threads_of
+
+SAMPLING = 0.8
+"""Seconds that sample places may take, beyond the first of each thread."""
+
+_BYTES_PER_TRIANGLE = {"embree": 750, "bvh": 1100}
+"""At the peak, while the ray caster is built; measured on a street of a million triangles."""
+_BYTES_PER_RAY_AND_PLACE = 160
+"""Of a place under way: directions, points, triangles and the bundles beside them."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a visibility grid will take.
+
+    Parameters
+    ----------
+    places, poses, targets, triangles : int
+        Places are poses that differ in more than the sensor; triangles those that rays are cast against.
+    rays : int
+        How many will be cast.
+    seconds : float
+    memory : int, bytes
+        In addition to what the scene itself takes.
+    """
+
+    places: int
+    poses: int
+    targets: int
+    triangles: int
+    rays: int
+    seconds: float
+    memory: int
+
+
+def estimate_visibility(
+    site: Site,
+    models: Mapping[str, LidarModel],
+    settings: VisibilitySettings,
+    engine: Engine = "auto",
+    threads: int | None = None,
+    seed: int = 0,
+) -> Generator[Progress, None, Estimate]:
+    """Estimate what `compute_visibility` will take.
+
+    Parameters
+    ----------
+    site : Site
+    models : mapping of str to LidarModel
+    settings : VisibilitySettings
+    engine : {"auto", "bvh", "embree"}
+    threads : int, optional
+        How many work at once at most.
+    seed : int
+        Of the lot that draws the sample.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    SeipError
+        As for `compute_visibility`.
+    """
+    yield Progress(0, 2, "triangles for the estimate")
+    began = time.perf_counter()
+    poses = site.candidates
+    used = find_models(models, np.unique(poses.sensor).tolist())
+    longest = max(model.max_range for model in used.values())
+    needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
+    task = ObserverTask(site, used, settings.delta, settings.min_intensity, engine_name(engine), needed.keep)
+    everywhere = places(poses.xyz, poses.yaw)
+    drawn = [everywhere[place] for place in _spread_lot(len(everywhere), seed)]
+    with threads_of(task, threads) as submit:
+        setting_up = time.perf_counter() - began
+        yield Progress(1, 2, "sample for the estimate")
+        sample = yield from _look_from(drawn, submit)
+    per_place = sample.seconds / sample.places
+    rays = sample.rays / sample.places
+    return Estimate(
+        places=len(everywhere),
+        poses=len(poses),
+        targets=len(site.targets),
+        triangles=int(needed.keep.sum()),
+        rays=round(rays * len(everywhere)),
+        seconds=setting_up + per_place * len(everywhere),
+        memory=_memory(task, rays, len(poses)),
+    )
+
+
+def _spread_lot(count: int, seed: int) -> list[int]:
+    """Return numbers below a count in an order drawn by lot, the first few of which are spread evenly over them all.
+
+    Places are in the order of positions and heights, so that an even sample has near and far ones, high and low ones.
+    Multiples of the golden ratio modulo 1 are spread so, from
+    whatever start.
+    """
+    start = np.random.default_rng(seed).random()
+    spread = (start + np.arange(2 * count) * ((math.sqrt(5) - 1) / 2)) % 1.0
+    return list(dict.fromkeys((spread * count).astype(int).tolist()))
+
+
+@dataclass(frozen=True)
+class _Sample:
+    places: int
+    seconds: float
+    rays: int
+
+
+def _look_from(
+    drawn: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]
+) -> Generator[Progress, None, _Sample]:
+    """Look from the first of some places, then from as many more as there is time for.
+
+    The second batch alone counts where it is the larger one: the first pays for what later places find ready.
+    """
+    first = yield from _timed(drawn[:_FIRST], submit)
+    more = math.floor(SAMPLING / first.seconds * first.places)
+    rest = drawn[_FIRST : _FIRST + more]
+    if len(rest) < _FIRST:
+        return first
+    return (yield from _timed(rest, submit))
+
+
+_FIRST = 4  # places: at least one for each thread
+
+
+def _timed(some: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]) -> Generator[Progress, None, _Sample]:
+    began = time.perf_counter()
+    futures = [submit(poses) for poses in some]
+    pending = set(futures)
+    while pending:
+        pending = wait(pending, PAUSE).not_done
+        yield Progress(1, 2, "sample for the estimate")
+    return _Sample(len(some), time.perf_counter() - began, sum(future.result().rays for future in futures))
+
+
+def _memory(task: ObserverTask, rays_per_place: float, poses: int) -> int:
+    triangles = len(task.keep) * _BYTES_PER_TRIANGLE[task.engine]
+    under_way = rays_per_place * _BYTES_PER_RAY_AND_PLACE * _FIRST
+    grid = poses * len(task.site.targets) * (1 + 1 / 8)  # as bits, and unpacked for the placement
+    return math.ceil(triangles + under_way + grid)

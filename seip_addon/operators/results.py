@@ -1,0 +1,303 @@
+"""What is done with a placement: look at it, compare it, move its sensors, write it to files."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from pathlib import Path
+
+import bpy
+from mathutils import Vector
+
+from .. import live, pointing, state
+from ..core.comparison import compare, unpacked_counts
+from ..core.errors import SeipError
+from ..core.goal import Plan, target_weights
+from ..core.progress import Progress
+from ..core.ranking import Ranked, rank_added, rank_alone
+from ..core.storage import check_folder
+from ..core.visibility.grid import VisibilityGrid
+from ..core.visibility.turned import Onlooker, onlooker
+from ..scene.result_folder import write_result_folder
+from ..scene.write import coverage_of, recolour, show_seen_by
+from .work import LongWork, Outcome, attempt
+
+MOST_RANKED = 50
+EYE_DISTANCE = 10.0
+"""Metres from a sensor's eye to the point that the view turns about."""
+
+
+class ForPlacement:
+    """A mixin: a button that works where there is a placement."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it works, and why not."""
+        sentence = state.obstacle(context.scene) or no_placement(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+
+def no_placement(scene: bpy.types.Scene) -> str:
+    """Say that there is no placement yet; empty if there is one."""
+    return "" if scene.seip.result.record else "There is no placement yet: place sensors first."
+
+
+def no_folder(scene: bpy.types.Scene) -> str:
+    """Say where the result would be written if the file were saved; empty if it can be."""
+    folder = scene.seip.result.folder
+    if bpy.data.filepath or not folder.startswith("//"):
+        return ""
+    return f"Save the file first: the result is written to {folder[2:] or 'the folder'} beside it."
+
+
+class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
+    """Set the view to the eye of the sensor that is active in the list, towards the road"""
+
+    bl_idname = "seip.look_from_sensor"
+    bl_label = "Look from It"
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Set the view."""
+        return attempt(self, lambda: self._look(context))
+
+    def _look(self, context: bpy.types.Context) -> None:
+        result = context.scene.seip.result
+        label = result.sensors[result.active_sensor].name if result.sensors else ""
+        empty = pointing.sensor_empties(context.scene).get(label)
+        if empty is None:
+            raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
+        if context.space_data is None or context.space_data.type != "VIEW_3D":
+            raise SeipError("there is no 3D view here: press this in the sidebar of one")
+        eye = empty.matrix_world.translation
+        way = (_middle_of_road(context.scene) - eye).normalized()
+        view = context.space_data.region_3d
+        view.view_perspective = "PERSP"
+        view.view_rotation = (-way).to_track_quat("Z", "Y")
+        view.view_distance = EYE_DISTANCE
+        view.view_location = eye + EYE_DISTANCE * way
+
+
+def _middle_of_road(scene: bpy.types.Scene) -> Vector:
+    """Return the middle of the coverage, or the origin where it is gone."""
+    coverage = coverage_of(scene)
+    corners = [] if coverage is None else [coverage.matrix_world @ Vector(corner) for corner in coverage.bound_box]
+    return sum(corners, Vector()) / len(corners) if corners else Vector()
+
+
+class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Ranked]]], bpy.types.Operator):
+    """List the candidates that are worth most, alone or in addition to the placement"""
+
+    bl_idname = "seip.rank_candidates"
+    bl_label = "Rank Candidates"
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, list[Ranked]]]:
+        """Find the placement again."""
+        return _ranked(state.answered(scene), scene.seip.result.order)
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, list[Ranked]]) -> None:
+        """Fill the list."""
+        state.held[scene.session_uid], lines = result
+        candidates = state.held[scene.session_uid].layout.site.candidates
+        ranking = scene.seip.result.ranking
+        ranking.clear()
+        for one in lines:
+            line = ranking.add()
+            line.pose, line.share = one.pose, one.share
+            position = candidates.position_name[candidates.position_of[one.pose]]
+            line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m {position}"
+
+
+def _ranked(
+    finding: Generator[Progress, None, state.Held], order: str
+) -> Generator[Progress, None, tuple[state.Held, list[Ranked]]]:
+    known = yield from finding
+    plan, grid = _plan_and_grid(known)
+    site, visible = known.layout.site, grid.visible
+    weight = target_weights(site, plan.goal)
+    if order == "ALONE":
+        return known, rank_alone(visible, weight, MOST_RANKED)
+    return known, rank_added(visible, weight, plan.placement.chosen, site.candidates.position_of, MOST_RANKED)
+
+
+def _plan_and_grid(known: state.Held) -> tuple[Plan, VisibilityGrid]:
+    if known.plan is None or known.grid is None:
+        raise RuntimeError("the work ended without a placement")
+    return known.plan, known.grid
+
+
+class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
+    """Keep the present placement under a name, to compare later ones with it"""
+
+    bl_idname = "seip.keep_placement"
+    bl_label = "Keep"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: bpy.props.StringProperty(name="Name", description="Under which it is kept; empty for a number")
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Keep it, in place of another of that name."""
+        seip = context.scene.seip
+        name = self.name.strip() or _free_name({one.name for one in seip.kept})
+        entry = seip.kept.get(name) or seip.kept.add()
+        entry.name = name
+        for field in ("record", "targets", "seen"):
+            setattr(entry, field, getattr(seip.result, field))
+        seip.active_kept = seip.kept.find(name)
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+        """Ask for the name."""
+        self.name = _free_name({one.name for one in context.scene.seip.kept})
+        outcome: Outcome = context.window_manager.invoke_props_dialog(self)
+        return outcome
+
+
+def _free_name(taken: set[str]) -> str:
+    return next(name for name in (f"Placement {n}" for n in range(1, len(taken) + 2)) if name not in taken)
+
+
+class SEIP_OT_drop_placement(bpy.types.Operator):
+    """Forget the kept placement that is active in the list"""
+
+    bl_idname = "seip.drop_placement"
+    bl_label = "Forget"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there is one."""
+        seip = context.scene.seip
+        return seip.active_kept in range(len(seip.kept))
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Remove it from the list."""
+        seip = context.scene.seip
+        seip.kept.remove(seip.active_kept)
+        seip.active_kept = max(0, seip.active_kept - 1)
+        return {"FINISHED"}
+
+
+class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
+    """Colour the road by what the present placement gains over the kept one, and what it loses"""
+
+    bl_idname = "seip.show_comparison"
+    bl_label = "Show Gains and Losses"
+    bl_options = {"REGISTER", "UNDO"}
+
+    back: bpy.props.BoolProperty(
+        name="Back", description="Show the coverage of the present placement again", default=False
+    )
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """Colour the road."""
+        return attempt(self, lambda: self._show(context.scene))
+
+    def _show(self, scene: bpy.types.Scene) -> None:
+        seip = scene.seip
+        present = unpacked_counts(seip.result.seen)
+        if self.back:
+            show_seen_by(scene, present)
+            return
+        if not 0 <= seip.active_kept < len(seip.kept):
+            raise SeipError("keep a placement first, to compare the present one with it")
+        kept = seip.kept[seip.active_kept]
+        if kept.targets != seip.result.targets:
+            raise SeipError("the two placements were made on different targets: only their figures can be compared")
+        comparison = compare(unpacked_counts(kept.seen), present)
+        recolour(scene, comparison.colouring())
+        gained, lost = comparison.gained / len(present), comparison.lost / len(present)
+        self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
+
+
+class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[state.Held, Onlooker]], bpy.types.Operator):
+    """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
+
+    bl_idname = "seip.follow_sensors"
+    bl_label = "Follow Moved Sensors"
+    bl_options = {"REGISTER"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """End it at once, or begin in a thread."""
+        return self.execute(context) if live.following is not None else super().invoke(context, event)
+
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        """End it, or begin."""
+        if live.following is not None:
+            live.stop()
+            return {"FINISHED"}
+        return super().execute(context)
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, Onlooker]]:
+        """Find the placement again."""
+        return _set_up(state.answered(scene))
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, Onlooker]) -> None:
+        """Begin to follow."""
+        state.held[scene.session_uid], looker = result
+        live.start(scene, state.held[scene.session_uid], looker)
+
+
+def _set_up(
+    finding: Generator[Progress, None, state.Held],
+) -> Generator[Progress, None, tuple[state.Held, Onlooker]]:
+    known = yield from finding
+    settings = known.layout.settings
+    yield Progress(0, 0, "getting ready to cast")
+    return known, onlooker(known.layout.site, settings.visibility, settings.engine)
+
+
+class SEIP_OT_export_result(ForPlacement, LongWork[state.Held], bpy.types.Operator):
+    """Write tables, pictures and the scene with its sensors to the folder; sensors moved by hand go back first"""
+
+    bl_idname = "seip.export_result"
+    bl_label = "Export"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it works, and why not."""
+        if not super().poll(context):
+            return False
+        sentence = no_folder(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """See that the folder can be written, and find the placement again."""
+        self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
+        check_folder(self._folder)
+        return state.answered(scene)
+
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+        """Write the files."""
+        state.held[scene.session_uid] = result
+        live.stop()
+        plan, grid = _plan_and_grid(result)
+        record = {**state.record_of(result.record)}
+        render = scene.seip.result.render
+        record["settings"] = {**record["settings"], "render": render}
+        layout = result.layout
+        write_result_folder(
+            self._folder,
+            scene,
+            layout.geometry,
+            layout.site,
+            plan,
+            record,
+            visible=grid.visible,
+            models=layout.models,
+            render=render,
+        )
+        self.report({"INFO"}, f"written to {self._folder}")
+
+
+CLASSES = (
+    SEIP_OT_look_from_sensor,
+    SEIP_OT_rank_candidates,
+    SEIP_OT_keep_placement,
+    SEIP_OT_drop_placement,
+    SEIP_OT_show_comparison,
+    SEIP_OT_follow_sensors,
+    SEIP_OT_export_result,
+)

@@ -1,0 +1,59 @@
+"""From a line in a list to the thing in the scene, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+from mathutils import Vector
+
+from . import state
+from .scene import contract
+
+
+def sensor_empties(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Return the sensors that stand in a scene, by label."""
+    collection = contract.find(scene, contract.SENSORS)
+    things = [] if collection is None else collection.all_objects
+    return {str(thing[contract.LABEL]): thing for thing in things if contract.LABEL in thing}
+
+
+def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """Select the sensor that was clicked on in the list, and nothing else."""
+    empty = sensor_empties(context.scene).get(result.sensors[result.active_sensor].name)
+    if empty is None or empty.name not in context.view_layer.objects:
+        return
+    for thing in context.selected_objects:
+        thing.select_set(state=False)
+    empty.select_set(state=True)
+    context.view_layer.objects.active = empty
+
+
+def show_candidate(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """Put the 3D cursor at the candidate that was clicked on in the ranking."""
+    known = state.find(context.scene)
+    pose = result.ranking[result.active_ranked].pose
+    if known is not None and pose < len(known.layout.site.candidates):
+        context.scene.cursor.location = Vector(known.layout.site.candidates.xyz[pose])
+
+
+def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:
+    """Yield the names of positions that hold a text: those that were laid out, or else the poles."""
+    scene = context.scene
+    known = state.find(scene)
+    if known is not None:
+        names = known.layout.site.candidates.position_name.tolist()
+    else:
+        names = sorted(thing.name for thing in contract.members(scene)[contract.POLES])
+    yield from (name for name in names if text.lower() in name.lower())
+
+
+def position_of(scene: bpy.types.Scene, thing: bpy.types.Object | None) -> str:
+    """Return the name of the position that an object stands for: a sensor's, or a pole's own; empty if for none."""
+    while thing is not None:
+        if "seip_position" in thing:
+            return str(thing["seip_position"])
+        if thing in contract.members(scene)[contract.POLES]:
+            return str(thing.name)
+        thing = thing.parent
+    return ""

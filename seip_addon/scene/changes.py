@@ -1,0 +1,107 @@
+"""Whether a scene is still as it was read, told without reading it again.
+
+Blender reports what it evaluates anew: objects that move or change their shape.
+What it does not report, such as objects that come and go, is in a digest of
+places and properties that takes no look at any vertex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from weakref import WeakSet
+
+import bpy
+
+from ..core.storage import digest
+from . import contract
+
+
+@dataclass(eq=False)
+class Watch:
+    """A scene as it was at one moment.
+
+    Parameters
+    ----------
+    scene : int
+        Its session number.
+    objects : frozenset of int
+        Session numbers of the objects that it is read from.
+    fingerprint : str
+        Digest of their names, places and properties.
+    changed : bool
+        Whether something happened to them since.
+    """
+
+    scene: int
+    objects: frozenset[int]
+    fingerprint: str
+    changed: bool = False
+
+    def look(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the scene has changed, after looking at what Blender does not report."""
+        scene.view_layers[0].update()  # what Blender has put off until now is reported first
+        self.changed = self.changed or _fingerprint(_sources(scene), scene) != self.fingerprint
+        return self.changed
+
+
+_watches: WeakSet[Watch] = WeakSet()
+
+
+def watch(scene: bpy.types.Scene) -> Watch:
+    """Begin to watch a scene, for as long as somebody holds the watch."""
+    scene.view_layers[0].update()
+    sources = _sources(scene)
+    new = Watch(scene.session_uid, frozenset(thing.session_uid for thing in sources), _fingerprint(sources, scene))
+    _watches.add(new)
+    return new
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Note what Blender evaluated anew; a handler of ``depsgraph_update_post``."""
+    concerned = [one for one in _watches if one.scene == scene.session_uid and not one.changed]
+    if not concerned:
+        return
+    objects = [update for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
+    affected = {u.id.original.session_uid for u in objects if u.is_updated_transform or u.is_updated_geometry}
+    rebuilt = any(not (update.is_updated_transform or update.is_updated_geometry) for update in objects)
+    fingerprint = _fingerprint(_sources(scene), scene) if rebuilt else None  # not at every step of a drag
+    for one in concerned:
+        one.changed = bool(affected & one.objects) or (rebuilt and fingerprint != one.fingerprint)
+
+
+def _sources(scene: bpy.types.Scene) -> set[bpy.types.Object]:
+    """Return the objects that a scene is read from, those within instanced collections included."""
+    found: set[bpy.types.Object] = set()
+    waiting = set().union(*contract.members(scene).values())
+    while waiting:
+        thing = waiting.pop()
+        found.add(thing)
+        if thing.instance_type == "COLLECTION" and thing.instance_collection is not None:
+            waiting |= set(thing.instance_collection.all_objects) - found
+    return found
+
+
+def _fingerprint(sources: Iterable[bpy.types.Object], scene: bpy.types.Scene) -> str:
+    layer = scene.view_layers[0]
+    roles = contract.members(scene)
+    lines = sorted(
+        repr((_traits(thing, layer), [n for n, things in roles.items() if thing in things])) for thing in sources
+    )
+    return digest(repr(scene.get(contract.ORIGIN)), repr(scene.get(contract.TITLE, scene.name)), *lines)
+
+
+def _traits(thing: bpy.types.Object, layer: bpy.types.ViewLayer) -> tuple[object, ...]:
+    """Return what of an object may change without a report; of its shape no more than its name."""
+    return (
+        thing.name_full,
+        tuple(value for row in thing.matrix_world for value in row),
+        None if thing.data is None else thing.data.name_full,
+        thing.hide_viewport,
+        thing.name in layer.objects and thing.visible_get(view_layer=layer),
+        None if thing.instance_collection is None else thing.instance_collection.name_full,
+        thing.instance_type,
+        *(repr(thing.get(name)) for name in (contract.WEIGHT, contract.FORBIDDEN, contract.MANDATORY)),
+        *((modifier.type, modifier.show_viewport) for modifier in thing.modifiers),
+    )

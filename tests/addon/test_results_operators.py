@@ -1,0 +1,163 @@
+"""Looking at a placement: ranking, comparison, and sensors that a hand moves."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon import live, pointing, state
+from seip_addon.core.comparison import unpacked_counts
+from seip_addon.core.errors import SeipError
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+
+
+@pytest.fixture
+def placed(add_on):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
+    scene = bpy.context.scene
+    scene.seip.survey.heights = "8"
+    scene.seip.survey.grid = 4.0
+    scene.seip.survey.spacing = 12.0
+    scene.seip.goal.count = 2
+    bpy.ops.seip.solve_placement()
+    return scene
+
+
+def shown(scene: bpy.types.Scene) -> np.ndarray:
+    mesh = bpy.data.objects["Coverage"].data
+    counts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.attributes["seip_seen"].data.foreach_get("value", counts)
+    return counts
+
+
+def test_candidates_are_ranked_as_a_slow_loop_does(placed):
+    bpy.ops.seip.rank_candidates()
+    known = state.find(placed)
+    visible, site = known.grid.visible, known.layout.site
+    chosen = [sensor.pose for sensor in known.plan.deployment.sensors]
+    taken = {int(site.candidates.position_of[pose]) for pose in chosen}
+    seen = visible[chosen].any(axis=0)
+    worth = {
+        pose: int((row & ~seen).sum())
+        for pose, row in enumerate(visible)
+        if int(site.candidates.position_of[pose]) not in taken
+    }
+    best = placed.seip.result.ranking[0]
+    assert best.share == pytest.approx(max(worth.values()) / len(site.targets))
+    assert worth[best.pose] == max(worth.values())
+    placed.seip.result.order = "ALONE"
+    bpy.ops.seip.rank_candidates()
+    assert placed.seip.result.ranking[0].share == pytest.approx(visible.sum(axis=1).max() / len(site.targets))
+    placed.seip.result.active_ranked = 0
+    assert np.allclose(placed.cursor.location, site.candidates.xyz[placed.seip.result.ranking[0].pose], atol=1e-4)
+
+
+def test_a_click_selects_the_sensor(placed):
+    placed.seip.result.active_sensor = 1
+    assert [thing["seip_label"] for thing in bpy.context.selected_objects] == ["S2"]
+
+
+def test_two_placements_are_compared_target_by_target(placed):
+    bpy.ops.seip.keep_placement(name="two")
+    before = unpacked_counts(placed.seip.result.seen) > 0
+    placed.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    after = unpacked_counts(placed.seip.result.seen) > 0
+    assert bpy.ops.seip.show_comparison() == {"FINISHED"}
+    mesh = bpy.data.objects["Coverage"].data
+    words = np.array([material.name.removeprefix("SEIP ") for material in mesh.materials])
+    index = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    assert (words[index] == "lost").sum() == (before & ~after).sum() > 0
+    assert (words[index] == "gained").sum() == (after & ~before).sum()
+    bpy.ops.seip.show_comparison(back=True)
+    assert (shown(placed) > 0).sum() == after.sum()
+
+
+def test_other_targets_are_not_compared(placed):
+    bpy.ops.seip.keep_placement(name="coarse")
+    placed.seip.survey.grid = 5.0
+    bpy.ops.seip.solve_placement()
+    with pytest.raises(RuntimeError, match="made on different targets"):
+        bpy.ops.seip.show_comparison()
+
+
+def test_kept_placements_have_names_and_can_be_forgotten(placed):
+    bpy.ops.seip.keep_placement()
+    bpy.ops.seip.keep_placement()
+    bpy.ops.seip.keep_placement(name="Placement 1")
+    assert [one.name for one in placed.seip.kept] == ["Placement 1", "Placement 2"]
+    bpy.ops.seip.drop_placement()
+    assert [one.name for one in placed.seip.kept] == ["Placement 2"]
+
+
+def test_moved_sensors_are_followed(placed):
+    before = shown(placed)
+    coverage = state.record_of(placed.seip.result.record)["coverage"]["whole"]
+    assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
+    assert live.following.coverage == pytest.approx(coverage, abs=1e-9)
+    assert (shown(placed) == before).all()
+    assert live.following.moved == ()
+
+    first = pointing.sensor_empties(placed)["S1"]
+    there = first.location.copy()
+    first.location.z -= 4.0
+    bpy.context.view_layer.update()
+    assert bpy.app.timers.is_registered(live.look)
+    live.look()
+    assert live.following.moved == ("S1",)
+    assert (shown(placed) != before).any()
+    assert live.following.coverage == pytest.approx((shown(placed) > 0).mean())
+
+    first.location = there
+    live.look()
+    assert live.following.moved == ()
+    assert (shown(placed) == before).mean() > 0.99  # the place is in single precision
+
+    first.rotation_euler.x = 0.4  # tilted: every ray is cast
+    live.look()
+    assert live.following.moved == ("S1",)
+    bpy.data.objects.remove(first)
+    live.look()
+    assert (shown(placed) <= 1).all()
+
+
+def test_a_level_turn_of_a_whole_step_sees_the_same(placed):
+    bpy.ops.seip.follow_sensors()
+    before = shown(placed)
+    first = pointing.sensor_empties(placed)["S1"]
+    first.rotation_euler.z += np.pi
+    live.look()
+    assert live.following.moved == ("S1",)
+    assert (shown(placed) == before).mean() > 0.97
+
+
+def test_following_leaves_nothing_behind(placed):
+    handlers = bpy.app.handlers.depsgraph_update_post
+    count = len(handlers)
+    bpy.ops.seip.follow_sensors()
+    assert len(handlers) == count + 1
+    bpy.ops.seip.follow_sensors()
+    assert live.following is None
+    assert len(handlers) == count
+    bpy.ops.seip.follow_sensors()
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert live.following is None
+
+
+def test_following_stops_where_the_scene_has_changed(placed):
+    bpy.ops.seip.follow_sensors()
+    bpy.data.objects["Building 1"].location.x += 1.0
+    bpy.context.view_layer.update()
+    live.look()
+    assert "the scene has changed" in live.following.problem
+
+
+def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
+    number = placed.session_uid
+    bpy.ops.scene.new(type="NEW")
+    bpy.data.scenes.remove(placed)
+    with pytest.raises(SeipError, match="is gone: nothing was written"):
+        state.scene_of(number)
