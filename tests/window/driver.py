@@ -22,8 +22,12 @@ import bpy
 
 Steps = Generator[float, None, None]
 
-ROW = 8
+ROW = 10
 """Pixels between two places that are asked: buttons are 20 high."""
+PAGES = 8
+"""Of the sidebar, at most."""
+HEADING = 32
+"""Pixels from a button down to the heading below it."""
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
 NAMES = dict(
@@ -115,26 +119,37 @@ class Window:
         what : str
             Part of an operator's call or of a property's path: ``seip.solve_placement(``, ``seip.goal.count``.
         """
-        for page in range(12):  # as it is, then from the top down
-            if page == 1:
+        for page in range(2 * PAGES):  # as it is and further down, then from the top
+            if page == PAGES:
                 yield from self._scroll("WHEELUPMOUSE", 100)
-            elif page > 1:
+            elif page:
                 yield from self._scroll("WHEELDOWNMOUSE", 10)
             region = self.region("UI")
             for y in range(region.y + region.height - 4, region.y, -ROW):
-                for share in (0.75, 0.3):  # a row may hold several
+                for share in (0.75, 0.5, 0.2):  # a row may hold several
                     place = (region.x + int(share * (region.width - 24)), y)
-                    self.event("MOUSEMOVE", "NOTHING", place)
-                    yield BEAT / 2
+                    yield from self._hover(place, BEAT / 2)
                     if what in self._asked():
-                        return place
+                        yield from self._hover(place, 10 * BEAT)  # it may have been slow to notice the mouse
+                        if what in self._asked():
+                            return place
         raise LookupError(f"there is no button {what} in the sidebar")
+
+    def _hover(self, place: tuple[int, int], seconds: float) -> Steps:
+        self.event("MOUSEMOVE", "NOTHING", place)
+        yield seconds
 
     def click(self, what: str) -> Steps:
         """Click a button of the sidebar."""
         place = yield from self.find(what)
         yield from self.press("LEFTMOUSE", place)
         yield 0.2
+
+    def open_below(self, what: str) -> Steps:
+        """Open the panel whose heading stands below a button."""
+        x, y = yield from self.find(what)
+        yield from self.press("LEFTMOUSE", (x, y - HEADING))
+        yield 0.5
 
     def enter(self, what: str, text: str) -> Steps:
         """Type into a field of the sidebar, in place of what is there."""
@@ -165,7 +180,7 @@ class Window:
         path = self.pictures / f"{name}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
         if shutil.which("import"):  # of X: Blender's own pictures are black where OpenGL is drawn in software
-            subprocess.run(["import", "-window", "root", str(path)], check=True)  # noqa: S603, S607
+            subprocess.run(["import", "-window", "root", "-resize", "1200x", "-colors", "255", f"PNG8:{path}"], check=True)  # noqa: S603, S607
         else:
             with bpy.context.temp_override(window=self.window):
                 bpy.ops.screen.screenshot(filepath=str(path))

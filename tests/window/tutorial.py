@@ -1,0 +1,144 @@
+"""The tutorial of docs/tutorial.md, played by mouse and keyboard: a test, and where its pictures come from.
+
+.ci/window BLENDER OUT tests/window/tutorial.py scenes/junction.blend
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import bpy
+from bl_ext.user_default.seip.seip_addon import state
+from driver import Steps, Window, play
+
+OUT = Path(sys.argv[sys.argv.index("--") + 1])
+TRAFFIC = Path(bpy.data.filepath).with_name("junction_traffic") / "run-1.npz"
+
+
+def scenario(window: Window) -> Steps:
+    """Check, compute, stop, compute, place, look, undo, save, reopen, and scan traffic."""
+    yield from _begin(window)
+    yield from _check(window)
+    yield from _choose(window)
+    yield from _compute(window)
+    yield from _place(window)
+    yield from _look(window)
+    yield from _undo_and_redo(window)
+    yield from _save_and_reopen(window)
+    yield from _scan(window)
+    yield from _take_picture(window)
+
+
+def _begin(window: Window) -> Steps:
+    copy = OUT / "junction.blend"
+    shutil.copy(bpy.data.filepath, copy)
+    bpy.ops.wm.open_mainfile(filepath=str(copy))
+    yield 1.5
+    yield from window.open_sidebar("SEIP")
+    yield from window.picture("1-sidebar")
+
+
+def _check(window: Window) -> Steps:
+    yield from window.click("seip.check_site(")
+    yield from window.until(lambda: state.running is None, 60)
+    yield from window.find("seip.check_site(")
+    yield from window.picture("2-check")
+
+
+def _choose(window: Window) -> Steps:
+    yield from window.enter("seip.survey.heights", "8")
+    yield from window.click("seip.preview_beams(")
+    yield from window.picture("3-beams")
+    yield from window.click("seip.preview_beams(")
+
+
+def _compute(window: Window) -> Steps:
+    yield from window.click("seip.compute_visibility(")
+    yield from window.until(lambda: state.running is not None, 10)
+    yield from window.press("ESC")
+    yield from window.until(lambda: state.running is None, 0.5)
+    assert _known() is None or _known().grid is None, "the run that was stopped went on"
+    yield from window.click("seip.estimate_visibility(")
+    yield from window.until(lambda: state.running is None and _known() and _known().estimate, 60)
+    yield from window.click("seip.compute_visibility(")
+    yield from window.until(lambda: state.running is None and _known().grid is not None, 120)
+    yield from window.find("seip.compute_visibility(")
+    yield from window.picture("4-visibility")
+
+
+def _place(window: Window) -> Steps:
+    yield from window.enter("seip.goal.count", "2")
+    yield from window.click("seip.solve_placement(")
+    yield from window.until(lambda: _scene().seip.result.record, 200)
+    assert len(_empties()) == 2, _empties()
+    (OUT / "placement.json").write_text(_scene().seip.result.record, encoding="utf-8")
+    yield from window.find("seip.solve_placement(")
+    yield from window.picture("5-placement")
+
+
+def _look(window: Window) -> Steps:
+    yield from window.click("seip.colour_coverage(aspect='seen'")
+    yield from window.picture("6-coverage")
+    yield from window.click("seip.look_from_sensor(")
+    yield from window.picture("7-from-the-sensor")
+
+
+def _undo_and_redo(window: Window) -> Steps:
+    yield from window.press("Z", ctrl=True)
+    yield from window.press("Z", ctrl=True)
+    yield from window.until(lambda: not _empties() and not _scene().seip.result.record, 5)
+    yield from window.press("Z", ctrl=True, shift=True)
+    yield from window.press("Z", ctrl=True, shift=True)
+    yield from window.until(lambda: len(_empties()) == 2 and _scene().seip.result.record, 5)
+
+
+def _save_and_reopen(window: Window) -> Steps:
+    yield from window.press("S", ctrl=True)
+    yield from window.until(lambda: not bpy.data.is_dirty, 10)
+    record = _scene().seip.result.record
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    yield 1.5
+    yield from window.open_sidebar("SEIP")
+    assert _known() is None
+    assert _scene().seip.result.record == record
+    yield from window.open_below("seip.follow_sensors(")
+    yield from window.click("seip.rank_candidates(")
+    yield from window.until(lambda: len(_scene().seip.result.ranking), 60)
+    yield from window.find("seip.rank_candidates(")
+    yield from window.picture("8-ranking")
+
+
+def _scan(window: Window) -> Steps:
+    _scene().seip.traffic.file = str(TRAFFIC)  # in place of the file browser
+    yield from window.click("seip.load_traffic(")
+    yield from window.until(lambda: state.running is None and "SEIP Traffic" in bpy.data.collections, 60)
+    _scene().frame_set(600)
+    yield from window.click("seip.scan_frame(")
+    yield from window.until(lambda: state.running is None, 60)
+    yield 1.0
+    yield from window.picture("9-scan")
+
+
+def _take_picture(window: Window) -> Steps:
+    yield from window.click("seip.save_picture(")
+    yield from window.until((OUT / "placement.png").exists, 60)
+
+
+def _scene() -> bpy.types.Scene:
+    return bpy.context.window_manager.windows[0].scene
+
+
+def _known() -> state.Held | None:
+    return state.find(_scene())
+
+
+def _empties() -> list[bpy.types.Object]:
+    collection = bpy.data.collections.get("SEIP Sensors")
+    return [thing for thing in collection.objects if thing.type == "EMPTY"] if collection else []
+
+
+play(scenario, Window(OUT))
