@@ -19,6 +19,7 @@ from .site import Site, make_site
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
 from .visibility.ring_resolution import resolution_warnings
+from .visibility.rounding import rounding_warnings
 from .visibility.store import stored_visibility
 
 
@@ -114,8 +115,8 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     """
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
-    resolution = resolution_warnings(site, models, settings.visibility)
-    return Layout(geometry, site, models, settings, (*warnings, *resolution))
+    limits = (*rounding_warnings(geometry), *resolution_warnings(site, models, settings.visibility))
+    return Layout(geometry, site, models, settings, (*warnings, *limits))
 
 
 def grid_key(layout: Layout) -> str:
