@@ -2,10 +2,10 @@
 
 An answer is the best placement under some settings; it is judged on a fine grid of
 targets, the same for all. Spacings are tried from coarse to fine, first that of the
-targets, then that of the candidates. A spacing is taken when neither of the next two,
-down to half of it, gains more than half the tolerance: where each halving gains at most
-half of what the one before gained, all finer ones together gain no more than the last.
-Two in a row alone agree too easily: the best of a few candidates is a matter of luck.
+targets, then that of the candidates. A spacing is taken when none of the next few gains
+more than half the tolerance: where each refinement gains at most half of what the one
+before gained, all finer ones together gain no more than the last. Two in a row alone agree
+too easily: the best of a few candidates is a matter of luck.
 """
 
 from __future__ import annotations
@@ -30,11 +30,14 @@ from .visibility.turned import Onlooker, onlooker
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 """Metres between targets, from coarse to fine: each halves the square that a target stands for."""
 
-AHEAD = 2
-"""How many finer spacings have to agree with the one that is taken."""
+GRID_AHEAD = 2
+"""How many finer spacings of targets have to agree with the one that is taken: down to half of it."""
 
 CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0, 1.4)
 """Metres between posts on the pavement, from coarse to fine."""
+
+CANDIDATES_AHEAD = 3
+"""The same of candidates, of which a step finer brings a third more: down to a third of the spacing."""
 
 COARSE_CANDIDATES = 8.0
 """Metres between posts while the spacing of the targets is sought."""
@@ -150,6 +153,7 @@ def coarsest_settings(
 
     by_grid, grid = yield from _until_settled(
         GRID_SPACINGS,
+        GRID_AHEAD,
         lambda spacing: answer(spacing, COARSE_CANDIDATES),
         lambda taken, finer: abs(taken.own - taken.judged) <= tolerance and _gain(taken, finer) <= tolerance / 2,
         "spacing of the targets",
@@ -157,12 +161,13 @@ def coarsest_settings(
     grid_spacing = by_grid[-1 if grid is None else grid].grid_spacing
     by_candidates, candidates = yield from _until_settled(
         CANDIDATE_SPACINGS,
+        CANDIDATES_AHEAD,
         lambda spacing: answer(grid_spacing, spacing),
         lambda taken, finer: _gain(taken, finer) <= tolerance / 2,
         "spacing of the candidates",
     )
     spacing = by_candidates[-1 if candidates is None else candidates].candidate_spacing
-    return Convergence(
+    convergence = Convergence(
         settings=replace(settings, grid_spacing=grid_spacing, candidates=replace(settings.candidates, spacing=spacing)),
         tolerance=tolerance,
         by_grid=by_grid,
@@ -171,6 +176,8 @@ def coarsest_settings(
         grid_settled=grid is not None,
         candidates_settled=candidates is not None,
     )
+    reasoned = replace(convergence.settings, spacings_because=convergence.sentence)
+    return replace(convergence, settings=reasoned)
 
 
 class Judge:
@@ -188,13 +195,13 @@ class Judge:
         spacing = max(JUDGED_ON, math.sqrt(geometry.region.area / MOST_JUDGED))
         self.site = make_site(geometry, replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS)), spacing)
         self.weights = target_weights(self.site, goal)
-        self._geometry, self._goal = geometry, goal
+        self.geometry, self._goal = geometry, goal
         self._models = settings.models()
         self._onlooker: Onlooker = onlooker(self.site, settings.visibility, settings.engine)
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
         """Find the best placement under some settings, and judge it."""
-        site = make_site(self._geometry, settings.candidates, settings.grid_spacing)
+        site = make_site(self.geometry, settings.candidates, settings.grid_spacing)
         plan = yield from self.plan(site, settings)
         seen = plan.deployment.seen_by > 0
         return Answer(
@@ -225,6 +232,7 @@ class Judge:
 
 def _until_settled(
     spacings: Sequence[float],
+    ahead: int,
     answer: Callable[[float], Generator[Progress, None, Answer]],
     agree: Callable[[Answer, Sequence[Answer]], bool],
     what: str,
@@ -242,7 +250,7 @@ def _until_settled(
                 raise
             continue
         answers.append(found)
-        taken = len(answers) - 1 - AHEAD
+        taken = len(answers) - 1 - ahead
         if taken >= 0 and agree(answers[taken], answers[taken + 1 :]):
             return tuple(answers), taken
     return tuple(answers), None
@@ -256,7 +264,8 @@ def _gain(taken: Answer, finer: Sequence[Answer]) -> float:
 def _reason(what: str, picked: float, answers: Sequence[Answer], *, settled: bool) -> str:
     if not settled:
         return f"{what} {picked:g} m apart, the finest tried, though finer ones may still gain"
-    taken, finer = answers[-1 - AHEAD], answers[-AHEAD:]
+    ahead = GRID_AHEAD if what == "targets" else CANDIDATES_AHEAD
+    taken, finer = answers[-1 - ahead], answers[-ahead:]
     best, finest = max(answer.judged for answer in finer), finer[-1]
     spacing = finest.grid_spacing if what == "targets" else finest.candidate_spacing
     return f"{what} {picked:g} m apart cover {taken.judged:.2%}, finer ones down to {spacing:g} m at best {best:.2%}"

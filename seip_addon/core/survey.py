@@ -41,6 +41,8 @@ class SurveySettings:
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds
         For each answer.
+    spacings_because : str
+        Why the spacings of targets and candidates are what they are; empty where the user chose them.
     """
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
@@ -50,6 +52,7 @@ class SurveySettings:
     engine: Engine = "auto"
     solver: str = "highs"
     time_limit: float = 60.0
+    spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
         """Return the sensor types to choose from, by catalogue key.
@@ -72,6 +75,7 @@ class SurveySettings:
             "engine": self.engine,
             "solver": self.solver,
             "time_limit_s": self.time_limit,
+            "spacings_because": self.spacings_because,
         }
 
 
