@@ -144,6 +144,13 @@ def coarsest_settings(
         raise SeipError(f"the tolerance must be a share above 0 and below 1, not {tolerance:g}")
     if goal.cheapest:
         raise SeipError("a tolerance needs a number of sensors or a budget: the coverage is not what you ask for")
+    poles = {pole.name for pole in geometry.poles}
+    for name in (*goal.forbidden, *goal.mandatory):
+        if name not in poles:
+            raise SeipError(
+                f"{name!r} is no pole: a tolerance lays posts on the pavement anew, under other names; "
+                "draw a forbidden or mandatory area instead, or give --grid and --spacing"
+            )
     judge = Judge(geometry, settings, goal)
 
     def answer(grid_spacing: float, candidate_spacing: float) -> Generator[Progress, None, Answer]:

@@ -279,7 +279,8 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, targets: Float) ->
     end, _ = caster.cast(xyz, way / distance[:, None], float(distance.max()) + 1.0)
     free: Boolean = end >= distance - CLEAR
     free &= (distance >= model.min_range) & (distance <= model.max_range)
-    return free & (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
+    free &= (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
+    return free
 
 
 def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle: float) -> Targets:
@@ -429,12 +430,12 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 answer="the record holds δ; warns where it cannot resolve the rings",
             )
         )
-    for what, answers, picked in (
+    for what, tried, picked in (
         ("grid spacing", study.by_grid, study.convergence.settings.grid_spacing),
         ("candidate spacing", study.by_candidates, study.convergence.settings.candidates.spacing),
     ):
-        finest = max(answer.judged for answer in answers[-CANDIDATES_AHEAD:])
-        worst = min(answers, key=lambda answer: answer.judged)
+        finest = max(answer.judged for answer in tried[-CANDIDATES_AHEAD:])
+        worst = min(tried, key=lambda answer: answer.judged)
         spacing = worst.grid_spacing if what == "grid spacing" else worst.candidate_spacing
         rows.append(
             Row(

@@ -143,14 +143,16 @@ def _everywhere(rays: int, random: np.random.Generator) -> Float:
 def _on_inner_edges(ground: Float, count: int, random: np.random.Generator) -> Float:
     """Points on sides that two triangles share, (count, 3): the diagonals of the squares."""
     which, share = random.integers(0, len(ground) // 2, count), random.random((count, 1))
-    return ground[which, 0] * (1 - share) + ground[which, 2] * share
+    points: Float = ground[which, 0] * (1 - share) + ground[which, 2] * share
+    return points
 
 
 def _inner_vertices(ground: Float, count: int, random: np.random.Generator) -> Float:
     """Corners off the ground's border, (count, 3)."""
     corners = np.unique(ground.reshape(-1, 3), axis=0)
     inner = corners[np.linalg.norm(corners, axis=1) < HALF * 0.99]
-    return inner[random.integers(0, len(inner), count)]
+    picked: Float = inner[random.integers(0, len(inner), count)]
+    return picked
 
 
 def _towards(points: Float, eye: Float = EYE) -> Float:

@@ -188,9 +188,8 @@ class EmbreeRayCaster:
         distance, face = hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64)
         if self._any_needle:
             needle = np.flatnonzero((face >= 0) & self._needle[face])
-            corners = self.triangles[self._index[face[needle]]]
-            start = np.broadcast_to(origin, directions.shape)[needle]
-            distance[needle] = _to_plane(start, directions[needle], corners)
+            met = self.triangles[self._index[face[needle]]]
+            distance[needle] = _to_plane(np.broadcast_to(origin, directions.shape)[needle], directions[needle], met)
         return _result(distance, face, self._index, max_range)
 
 
