@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +24,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 """Told apart by colour-blind people (Okabe and Ito 2008)."""
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-LIMIT = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
+LIMIT: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 
 def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
@@ -36,7 +37,7 @@ def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, 
         for number, height in enumerate(sorted({border.height for border in own})):
             at = [border for border in own if border.height == height]
             deltas, radii = [border.delta for border in at], [border.radius for border in at]
-            style = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
+            style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
             panel.plot(deltas, radii, label=f"{height:g} m high", **style)
             panel.fill_between(deltas, radii, top, color=COLOURS[number], alpha=0.07)
         panel.axvline(delta, **LIMIT)
@@ -60,7 +61,7 @@ def save_border_check_chart(path: str | os.PathLike[str], study: CriterionStudy,
         ]
         at, value, low, high = np.array(points).T
         reach = [np.maximum(value - low, 0), np.maximum(high - value, 0)]
-        style = {"color": COLOURS[number], "marker": MARKS[number], "capsize": 3}
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "capsize": 3}
         panel.errorbar(at, value, reach, label=own.sensor, **style)
     panel.axvline(1.0, **LIMIT)
     panel.set_ylim(0, 1.03)
@@ -75,7 +76,8 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
     figure, panels = _figure(2, title)
     for number, sensor in enumerate(dict.fromkeys(answer.sensor for answer in study.by_delta)):
         own = [answer for answer in study.by_delta if answer.sensor == sensor]
-        deltas, style = [answer.delta for answer in own], {"color": COLOURS[number], "marker": MARKS[number]}
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
+        deltas = [answer.delta for answer in own]
         coverage, view = [answer.coverage for answer in own], [answer.view for answer in own]
         panels[0].plot(deltas, coverage, label=f"{sensor}, {own[0].height:g} m high", **style)
         panels[0].plot(deltas, view, color=COLOURS[number], linewidth=1.0, linestyle=":")
@@ -131,7 +133,12 @@ def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, ti
     ):
         for engine, dash in zip(dict.fromkeys(check.engine for check in checks), ("-", ":"), strict=False):
             own = [check for check in checks if check.engine == engine]
-            style = {"color": COLOURS[number], "marker": MARKS[number], "linestyle": dash, "markersize": 5}
+            style: dict[str, Any] = {
+                "color": COLOURS[number],
+                "marker": MARKS[number],
+                "linestyle": dash,
+                "markersize": 5,
+            }
             panel.plot([c.distance for c in own], [c.off for c in own], label=f"{name}, {engine}", **style)
     panel.axhline(NOTICEABLE, **LIMIT)
     panel.axvline(NOTICEABLE / STEP, **LIMIT)
@@ -147,7 +154,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     figure, panels = _figure(3, title)
     for number, (what, method) in enumerate(dict.fromkeys((c.what, c.method) for c in study.spans)):
         own = [c for c in study.spans if (c.what, c.method) == (what, method)]
-        style = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
         panels[0].plot([c.decades for c in own], [c.lost for c in own], label=f"{what}, {method}", **style)
     panels[0].axhline(TIE, **LIMIT)
     panels[0].set_yscale("symlog", linthresh=1e-15)

@@ -141,8 +141,9 @@ class Draws:
     @property
     def settled(self) -> bool:
         """Whether half of the draws lead to a spread within the interval."""
+        half = self.coverage[: len(self.coverage) // 2]
         low, high = self.spread_interval
-        return low <= float(self.coverage[: len(self.coverage) // 2].std(ddof=1)) <= high
+        return len(half) > 1 and low <= float(half.std(ddof=1)) <= high
 
 
 @dataclass(frozen=True, eq=False)

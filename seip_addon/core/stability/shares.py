@@ -32,7 +32,8 @@ class Share:
         n, p, z = self.trials, self.value, NORMAL
         middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
         reach = z / (1 + z**2 / n) * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-        return max(0.0, middle - reach), min(1.0, middle + reach)
+        low = 0.0 if self.count == 0 else max(0.0, middle - reach)
+        return low, 1.0 if self.count == n else min(1.0, middle + reach)
 
     @property
     def per_million(self) -> str:

@@ -245,7 +245,7 @@ def _check_span(what: str, decades: int, instances: int, random: np.random.Gener
     checks = [_span_check(what, "solve", decades, problems, [finish(solve(p)).chosen for p in problems])]
     for solver in ("highs", "cbc"):
         if is_available(solver):
-            few = problems[: instances // 3]  # each starts a solver of its own
+            few = problems[: max(1, instances // 3)]  # each starts a solver of its own
             checks.append(_span_check(what, solver, decades, few, [_by_program(p, solver) for p in few]))
     return checks
 
