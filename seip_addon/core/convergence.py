@@ -1,11 +1,10 @@
 """The coarsest spacings of targets and of candidates whose answer stays within a tolerance.
 
 An answer is the best placement under some settings; it is judged on a fine grid of
-targets, the same for all. Spacings are tried from coarse to fine, first that of the
-targets, then that of the candidates. A spacing is taken when none of the next few gains
-more than half the tolerance: where each refinement gains at most half of what the one
-before gained, all finer ones together gain no more than the last. Two in a row alone agree
-too easily: the best of a few candidates is a matter of luck.
+targets, the same for all. First the spacing of the targets is sought, then that of the
+candidates: from coarse to fine until the answer is as good as that of the finest. To stop
+where two spacings in a row agree would be quicker, but they agree too easily: which of a
+few candidates is the best is a matter of luck.
 """
 
 from __future__ import annotations
@@ -30,14 +29,8 @@ from .visibility.turned import Onlooker, onlooker
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 """Metres between targets, from coarse to fine: each halves the square that a target stands for."""
 
-GRID_AHEAD = 2
-"""How many finer spacings of targets have to agree with the one that is taken: down to half of it."""
-
-CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0, 1.4)
+CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)
 """Metres between posts on the pavement, from coarse to fine."""
-
-CANDIDATES_AHEAD = 3
-"""The same of candidates, of which a step finer brings a third more: down to a third of the spacing."""
 
 COARSE_CANDIDATES = 8.0
 """Metres between posts while the spacing of the targets is sought."""
@@ -83,11 +76,9 @@ class Convergence:
     tolerance : float
         Share of the weight within which answers agree.
     by_grid, by_candidates : tuple of Answer
-        What was tried, from coarse to fine.
+        What was tried, from coarse to fine; the last is the finest, with which the others are compared.
     judged_on : float, metres
         Spacing of the grid that judged.
-    grid_settled, candidates_settled : bool
-        Whether finer ones agreed with what is picked; else it is the finest.
     """
 
     settings: SurveySettings
@@ -95,18 +86,17 @@ class Convergence:
     by_grid: tuple[Answer, ...]
     by_candidates: tuple[Answer, ...]
     judged_on: float
-    grid_settled: bool
-    candidates_settled: bool
 
     @property
     def sentence(self) -> str:
         """What was picked and why."""
-        grid = _reason("targets", self.settings.grid_spacing, self.by_grid, settled=self.grid_settled)
-        spacing = self.settings.candidates.spacing
-        posts = _reason("posts", spacing, self.by_candidates, settled=self.candidates_settled)
+        grid, finest = self.by_grid[-2:]
+        posts, most = self.by_candidates[-2:]
         return (
-            f"picked for a tolerance of {self.tolerance:g}: {grid}; {posts}; "
-            f"all judged on targets {self.judged_on:g} m apart"
+            f"picked for a tolerance of {self.tolerance:g}: targets {grid.grid_spacing:g} m apart, whose placement "
+            f"covers {grid.judged:.2%} against {finest.judged:.2%} with {finest.grid_spacing:g} m; "
+            f"posts {posts.candidate_spacing:g} m apart, {posts.judged:.2%} against {most.judged:.2%} "
+            f"with {most.candidate_spacing:g} m; all judged on targets {self.judged_on:g} m apart"
         )
 
 
@@ -115,8 +105,8 @@ def coarsest_settings(
 ) -> Generator[Progress, None, Convergence]:
     """Find the coarsest spacings whose answer to a goal stays within a tolerance.
 
-    A spacing of targets has to agree with the fine grid about the coverage of
-    its own placement as well.
+    Each of the two may cost half of the tolerance. A spacing of targets has to agree
+    with the fine grid about the coverage of its own placement as well.
 
     Parameters
     ----------
@@ -158,30 +148,30 @@ def coarsest_settings(
         tried = replace(settings, candidates=candidates, grid_spacing=grid_spacing)
         return (yield from judge.answer(tried))
 
-    by_grid, grid = yield from _until_settled(
+    share = tolerance / 2
+    finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATES)
+    by_grid = yield from _until_as_good(
         GRID_SPACINGS,
-        GRID_AHEAD,
         lambda spacing: answer(spacing, COARSE_CANDIDATES),
-        lambda taken, finer: abs(taken.own - taken.judged) <= tolerance and _gain(taken, finer) <= tolerance / 2,
+        lambda found: abs(found.own - found.judged) <= share and finest.judged - found.judged <= share,
         "spacing of the targets",
     )
-    grid_spacing = by_grid[-1 if grid is None else grid].grid_spacing
-    by_candidates, candidates = yield from _until_settled(
+    grid_spacing = by_grid[-1].grid_spacing
+    # with more candidates a coarse grid misleads more: the finest answer is one on a finer grid, too
+    most = yield from answer(max(grid_spacing / 2, GRID_SPACINGS[-1]), CANDIDATE_SPACINGS[-1])
+    by_candidates = yield from _until_as_good(
         CANDIDATE_SPACINGS,
-        CANDIDATES_AHEAD,
         lambda spacing: answer(grid_spacing, spacing),
-        lambda taken, finer: _gain(taken, finer) <= tolerance / 2,
+        lambda found: most.judged - found.judged <= share,
         "spacing of the candidates",
     )
-    spacing = by_candidates[-1 if candidates is None else candidates].candidate_spacing
+    candidates = replace(settings.candidates, spacing=by_candidates[-1].candidate_spacing)
     convergence = Convergence(
-        settings=replace(settings, grid_spacing=grid_spacing, candidates=replace(settings.candidates, spacing=spacing)),
+        settings=replace(settings, grid_spacing=grid_spacing, candidates=candidates),
         tolerance=tolerance,
-        by_grid=by_grid,
-        by_candidates=by_candidates,
+        by_grid=(*by_grid, finest),
+        by_candidates=(*by_candidates, most),
         judged_on=judge.site.targets.spacing,
-        grid_settled=grid is not None,
-        candidates_settled=candidates is not None,
     )
     reasoned = replace(convergence.settings, spacings_because=convergence.sentence)
     return replace(convergence, settings=reasoned)
@@ -237,14 +227,13 @@ class Judge:
         return weighted_share(seen, self.weights)
 
 
-def _until_settled(
+def _until_as_good(
     spacings: Sequence[float],
-    ahead: int,
     answer: Callable[[float], Generator[Progress, None, Answer]],
-    agree: Callable[[Answer, Sequence[Answer]], bool],
+    good: Callable[[Answer], bool],
     what: str,
-) -> Generator[Progress, None, tuple[tuple[Answer, ...], int | None]]:
-    """Try spacings from coarse to fine until the next ones agree with one, and return which that is.
+) -> Generator[Progress, None, tuple[Answer, ...]]:
+    """Try spacings from coarse to fine until an answer is good, or there is no finer one.
 
     Those too coarse for any answer, where fewer positions are left than sensors are asked for, are left out.
     """
@@ -257,22 +246,6 @@ def _until_settled(
                 raise
             continue
         answers.append(found)
-        taken = len(answers) - 1 - ahead
-        if taken >= 0 and agree(answers[taken], answers[taken + 1 :]):
-            return tuple(answers), taken
-    return tuple(answers), None
-
-
-def _gain(taken: Answer, finer: Sequence[Answer]) -> float:
-    """Return by how much the best of finer answers is better."""
-    return max(answer.judged for answer in finer) - taken.judged
-
-
-def _reason(what: str, picked: float, answers: Sequence[Answer], *, settled: bool) -> str:
-    if not settled:
-        return f"{what} {picked:g} m apart, the finest tried, though finer ones may still gain"
-    ahead = GRID_AHEAD if what == "targets" else CANDIDATES_AHEAD
-    taken, finer = answers[-1 - ahead], answers[-ahead:]
-    best, finest = max(answer.judged for answer in finer), finer[-1]
-    spacing = finest.grid_spacing if what == "targets" else finest.candidate_spacing
-    return f"{what} {picked:g} m apart cover {taken.judged:.2%}, finer ones down to {spacing:g} m at best {best:.2%}"
+        if good(found):
+            break
+    return tuple(answers)

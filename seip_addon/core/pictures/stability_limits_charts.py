@@ -157,8 +157,10 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
         style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
         panels[0].plot([c.decades for c in own], [c.lost for c in own], label=f"{what}, {method}", **style)
     panels[0].axhline(TIE, **LIMIT)
-    panels[0].set_yscale("symlog", linthresh=1e-15)
-    _name(panels[0], "powers of ten that they span", "largest share of the optimum lost; dashed: counts as equal")
+    panels[0].set_yscale("symlog", linthresh=1e-13)
+    panels[0].set_ylim(0, 10 * TIE)
+    panels[0].set_xticks(sorted({check.decades for check in study.spans}))
+    _name(panels[0], "powers of ten that they span", "largest loss; dashed: counts as equal")
     by = [check.by for check in study.ties]
     shares = np.array([(c.changed.value, *c.changed.interval) for c in study.ties]).T
     panels[1].errorbar(
@@ -190,8 +192,7 @@ def save_flat_top_chart(path: str | os.PathLike[str], tops: Sequence[tuple[str, 
     """Draw how many placements near the best share how many positions with it."""
     figure, panels = _figure(len(tops), title)
     for panel, (name, top) in zip(panels, tops, strict=True):
-        panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0])
-        panel.set_yscale("symlog", linthresh=1)
+        panel.bar_label(panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0]), fontsize=9)
         panel.set_xticks(range(len(top.in_common)))
         panel.set_title(f"{name}: {len(top):,}{'' if top.complete else ' and more'}", fontsize=10, color=INK)
         _name(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")

@@ -16,7 +16,6 @@ import shapely
 from ..arrays import Boolean, Float
 from ..convergence import (
     CANDIDATE_SPACINGS,
-    CANDIDATES_AHEAD,
     GRID_SPACINGS,
     JUDGED_ON,
     Answer,
@@ -435,7 +434,7 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
         ("grid spacing", study.by_grid, study.convergence.settings.grid_spacing),
         ("candidate spacing", study.by_candidates, study.convergence.settings.candidates.spacing),
     ):
-        finest = max(answer.judged for answer in tried[-CANDIDATES_AHEAD:])
+        finest = max(answer.judged for answer in tried)
         worst = min(tried, key=lambda answer: answer.judged)
         spacing = worst.grid_spacing if what == "grid spacing" else worst.candidate_spacing
         rows.append(
