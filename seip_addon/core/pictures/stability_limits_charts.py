@@ -41,8 +41,7 @@ def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, 
             panel.plot(deltas, radii, label=f"{height:g} m high", **style)
             panel.fill_between(deltas, radii, top, color=COLOURS[number], alpha=0.07)
         panel.axvline(delta, **LIMIT)
-        panel.set_xscale("log")
-        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _delta_axis(panel, study)
         panel.set_ylim(0, top)
         panel.set_title(f"{sensor}: above the line, coverage counts beams", fontsize=10, color=INK)
         _name(panel, "δ (m); dashed: asked for", "distance on a level road (m)")
@@ -89,8 +88,7 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
         strict=True,
     ):
         panel.axvline(delta, **LIMIT)
-        panel.set_xscale("log")
-        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _delta_axis(panel, study)
         panel.set_ylim(0, 1.03)
         _share_axis(panel)
         _name(panel, "δ (m) that the placement was made for", what)
@@ -203,6 +201,13 @@ def _figure(panels: int, title: str) -> tuple[Figure, Sequence[Axes]]:
     figure = Figure((max(6.5, 4.8 * panels), 4.6), dpi=150, facecolor=PAPER, layout="constrained")
     figure.suptitle(title, color=INK, fontsize=11)
     return figure, list(figure.subplots(1, panels, squeeze=False)[0])
+
+
+def _delta_axis(panel: Axes, study: CriterionStudy) -> None:
+    panel.set_xscale("log")
+    panel.minorticks_off()
+    panel.set_xticks(sorted({border.delta for border in study.borders})[::2])
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _share_axis(panel: Axes) -> None:
