@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -23,6 +24,7 @@ from headless import session, survey
 
 import bpy
 
+from seip_addon.core.convergence import coarsest_settings
 from seip_addon.core.goal import DEFAULT_COUNT, Goal, Plan, check_goal
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.survey import Circumstances, place, record_of
@@ -33,7 +35,8 @@ def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
     goal = _goal(options)
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
+    refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
+    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal), refine)
     layout, watch = surveyed.layout, surveyed.stopwatch
     plan = watch.run("placement", place(layout, surveyed.grid, goal))
     circumstances = Circumstances(datetime.now(UTC), watch.seconds, versions(blender=bpy.app.version_string))
@@ -101,6 +104,12 @@ def _parser() -> argparse.ArgumentParser:
     goal.add_argument("--min-distance", type=float, default=0.0, metavar="M", help="between two sensors")
     goal.add_argument("--forbid", nargs="+", default=[], metavar="POSITION", help="positions without sensor")
     goal.add_argument("--require", nargs="+", default=[], metavar="POSITION", help="positions with a sensor")
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="SHARE",
+        help="pick --grid and --spacing: the coarsest whose placement covers as much but for this share",
+    )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

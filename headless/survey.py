@@ -15,9 +15,11 @@ import bpy
 import numpy as np
 
 from seip_addon.core.candidates import CandidateSettings, heights_of
+from seip_addon.core.convergence import Convergence
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, finish
+from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site
 from seip_addon.core.survey import Layout, SurveySettings, lay_out, see
 from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
@@ -92,7 +94,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     work.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for each answer, in seconds")
 
 
-def survey(options: argparse.Namespace, check: Callable[[Site, dict[str, LidarModel]], None]) -> Survey:
+Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
+
+
+def survey(
+    options: argparse.Namespace, check: Callable[[Site, dict[str, LidarModel]], None], refine: Refine | None = None
+) -> Survey:
     """Read the scene, lay out its site, and find or compute its visibility grid.
 
     Parameters
@@ -101,6 +108,8 @@ def survey(options: argparse.Namespace, check: Callable[[Site, dict[str, LidarMo
         Of a parser with `add_options`.
     check : callable
         Called with the site and the models before any ray is cast: refuses what the site cannot do.
+    refine : callable, optional
+        Finds the spacings of targets and candidates.
 
     Returns
     -------
@@ -113,6 +122,9 @@ def survey(options: argparse.Namespace, check: Callable[[Site, dict[str, LidarMo
 
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
+    if refine is not None:
+        settings = watch.run("spacings", refine(reading.geometry, settings)).settings
+        session.say(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
     session.say(_in_words(layout.site))
     for sentence in layout.warnings:

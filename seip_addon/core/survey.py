@@ -26,6 +26,7 @@ from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
 from .visibility.ring_resolution import resolution_warnings
+from .visibility.rounding import rounding_warnings
 from .visibility.store import stored_visibility
 
 
@@ -47,6 +48,8 @@ class SurveySettings:
         ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
     time_limit : float, seconds
         For each answer.
+    spacings_because : str
+        Why the spacings of targets and candidates are what they are; empty where the user chose them.
     """
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
@@ -56,6 +59,7 @@ class SurveySettings:
     engine: Engine = "auto"
     solver: str = "auto"
     time_limit: float = 60.0
+    spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
         """Return the sensor types to choose from, by catalogue key.
@@ -78,6 +82,7 @@ class SurveySettings:
             "engine": self.engine,
             "solver": self.solver,
             "time_limit_s": self.time_limit,
+            "spacings_because": self.spacings_because,
         }
 
 
@@ -121,8 +126,8 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     """
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
-    resolution = resolution_warnings(site, models, settings.visibility)
-    return Layout(geometry, site, models, settings, (*warnings, *resolution))
+    limits = (*rounding_warnings(geometry), *resolution_warnings(site, models, settings.visibility))
+    return Layout(geometry, site, models, settings, (*warnings, *limits))
 
 
 def grid_key(layout: Layout) -> str:

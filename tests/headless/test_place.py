@@ -70,6 +70,15 @@ def test_the_same_run_gives_the_same_bytes(folder, tmp_path):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 
+def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path):
+    record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
+    settings = record["settings"]
+    assert "picked for a tolerance of 0.05" in settings["spacings_because"]
+    assert f"targets {settings['grid_spacing_m']:g} m apart" in settings["spacings_because"]
+    assert f"posts {settings['candidates']['spacing']:g} m apart" in settings["spacings_because"]
+    assert "spacings" in record["times"]["durations_s"]
+
+
 def test_another_goal_uses_the_stored_grid(folder, tmp_path):
     stored = tmp_path / "visibility.npz"
     stored.write_bytes((folder / "visibility.npz").read_bytes())

@@ -180,7 +180,8 @@ class Window:
         path = self.pictures / f"{name}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
         if shutil.which("import"):  # of X: Blender's own pictures are black where OpenGL is drawn in software
-            subprocess.run(["import", "-window", "root", "-resize", "1200x", "-colors", "255", f"PNG8:{path}"], check=True)  # noqa: S603, S607
+            shot = ["import", "-window", "root", "-resize", "1200x", "-colors", "255", f"PNG8:{path}"]
+            subprocess.run(shot, check=True)  # noqa: S603  # ImageMagick's, and our own path
         else:
             with bpy.context.temp_override(window=self.window):
                 bpy.ops.screen.screenshot(filepath=str(path))

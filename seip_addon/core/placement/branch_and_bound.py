@@ -172,7 +172,7 @@ def relative_price(instance: Instance, price: float) -> float:
     return round(price / (float(instance.price.max(initial=0.0)) or 1.0), 8)
 
 
-class _Search:
+class Search:
     """The walk over all placements in greedy order; what is wanted of them is up to `_take` and `_is_hopeless`."""
 
     def __init__(self, instance: Instance, goal: float) -> None:
@@ -334,7 +334,7 @@ def _sorted_node(
     return _Node(chosen, value, goal, followers[order], gains[order], multipliers)
 
 
-class _BestPlacements(_Search):
+class _BestPlacements(Search):
     """Lists the placements of largest coverage: a better one clears the list."""
 
     def __init__(self, instance: Instance, goal: float, most: int, bound: float) -> None:
@@ -366,7 +366,7 @@ class _BestPlacements(_Search):
         return False
 
 
-class _FirstInOrder(_Search):
+class _FirstInOrder(Search):
     """Keeps the first by merit, and cuts what is dearer or doubly covers less.
 
     What is covered once and what is covered twice are together a submodular

@@ -19,6 +19,7 @@ from .greedy import exchange, greedy_and_exchange, greedy_choices, tabu_search, 
 from .instance import Instance, make_instance
 from .integer_program import check_solver, reaching
 from .problem import Placement, PlacementProblem, record_choice
+from .scale_notes import scale_notes
 from .ties import MANY, canonical_optimum
 
 BRANCHING = 0.6
@@ -98,7 +99,8 @@ def solve(
     start = yield from starting_choice(problem, instance, solver)
     first = yield from greedy_and_exchange(instance, start)
     proof = yield from prove(instance, first, solver, clock)
-    chosen, notes = without_idle(instance, proof.chosen, instance.covered(proof.chosen)), []
+    chosen = without_idle(instance, proof.chosen, instance.covered(proof.chosen))
+    notes = [*scale_notes(problem)]
     if proof.optimal:
         chosen, settled = yield from canonical_optimum(instance, chosen, proof.ties, solver, clock)
         if not settled:

@@ -19,6 +19,7 @@ from .greedy import greedy, greedy_and_exchange, without_idle
 from .instance import Instance, common_unit, make_instance
 from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, record_choice, relative_gap
+from .scale_notes import scale_notes
 from .ties import fewest
 
 FINISH = 1.0
@@ -146,7 +147,7 @@ def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Plac
     )
     price = record.price
     optimal = bound >= price * (1 - 3 * TIE)
-    notes = []
+    notes = [*scale_notes(problem)]
     if not optimal:
         notes.append(
             "the time was too short to prove this placement the cheapest: the gap says how much dearer it may be"

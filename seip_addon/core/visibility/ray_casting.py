@@ -25,6 +25,10 @@ Engine = Literal["auto", "bvh", "embree"]
 # Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray
 # is then the same as on a longer ray.
 _BEYOND = 1 + 1e-6
+
+_NEEDLE = 1 / 300
+"""Height over longest side below which Embree's float32 distances are off by centimetres, though its hits are right."""
+
 MOST_THREADS = min(4, os.cpu_count() or 1)
 """That cast at once to advantage: the work between casts holds Python's lock for a part of the time."""
 
@@ -171,6 +175,8 @@ class EmbreeRayCaster:
         self._index, self._centre, corners = _rebased(triangles, keep)
         self._scene = EmbreeScene(robust=True)  # no leaks along shared edges
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32)) if len(corners) else None
+        self._needle = _needles(corners)
+        self._any_needle = bool(self._needle.any())
         self.cast(self._centre, np.array([[0.0, 0.0, 1.0]]), 1.0)  # builds the tree, before threads may ask for it
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
@@ -180,7 +186,12 @@ class EmbreeRayCaster:
         start = np.broadcast_to((origin - self._centre).astype(np.float32), directions.shape)
         reach = np.full(len(directions), max_range * _BEYOND, dtype=np.float32)
         hits = self._scene.run(np.ascontiguousarray(start), directions.astype(np.float32), dists=reach, output=True)
-        return _result(hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64), self._index, max_range)
+        distance, face = hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64)
+        if self._any_needle:
+            needle = np.flatnonzero((face >= 0) & self._needle[face])
+            met = self.triangles[self._index[face[needle]]]
+            distance[needle] = _to_plane(np.broadcast_to(origin, directions.shape)[needle], directions[needle], met)
+        return _result(distance, face, self._index, max_range)
 
 
 def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Float]:
@@ -210,6 +221,27 @@ def _rebased(triangles: Float, keep: Boolean | None) -> tuple[Integer, Float, Fl
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     index = np.flatnonzero(area > 0 if keep is None else (area > 0) & keep)
     return index, centre, corners[index]
+
+
+def _needles(corners: Float) -> Boolean:
+    """Return which triangles are far lower than they are long, (n,) bool."""
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
+    twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    thin: Boolean = twice_area < _NEEDLE * longest**2
+    return thin
+
+
+def _to_plane(start: Float, directions: Float, corners: Float) -> Float:
+    """Return the distances (n,) at which rays (n, 3) meet the planes of the triangles (n, 3, 3) that they hit."""
+    way = corners - start[:, None]
+    normal = np.cross(way[:, 1] - way[:, 0], way[:, 2] - way[:, 0])
+    along = (way * directions[:, None]).sum(axis=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (way[:, 0] * normal).sum(axis=1) / (directions * normal).sum(axis=1)
+    distance = np.where(np.isfinite(distance), distance, along.mean(axis=1))
+    met: Float = np.clip(distance, along.min(axis=1), along.max(axis=1))  # a ray that grazes meets no plane
+    return met
 
 
 def _result(distance: Float, face: Integer, index: Integer, max_range: float) -> tuple[Float, Integer]:

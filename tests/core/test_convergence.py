@@ -1,0 +1,175 @@
+"""The coarsest spacings within a tolerance, and the study of the criterion, on a small junction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from engines import ANY, needs_any
+from small_junction import make_geometry
+from synthetic_junction import rectangle
+
+from seip_addon.core import convergence
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.convergence import Answer, Judge, coarsest_settings
+from seip_addon.core.errors import SeipError
+from seip_addon.core.goal import Goal
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.pictures import stability_limits_charts as charts
+from seip_addon.core.progress import finish
+from seip_addon.core.stability.criterion import (
+    Draws,
+    criterion_rows,
+    criterion_study,
+    in_view,
+    ring_borders,
+    turned_targets,
+)
+from seip_addon.core.survey import SurveySettings
+from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.visibility.ring_resolution import unresolved_from
+
+GEOMETRY = make_geometry(24.0)
+SETTINGS = SurveySettings(candidates=CandidateSettings(sensors=("type2",), heights=(5.4,)), engine=ANY)
+
+
+def answers(judged: dict[float, float]):
+    """Stand in for answers: what they cover by spacing of the candidates."""
+
+    def answer(_, settings):
+        yield from ()
+        spacing = settings.candidates.spacing
+        value = judged[spacing]
+        return Answer(settings.grid_spacing, spacing, 100, 10, value, value)
+
+    return patch.object(Judge, "answer", answer)
+
+
+def picked(judged: dict[float, float], tolerance: float = 0.01) -> float:
+    with answers(judged):
+        return finish(coarsest_settings(GEOMETRY, SETTINGS, Goal(count=2), tolerance)).settings.candidates.spacing
+
+
+@needs_any
+def test_two_in_a_row_that_agree_by_luck_are_not_taken() -> None:
+    shares = (0.874, 0.874, 0.875, 0.892, 0.895, 0.891, 0.898)
+    assert picked(dict(zip(convergence.CANDIDATE_SPACINGS, shares, strict=True))) == 4.0
+
+
+@needs_any
+def test_the_coarsest_is_taken_where_nothing_is_gained_and_the_finest_where_all_gain() -> None:
+    assert picked(dict.fromkeys(convergence.CANDIDATE_SPACINGS, 0.5)) == 16.0
+    growing = {spacing: 0.5 + 0.05 * row for row, spacing in enumerate(convergence.CANDIDATE_SPACINGS)}
+    assert picked(growing) == convergence.CANDIDATE_SPACINGS[-1]
+
+
+@needs_any
+def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
+    goal, tolerance = Goal(count=2), 0.02
+    found = finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
+    assert found.settings.spacings_because == found.sentence
+    judge = Judge(GEOMETRY, SETTINGS, goal)
+    taken = finish(judge.answer(found.settings))
+    finest = finish(
+        judge.answer(replace(SETTINGS, grid_spacing=0.5, candidates=replace(SETTINGS.candidates, spacing=2.0)))
+    )
+    assert finest.judged - taken.judged <= tolerance
+    assert abs(taken.own - taken.judged) <= tolerance
+
+
+@needs_any
+@pytest.mark.parametrize(
+    ("goal", "tolerance", "words"),
+    [
+        (Goal(count=2), 0.0, "above 0 and below 1"),
+        (Goal(coverage=0.5), 0.01, "a number of sensors or a budget"),
+        (Goal(count=2, forbidden=("sidewalk 3",)), 0.01, "'sidewalk 3' is no pole"),
+    ],
+)
+def test_what_a_tolerance_cannot_do(goal: Goal, tolerance: float, words: str) -> None:
+    with pytest.raises(SeipError, match=words):
+        finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
+
+
+@needs_any
+def test_goals_that_no_spacing_can_meet_are_refused() -> None:
+    with pytest.raises(SeipError, match="positions"):
+        finish(coarsest_settings(GEOMETRY, SETTINGS, Goal(count=100_000), 0.01))
+
+
+@needs_any
+def test_lines_of_sight() -> None:
+    road = rectangle((-50, -5), (50, 5), step=10.0)
+    wall = np.array([[[10.0, -5, 0], [10, 5, 0], [10, 5, 20]], [[10, -5, 0], [10, 5, 20], [10, -5, 20]]])
+    model = load_catalogue()["type3"]
+    targets = np.array([[5.0, 0, 0], [20, 0, 0], [-20, 0, 0], [0.01, 0, 0], [-400, 0, 0]])
+    caster = make_ray_caster(np.concatenate([road, wall]), ANY)
+    assert in_view(caster, model, np.array([0.0, 0, 5]), targets[2:3]).all()
+    seen = in_view(caster, model, np.array([0.0, 0, 5]), targets)
+    assert not seen[1]  # behind the wall
+    assert not seen[3]  # below the lowest channel
+    assert not seen[4]  # out of range
+
+
+def test_borders_are_those_of_the_warning() -> None:
+    models = {"type1": load_catalogue()["type1"]}
+    for border in ring_borders(models, (3.5, 8.0), (0.5, 1.0), 80.0):
+        assert border.radius == unresolved_from(models["type1"], border.height, border.delta, 80.0)
+
+
+def test_turned_grids_cover_the_same_road() -> None:
+    plain = turned_targets(GEOMETRY, 1.0, np.zeros(2), 0.0)
+    turned = turned_targets(GEOMETRY, 1.0, np.array([0.3, 0.8]), 0.6)
+    assert len(turned) == pytest.approx(GEOMETRY.region.area, rel=0.02)
+    assert len(plain) == pytest.approx(GEOMETRY.region.area, rel=0.1)
+    gaps = np.linalg.norm(turned.xyz[:, None, :2] - turned.xyz[None, :50, :2], axis=2)
+    assert gaps[gaps > 0].min() == pytest.approx(1.0)
+
+
+def test_spreads_hold_the_true_one() -> None:
+    random = np.random.default_rng(0)
+    held = 0
+    for _ in range(200):
+        low, high = Draws("", random.normal(0, 2.0, 40)).spread_interval
+        held += low <= 2.0 <= high
+    assert held >= 180
+
+
+@needs_any
+def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
+    settings = SurveySettings(
+        candidates=CandidateSettings(sensors=("type2",), heights=(5.4,), spacing=12.0),
+        visibility=VisibilitySettings(0.5),
+        grid_spacing=1.0,
+        engine=ANY,
+    )
+    with (
+        patch("seip_addon.core.stability.criterion.DELTAS", (0.5, 2.0)),
+        patch("seip_addon.core.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
+        patch("seip_addon.core.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
+    ):
+        study = finish(criterion_study(GEOMETRY, settings, 2, tolerance=0.2, draws=8))
+    (by_ratio,) = study.by_ratio
+    inside = [s.value for edge, s in zip(by_ratio.ratios, by_ratio.seen, strict=False) if s and 0.25 <= edge < 1]
+    beyond = [s.value for edge, s in zip(by_ratio.ratios, by_ratio.seen, strict=False) if s and edge >= 1.5]
+    assert min(inside) > 0.95
+    assert max(beyond) < 0.8
+    fine, wide = study.by_delta
+    assert fine.coverage < wide.coverage <= 1
+    assert fine.moved == 0
+    assert study.azimuth.spread < 0.02
+    assert len(criterion_rows(study, 0.5)) == 7
+    for number, draw in enumerate(
+        (
+            lambda path: charts.save_ring_border_chart(path, study, 0.5, "rings"),
+            lambda path: charts.save_border_check_chart(path, study, "border"),
+            lambda path: charts.save_delta_chart(path, study, 0.5, "delta"),
+            lambda path: charts.save_convergence_chart(path, study, "convergence"),
+        )
+    ):
+        draw(tmp_path / f"{number}.png")
+        assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,149 @@
+"""Float32: both ray casters against float64 on hard scenes, and the warnings where it is too coarse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+import shapely
+from engines import each_engine, needs_embree
+from float64_rays import first_hits as plain_first_hits
+
+from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.pictures.stability_limits_charts import save_rounding_chart
+from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
+from seip_addon.core.stability.arithmetic import (
+    ArithmeticStudy,
+    arithmetic_rows,
+    check_grid,
+    check_hits,
+    tolerance_of,
+)
+from seip_addon.core.stability.float64_rays import first_hits
+from seip_addon.core.stability.hard_scenes import far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray
+from seip_addon.core.stability.shares import Share
+from seip_addon.core.survey import SurveySettings, lay_out
+from seip_addon.core.visibility import ray_casting
+from seip_addon.core.visibility.ray_casting import Engine
+from seip_addon.core.visibility.rounding import rounding_warnings
+
+SCENES = {scene.name: scene for scene in hard_scenes(1500, np.random.default_rng(1))}
+STREET = ordinary_scene(1500, np.random.default_rng(2))
+
+
+def truth(scene):
+    return first_hits(scene.origin, scene.directions, scene.triangles, tolerance_of(scene))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_reference_is_plain_arithmetic(name: str) -> None:
+    scene = SCENES[name]
+    few = scene.directions[:200]
+    found = first_hits(scene.origin, few, scene.triangles, tolerance_of(scene))
+    plain = plain_first_hits(scene.origin, few, scene.triangles)
+    same = np.isclose(found.distance, plain, rtol=1e-7, atol=0) | (found.distance == plain)
+    on_an_edge = ~np.isfinite(plain)  # plain arithmetic may let a ray slip through an edge
+    assert (same | on_an_edge).all()
+    assert found.allow(found.distance).all()
+
+
+@each_engine
+@pytest.mark.parametrize("name", SCENES)
+def test_hard_scenes_flip_no_hit_and_no_target(engine: Engine, name: str) -> None:
+    check = check_hits(SCENES[name], engine, truth(SCENES[name]))
+    assert check.flipped.count == 0
+    assert check.unexplained.count == 0
+    assert check_grid(SCENES[name], engine).outside.count == 0
+
+
+@needs_embree
+def test_without_float64_on_needles_embree_is_off() -> None:
+    with patch.object(ray_casting, "_NEEDLE", 0.0):
+        check = check_hits(SCENES["slivers"], "embree", truth(SCENES["slivers"]))
+    assert check.unexplained.count > 0
+
+
+@each_engine
+def test_without_a_common_middle_far_scenes_are_off(engine: Engine) -> None:
+    far, here = far_away(STREET, 1e6), truth(STREET)
+    assert check_hits(far, engine, here).flipped.count == 0
+
+    def where_it_is(triangles, keep):
+        return np.arange(len(triangles)), np.zeros(3), triangles
+
+    with patch.object(ray_casting, "_rebased", where_it_is):
+        assert check_hits(far, engine, here).flipped.count > 0
+
+
+@each_engine
+def test_where_the_tool_warns_float32_moves_hits(engine: Engine) -> None:
+    here = truth(STREET)
+    near, far = 3e3, 3e5
+    assert check_hits(stored_far_away(STREET, near), engine, here, kept_at=near).off < 1e-3
+    assert check_hits(stored_far_away(STREET, far), engine, here, kept_at=far).off > 1e-2
+    for distance, off in ((near, False), (far, True)):
+        scene = with_stray(STREET, distance)
+        assert (check_hits(scene, engine, truth(scene)).off > 1e-3) == off
+
+
+def geometry(triangles: np.ndarray, *strays: Mesh) -> SceneGeometry:
+    road = Mesh("carriageway", triangles)
+    region = shapely.box(*triangles.min(axis=(0, 1))[:2], *triangles.max(axis=(0, 1))[:2])
+    pole = Pole("pole", np.array([0.0, 6.0, 0.0]))
+    return SceneGeometry("street", np.zeros(3), (road,), (), strays, region, poles=(pole,))
+
+
+GROUND = np.array([[[-20.0, -4, 0], [20, -4, 0], [20, 4, 0]], [[-20, -4, 0], [20, 4, 0], [-20, 4, 0]]])
+
+
+def moved(x: float, y: float) -> np.ndarray:
+    return GROUND + np.array([x, y, 0.0])
+
+
+def test_scenes_near_their_origin_are_not_warned_of() -> None:
+    assert rounding_warnings(geometry(GROUND)) == ()
+    assert rounding_warnings(geometry(moved(4e3, -4e3))) == ()
+
+
+def test_a_scene_at_map_coordinates_is_warned_of() -> None:
+    (warning,) = rounding_warnings(geometry(moved(5e5, 5.3e6)))
+    assert "5,300,0" in warning
+    assert "move it to the origin" in warning
+
+
+def test_a_stray_mesh_is_warned_of_by_name() -> None:
+    stray = Mesh("left behind", moved(3e4, 0))
+    (warning,) = rounding_warnings(geometry(GROUND, stray))
+    assert "'left behind'" in warning
+    assert "30,0" in warning
+
+
+def test_a_survey_carries_the_warning() -> None:
+    settings = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))
+    plain = lay_out(geometry(GROUND), settings)
+    stray = lay_out(geometry(GROUND, Mesh("left behind", moved(3e4, 0))), settings)
+    assert [w for w in stray.warnings if "left behind" in w]
+    assert not [w for w in plain.warnings if "wide" in w]
+
+
+def test_rows_say_where_it_begins(tmp_path: Path) -> None:
+    here = truth(STREET)
+    engine: Engine = ray_casting.engine_name("auto")
+    plain = check_hits(STREET, engine, here)
+    far = check_hits(stored_far_away(STREET, 3e5), engine, here, 3e5, kept_at=3e5)
+    study = ArithmeticStudy((plain,), (replace(plain, distance=1e3),), (far,), (replace(plain, distance=1e3),), ())
+    rows = arithmetic_rows(study)
+    save_rounding_chart(tmp_path / "rounding.png", study, "float32")
+    assert (tmp_path / "rounding.png").read_bytes().startswith(b"\x89PNG")
+    assert "nowhere" in rows[1].begins
+    assert "over 1 cm from 300,000 m" in rows[2].begins
+
+
+@pytest.mark.parametrize(("count", "trials"), [(0, 1000), (3, 50), (50, 50)])
+def test_shares_hold_the_probability(count: int, trials: int) -> None:
+    low, high = Share(count, trials).interval
+    assert 0 <= low <= count / trials <= high <= 1
+    assert high - low > 0
