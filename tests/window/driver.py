@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -119,21 +119,28 @@ class Window:
         what : str
             Part of an operator's call or of a property's path: ``seip.solve_placement(``, ``seip.goal.count``.
         """
-        for page in range(2 * PAGES):  # as it is and further down, then from the top
-            if page == PAGES:
-                yield from self._scroll("WHEELUPMOUSE", 100)
-            elif page:
-                yield from self._scroll("WHEELDOWNMOUSE", 10)
-            region = self.region("UI")
-            for y in range(region.y + region.height - 4, region.y, -ROW):
-                for share in (0.75, 0.5, 0.2):  # a row may hold several
-                    place = (region.x + int(share * (region.width - 24)), y)
-                    yield from self._hover(place, BEAT / 2)
-                    if what in self._asked():
-                        yield from self._hover(place, 10 * BEAT)  # it may have been slow to notice the mouse
-                        if what in self._asked():
-                            return place
+        for columns in ((0.6,), (0.85, 0.2)):  # of the width: most rows hold one button, some several
+            for page in range(2 * PAGES):  # as it is and further down, then from the top
+                if page == PAGES:
+                    yield from self._scroll("WHEELUPMOUSE", 100)
+                elif page:
+                    yield from self._scroll("WHEELDOWNMOUSE", 10)
+                place = yield from self._find_here(what, columns)
+                if place:
+                    return place
         raise LookupError(f"there is no button {what} in the sidebar")
+
+    def _find_here(self, what: str, columns: Sequence[float]) -> Generator[float, None, tuple[int, int] | None]:
+        region = self.region("UI")
+        for y in range(region.y + region.height - 4, region.y, -ROW):
+            for share in columns:
+                place = (region.x + int(share * (region.width - 24)), y)
+                yield from self._hover(place, BEAT / 2)
+                if what in self._asked():
+                    yield from self._hover(place, 10 * BEAT)  # it may have been slow to notice the mouse
+                    if what in self._asked():
+                        return place
+        return None
 
     def _hover(self, place: tuple[int, int], seconds: float) -> Steps:
         self.event("MOUSEMOVE", "NOTHING", place)

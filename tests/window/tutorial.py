@@ -81,7 +81,7 @@ def _place(window: Window) -> Steps:
 
 
 def _look(window: Window) -> Steps:
-    yield from window.click("seip.colour_coverage(aspect='seen'")
+    yield from window.click("seip.colour_coverage(aspect='times'")
     yield from window.picture("6-coverage")
     yield from window.click("seip.look_from_sensor(")
     yield from window.picture("7-from-the-sensor")
