@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from seip_addon.core.candidates import CandidateSettings, lay_candidates
 from seip_addon.core.errors import SeipError
-from seip_addon.core.obstruction import winding_number
 from seip_addon.core.pavement_sampling import spread
 from seip_addon.core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 
@@ -155,13 +154,6 @@ def test_names_and_order_of_poles_change_no_place(order):
     one = lay_candidates(street(poles=poles), PLAIN)
     two = lay_candidates(street(poles=tuple(replace(poles[i], name=f"x{i}") for i in order)), PLAIN)
     assert one.xyz.tobytes() == two.xyz.tobytes()
-
-
-def test_winding_number_tells_inside_whatever_the_normals():
-    points = np.array([(0.5, 0.5, 0.5), (1.5, 0.5, 0.5), (0.9, 0.1, 0.2)])
-    cube = block((0, 0, 0), (1, 1, 1))
-    np.testing.assert_allclose(np.abs(winding_number(points, cube)), [1, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(np.abs(winding_number(points, cube[:, ::-1])), [1, 0, 1], atol=1e-12)
 
 
 @pytest.mark.parametrize(
