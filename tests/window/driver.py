@@ -24,10 +24,8 @@ Steps = Generator[float, None, None]
 
 ROW = 10
 """Pixels between two places that are asked: buttons are 20 high."""
-PAGES = 8
-"""Of the sidebar, at most."""
-HEADING = 32
-"""Pixels from a button down to the heading below it."""
+HEADING = 38
+"""Pixels from near the upper edge of a button down to the heading below it."""
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
 NAMES = dict(
@@ -120,15 +118,23 @@ class Window:
             Part of an operator's call or of a property's path: ``seip.solve_placement(``, ``seip.goal.count``.
         """
         for columns in ((0.6,), (0.85, 0.2)):  # of the width: most rows hold one button, some several
-            for page in range(2 * PAGES):  # as it is and further down, then from the top
-                if page == PAGES:
+            for start in ("as it is", "top"):
+                if start == "top":
                     yield from self._scroll("WHEELUPMOUSE", 100)
-                elif page:
+                scrolled = True
+                while scrolled:
+                    place = yield from self._find_here(what, columns)
+                    if place:
+                        return place
+                    before = self._height
                     yield from self._scroll("WHEELDOWNMOUSE", 10)
-                place = yield from self._find_here(what, columns)
-                if place:
-                    return place
+                    scrolled = self._height != before
         raise LookupError(f"there is no button {what} in the sidebar")
+
+    @property
+    def _height(self) -> float:
+        """How far the sidebar is scrolled."""
+        return float(self.region("UI").view2d.region_to_view(0, 0)[1])
 
     def _find_here(self, what: str, columns: Sequence[float]) -> Generator[float, None, tuple[int, int] | None]:
         region = self.region("UI")
@@ -155,6 +161,7 @@ class Window:
     def open_below(self, what: str) -> Steps:
         """Open the panel whose heading stands below a button."""
         x, y = yield from self.find(what)
+        yield from self._hover((x, y - HEADING), 10 * BEAT)
         yield from self.press("LEFTMOUSE", (x, y - HEADING))
         yield 0.5
 
