@@ -120,14 +120,14 @@ class Window:
         for columns in ((0.6,), (0.85, 0.2)):  # of the width: most rows hold one button, some several
             for start in ("as it is", "top"):
                 if start == "top":
-                    yield from self._scroll("WHEELUPMOUSE", 100)
+                    yield from self._scroll(-20)
                 scrolled = True
                 while scrolled:
                     place = yield from self._find_here(what, columns)
                     if place:
                         return place
                     before = self._height
-                    yield from self._scroll("WHEELDOWNMOUSE", 10)
+                    yield from self._scroll(1)
                     scrolled = self._height != before
         raise LookupError(f"there is no button {what} in the sidebar")
 
@@ -200,13 +200,12 @@ class Window:
             with bpy.context.temp_override(window=self.window):
                 bpy.ops.screen.screenshot(filepath=str(path))
 
-    def _scroll(self, way: str, count: int) -> Steps:
-        region = self.region("UI")
-        place = (region.x + region.width // 3, region.y + region.height - 12)  # on a panel: below all, it would zoom
-        self.event("MOUSEMOVE", "NOTHING", place)
-        yield BEAT
-        for _ in range(count):
-            self.event(way, "PRESS", place)
+    def _scroll(self, pages: int) -> Steps:
+        """Scroll the sidebar: not by the wheel, which scrolls a list where the mouse is over one."""
+        way = bpy.ops.view2d.scroll_down if pages > 0 else bpy.ops.view2d.scroll_up
+        with bpy.context.temp_override(window=self.window, area=self.area, region=self.region("UI")):
+            for _ in range(abs(pages)):
+                way(page=True)
         yield 0.3
 
     def _asked(self) -> str:

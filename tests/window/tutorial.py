@@ -103,6 +103,7 @@ def _save_and_reopen(window: Window) -> Steps:
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
     yield 1.5
     yield from window.open_sidebar("SEIP")
+    yield from window.press("NUMPAD_0")  # the camera's view
     assert _known() is None
     assert _scene().seip.result.record == record
     yield from window.open_below("seip.follow_sensors(")
