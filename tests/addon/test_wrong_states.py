@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import preferences, state
+from seip_addon import live, preferences, state
 from seip_addon.core.background import Background
 from seip_addon.operators import results, work
 from seip_addon.panels import incomplete
@@ -140,3 +140,14 @@ def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
     assert incomplete.MISSING == "shapely.lib"
     registration.unregister()
     assert not hasattr(bpy.types, "SEIP_PT_incomplete")
+
+
+def test_an_undo_is_followed(placed):
+    bpy.ops.ed.undo_push(message="placed")
+    bpy.ops.seip.follow_sensors()
+    bpy.ops.ed.undo_push(message="followed")
+    bpy.context.scene.cursor.location.x += 1.0
+    bpy.ops.ed.undo_push(message="something else")
+    bpy.ops.ed.undo()
+    assert bpy.app.timers.is_registered(live.look)
+    live.stop()
