@@ -7,6 +7,7 @@ those sensors alone and colours the road anew. Neither is there while this is of
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
@@ -71,8 +72,8 @@ def start(scene: bpy.types.Scene, known: state.Held, onlooker: Onlooker) -> None
     if known.plan is None or known.grid is None:
         raise RuntimeError("there is no placement to follow")
     following = Live(scene.session_uid, known, onlooker, _as_placed(known.plan.deployment, known.grid.visible))
-    bpy.app.handlers.depsgraph_update_post.append(_on_update)
-    bpy.app.handlers.load_pre.append(_on_load)
+    for event, handler in _handlers():
+        getattr(bpy.app.handlers, event).append(handler)
     look()
 
 
@@ -82,8 +83,8 @@ def stop() -> None:
     if following is None:
         return
     following = None
-    bpy.app.handlers.depsgraph_update_post.remove(_on_update)
-    bpy.app.handlers.load_pre.remove(_on_load)
+    for event, handler in _handlers():
+        getattr(bpy.app.handlers, event).remove(handler)
     if bpy.app.timers.is_registered(look):
         bpy.app.timers.unregister(look)
 
@@ -157,12 +158,32 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     moved = any(update.is_updated_transform and contract.SENSOR in update.id for update in objects)
     rebuilt = any(not (update.is_updated_transform or update.is_updated_geometry) for update in objects)
     if moved or rebuilt:
-        bpy.app.timers.register(look, first_interval=DELAY)
+        _look_soon()
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _on_undo(*_: object) -> None:
+    """Have a look at what an undo or redo brought back: Blender names no object."""
+    if not bpy.app.timers.is_registered(look):
+        _look_soon()
+
+
+def _look_soon() -> None:
+    bpy.app.timers.register(look, first_interval=DELAY)
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _on_load(*_: object) -> None:
     stop()
+
+
+def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
+    return (
+        ("depsgraph_update_post", _on_update),
+        ("undo_post", _on_undo),
+        ("redo_post", _on_undo),
+        ("load_pre", _on_load),
+    )
 
 
 CLASSES: tuple[type, ...] = ()

@@ -68,6 +68,7 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         name="Map",
         description="OpenDRIVE map, or site description that names one",
         subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     junctions: CollectionProperty(type=SEIP_PG_junction)
     junction: StringProperty(
@@ -380,6 +381,7 @@ class SEIP_PG_result(SEIP_PG_placement):
         description="Where the result is written; // is the folder of the .blend",
         subtype="DIR_PATH",
         default="//seip-result/",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     render: BoolProperty(
         name="Rendered View", description="Render a view of the scene as well, which takes a minute", default=False

@@ -41,7 +41,7 @@ def register() -> None:
     """Register all parts, or say in the sidebar what they lack."""
     try:
         parts = [importlib.import_module(f".{name}", __package__) for name in PARTS]
-    except ModuleNotFoundError as error:
+    except ImportError as error:
         parts = [_incomplete(error)]
     for part in parts:
         for one in part.CLASSES:
@@ -61,8 +61,8 @@ def unregister() -> None:
             bpy.utils.unregister_class(one)
 
 
-def _incomplete(error: ModuleNotFoundError) -> ModuleType:
-    """Return the part that stands in for all others where a package is missing."""
+def _incomplete(error: ImportError) -> ModuleType:
+    """Return the part that stands in for all others where a package is missing or broken."""
     part = importlib.import_module(".panels.incomplete", __package__)
     part.MISSING = error.name or str(error)  # type: ignore[attr-defined]  # the panel's one fact
     return part

@@ -23,6 +23,7 @@ from .core.errors import SeipError
 from .core.goal import Plan
 from .core.progress import Progress
 from .core.results.placement_record import Record
+from .core.storage import check_folder
 from .core.survey import Layout, SurveySettings, grid_key, lay_out, restored_plan, see
 from .core.visibility.estimate import Estimate
 from .core.visibility.grid import VisibilityGrid
@@ -82,6 +83,8 @@ class Running:
     work : Background
     began : float
         Reading of `time.monotonic`.
+    timer : bpy.types.Timer or None
+        Has somebody look at it from time to time.
     stop : bool
         Whether somebody asked to stop it.
     """
@@ -89,6 +92,7 @@ class Running:
     operator: str
     work: Background[Any]
     began: float = field(default_factory=time.monotonic)
+    timer: bpy.types.Timer | None = None
     stop: bool = False
 
 
@@ -117,10 +121,26 @@ def scene_of(number: int) -> bpy.types.Scene:
     raise SeipError("the scene that this was computed for is gone: nothing was written")
 
 
+NEWER = "This file was saved by a newer version of SEIP: install that version to go on."
+LINKED = "This scene is linked from another file: open that file to work on it."
+
+
+def is_linked(scene: bpy.types.Scene) -> bool:
+    """Return whether a scene belongs to another file: nothing can be written into it."""
+    return scene.library is not None
+
+
+def is_newer(scene: bpy.types.Scene) -> bool:
+    """Return whether a newer add-on saved the scene: nobody here knows what its record looks like."""
+    return bool(scene.seip.version > VERSION)
+
+
 def obstacle(scene: bpy.types.Scene) -> str:
     """Return why nothing can be computed for a scene, in a sentence for panels and buttons alike; empty if it can."""
-    if scene.seip.version > VERSION:
-        return "This file was saved by a newer version of SEIP: install that version to go on."
+    if is_linked(scene):
+        return LINKED
+    if is_newer(scene):
+        return NEWER
     for name, what in ((contract.REGION, "region"), (contract.ROADS, "road")):
         if not contract.has_members(scene, name):
             return f"There is no {what}: put a mesh into the collection {name!r}."
@@ -170,6 +190,7 @@ def seen(known: Held) -> Generator[Progress, None, VisibilityGrid]:
     began = time.perf_counter()
     key = grid_key(known.layout)
     if known.grid is None or known.grid.key != key:
+        _check_cache()
         known.grid = yield from see(known.layout, grid_file(key), threads=preferences.cores())
         known.durations["visibility"] = time.perf_counter() - began
     return known.grid
@@ -188,6 +209,14 @@ def answered(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
     if not text:
         raise SeipError("there is no placement yet: place sensors first")
     return _answered(survey(scene), text)
+
+
+def _check_cache() -> None:
+    """See that visibility can be kept, and say where the folder is set if it cannot."""
+    try:
+        check_folder(preferences.cache_folder())
+    except SeipError as error:
+        raise SeipError(f"{error} as Cache in the add-on's preferences") from error
 
 
 def grid_file(key: str) -> Path:

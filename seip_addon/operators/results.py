@@ -39,13 +39,17 @@ class ForPlacement:
 
 
 def no_placement(scene: bpy.types.Scene) -> str:
-    """Say that there is no placement yet; empty if there is one."""
+    """Say that there is no placement that can be shown; empty if there is one."""
+    if state.is_newer(scene):
+        return state.NEWER
     return "" if scene.seip.result.record else "There is no placement yet: place sensors first."
 
 
 def no_folder(scene: bpy.types.Scene) -> str:
     """Say where the result would be written if the file were saved; empty if it can be."""
     folder = scene.seip.result.folder
+    if not folder:
+        return "Name a folder to write the result to."
     if bpy.data.filepath or not folder.startswith("//"):
         return ""
     return f"Save the file first: the result is written to {folder[2:] or 'the folder'} beside it."

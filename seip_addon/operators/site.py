@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from .. import sensor_types
+from .. import sensor_types, state
 from ..core.errors import SeipError
 from ..core.opendrive import read_map
 from ..core.opendrive.road_map import RoadMap
@@ -152,12 +152,20 @@ class _RoleOperator:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether anything is selected."""
-        if not context.selected_objects:
-            cls.poll_message_set(NOTHING_SELECTED)
-        return bool(context.selected_objects)
+        reason = why_no_role(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
 
 NOTHING_SELECTED = "Select objects first"
+
+
+def why_no_role(context: bpy.types.Context) -> str:
+    """Say why no role can be given or taken, or nothing."""
+    if state.is_linked(context.scene):
+        return state.LINKED
+    return "" if context.selected_objects else NOTHING_SELECTED
 
 
 class SEIP_OT_assign_role(_RoleOperator, bpy.types.Operator):
@@ -222,9 +230,12 @@ class SEIP_OT_add_area(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether objects can be added."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave Edit Mode first")
-        return bool(context.mode == "OBJECT")
+        reason = state.LINKED if state.is_linked(context.scene) else ""
+        if not reason and context.mode != "OBJECT":
+            reason = "Leave Edit Mode first"
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
         """Take the size from the view where the area is laid there."""

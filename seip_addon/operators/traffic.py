@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import preferences, scans
+from .. import preferences, scans, state
 from ..core.errors import SeipError
 from ..core.progress import Progress, finish
 from ..core.recording import RecordingSettings, make_run, record, simulation_of
@@ -27,6 +27,13 @@ from .work import LongWork, Outcome, Result
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 NO_SENSORS = "There is no sensor to scan with: place sensors first."
+
+
+def why_no_load(scene: bpy.types.Scene) -> str:
+    """Return why no traffic can be loaded; nothing where it can."""
+    if state.is_linked(scene):
+        return state.LINKED
+    return "" if scene.seip.traffic.file else NO_FILE
 
 
 def why_no_scan(scene: bpy.types.Scene) -> str:
@@ -59,9 +66,10 @@ class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether there is a file to read."""
-        if not context.scene.seip.traffic.file:
-            cls.poll_message_set(NO_FILE)
-        return bool(context.scene.seip.traffic.file)
+        reason = why_no_load(context.scene)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
         """Read the scene that the traffic is to stand on."""

@@ -106,7 +106,9 @@ _items: list[tuple[str, str, str]] = []
 
 def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
     there = placed_sensors(context.scene) if context else {}
-    _items[:] = [(label, label, thing.name) for label, thing in there.items()] or [("", "None", "Place sensors first")]
+    _items[:] = [(label, label, thing.name) for label, thing in there.items()] or [
+        ("NONE", "None", "Place sensors first")
+    ]
     return _items
 
 
@@ -174,7 +176,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operato
         path = _free(_named(settings.picture))
         if settings.picture_of == "VIEW":
             area = getattr(self, "_area", None) or bpy.context.area
-            if bpy.app.background or area is None or area.type != "VIEW_3D":
+            if bpy.app.background or area not in _viewports():
                 raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
             save_viewport_sheet(path, scene, area, result)
         else:
@@ -225,10 +227,19 @@ def _plan(held: state.Held) -> Plan:
     return held.plan
 
 
+def _viewports() -> list[bpy.types.Area]:
+    """Return the 3D viewports that are open: one may have been closed since a picture was asked for."""
+    areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
+    return [area for area in areas if area.type == "VIEW_3D"]
+
+
 def _named(text: str) -> Path:
     if text.startswith("//") and not bpy.data.filepath:
         raise SeipError(f"the picture {text} is beside the file, and the file has not been saved: save it first")
-    return Path(bpy.path.abspath(text)).with_suffix(".png")
+    path = Path(bpy.path.abspath(text))
+    if not path.name or path.is_dir():
+        raise SeipError("name a file for the picture, not a folder")
+    return path.with_suffix(".png")
 
 
 def _free(path: Path) -> Path:

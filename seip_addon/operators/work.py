@@ -20,11 +20,14 @@ PERIOD = 0.1
 
 
 def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
-    """Do something, and report a user's mistake instead of raising it."""
+    """Do something, and report a user's mistake, or a package that is gone, instead of raising it."""
     try:
         work()
     except SeipError as error:
         operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    except ImportError as error:  # some come only when they are needed
+        operator.report({"ERROR"}, f"a package of the extension is missing or broken ({error}): install its zip again")
         return {"CANCELLED"}
     return {"FINISHED"}
 
@@ -96,15 +99,21 @@ class LongWork(Generic[Result]):
             raise SeipError("other work is under way: wait for it, or stop it with Esc")
         self._scene = context.scene.session_uid
         self._running = state.running = state.Running(self.bl_idname, Background(self.prepare(context.scene)))
-        self._timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
+        self._running.timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
         context.window_manager.modal_handler_add(self)
 
     def _end(self, context: bpy.types.Context) -> None:
-        self._running.work.stop()
-        context.window_manager.event_timer_remove(self._timer)
-        if state.running is self._running:
-            state.running = None
+        _put_away(self._running)
         _redraw(context)
+
+
+def _put_away(running: state.Running) -> None:
+    running.work.stop()
+    if running.timer is not None:
+        bpy.context.window_manager.event_timer_remove(running.timer)
+        running.timer = None
+    if state.running is running:
+        state.running = None
 
 
 def _redraw(context: bpy.types.Context) -> None:
@@ -136,3 +145,9 @@ class SEIP_OT_stop(bpy.types.Operator):
 
 
 CLASSES = (SEIP_OT_stop,)
+
+
+def detach() -> None:
+    """Stop what is under way: Blender drops its operator with the add-on, and asks it nothing."""
+    if state.running is not None:
+        _put_away(state.running)

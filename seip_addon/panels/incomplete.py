@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .sentence import draw_sentence
 from .sidebar import Sidebar
 
 MISSING = ""
@@ -18,11 +19,8 @@ class SEIP_PT_incomplete(Sidebar, bpy.types.Panel):
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the one sentence and the cure."""
-        column = self.layout.column(align=True)
-        column.alert = True
-        column.label(text=f"The package {MISSING!r} is missing.", icon="ERROR")
-        column.label(text="Install the extension's zip again:")
-        column.label(text="it carries all that it needs.")
+        sentence = f"The package {MISSING!r} is missing or broken. Install the extension's zip again: it carries all."
+        draw_sentence(self.layout, sentence, icon="ERROR", alert=True)
 
 
 CLASSES = (SEIP_PT_incomplete,)

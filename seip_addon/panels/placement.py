@@ -7,6 +7,7 @@ import bpy
 from .. import state
 from ..core.results.placement_record import Record
 from ..operators.placement import SEIP_OT_solve_placement
+from ..operators.results import no_placement
 from .run_button import draw_run
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -59,7 +60,7 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         if obstacle:
             draw_sentence(layout, obstacle, icon="ERROR")
         draw_run(layout, SEIP_OT_solve_placement.bl_idname)
-        if scene.seip.result.record:
+        if not no_placement(scene):
             _draw_answer(layout, state.record_of(scene.seip.result.record), state.doubt(scene))
 
 

@@ -87,7 +87,7 @@ class _Result(Sidebar):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether there is a placement."""
-        return bool(context.scene.seip.result.record)
+        return not results.no_placement(context.scene)
 
 
 class SEIP_PT_results(Sidebar, bpy.types.Panel):

@@ -6,7 +6,6 @@ import bpy
 
 from ..core.streetscape.parts import Role
 from ..operators.site import (
-    NOTHING_SELECTED,
     SEIP_OT_add_area,
     SEIP_OT_assign_role,
     SEIP_OT_build_site,
@@ -16,6 +15,7 @@ from ..operators.site import (
     SEIP_OT_take_out_of_role,
     has_site,
     missing_for_build,
+    why_no_role,
 )
 from ..properties import SEIP_PG_problem, SEIP_PG_site
 from ..scene import roles
@@ -85,8 +85,9 @@ class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator(SEIP_OT_assign_role.bl_idname, icon="ADD").role = site.role
         row.operator(SEIP_OT_take_out_of_role.bl_idname, icon="REMOVE").role = site.role
-        if not context.selected_objects:
-            draw_sentence(layout, NOTHING_SELECTED, icon="INFO")
+        reason = why_no_role(context)
+        if reason:
+            draw_sentence(layout, reason, icon="INFO")
         if Role[site.role] in roles.AREAS:
             row = layout.row(align=True)
             for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):

@@ -6,11 +6,11 @@ import bpy
 
 from .. import scans
 from ..operators.traffic import (
-    NO_FILE,
     SEIP_OT_clear_traffic,
     SEIP_OT_load_traffic,
     SEIP_OT_scan_frame,
     SEIP_OT_write_dataset,
+    why_no_load,
     why_no_scan,
 )
 from .run_button import draw_run
@@ -33,8 +33,9 @@ class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
         if traffic.file and not traffic.file.lower().endswith(".npz"):
             column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
             column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
-        if not traffic.file:
-            draw_sentence(layout, NO_FILE, icon="INFO")
+        reason = why_no_load(context.scene)
+        if reason:
+            draw_sentence(layout, reason, icon="INFO")
         row = layout.row(align=True)
         draw_run(row, SEIP_OT_load_traffic.bl_idname)
         row.operator(SEIP_OT_clear_traffic.bl_idname, text="", icon="TRASH")

@@ -62,6 +62,15 @@ def find_or_make(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return collection
 
 
+def leave_shared(scene: bpy.types.Scene, name: str) -> None:
+    """Unlink a scene's collection of that name where other scenes have it too, as after Blender's Linked Copy."""
+    top = scene.collection.children
+    shared = find(scene, name)
+    others = (other for other in bpy.data.scenes if other != scene)
+    if shared is not None and shared.name in top and any(find(other, name) == shared for other in others):
+        top.unlink(shared)
+
+
 def has_members(scene: bpy.types.Scene, name: str) -> bool:
     """Return whether a collection that is read holds any object."""
     return any(kind(collection) == name and len(collection.all_objects) > 0 for collection in _reached(scene))

@@ -203,7 +203,8 @@ def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
     """Return an object's triangles, or None where it has no faces to give."""
     if evaluated.type not in _SURFACES:
         return None
-    mesh = evaluated.data if evaluated.type == "MESH" else evaluated.to_mesh()
+    is_copied = evaluated.type != "MESH" or evaluated.data.is_editmode  # Edit Mode keeps its own mesh, and shows none
+    mesh = evaluated.to_mesh() if is_copied else evaluated.data
     if mesh is None or not len(mesh.loop_triangles):
         return None
     corners = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
@@ -212,7 +213,7 @@ def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
     mesh.vertices.foreach_get("co", places)
     material = np.empty(len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("material_index", material)
-    if evaluated.type != "MESH":
+    if is_copied:
         evaluated.to_mesh_clear()
     triangles = places.reshape(-1, 3).astype(np.float64)[corners].reshape(-1, 3, 3)
     return _Faces(triangles, material.astype(np.int64))

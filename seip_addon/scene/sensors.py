@@ -46,8 +46,7 @@ def read_sensors(scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel]) ->
     if not empties:
         hidden = f"; {len(members)} hidden ones do not count" * bool(members)
         raise SeipError(
-            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{hidden}: "
-            "place some with headless/place.py"
+            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{hidden}: place some first"
         )
     labels = _labels(empties)
     sensors = [_mounted(thing, labels[thing.name], catalogue) for thing in empties]

@@ -51,6 +51,8 @@ def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> 
     deployment : Deployment
         The chosen sensors and what they see.
     """
+    for name in (contract.SENSORS, contract.COVERAGE):
+        contract.leave_shared(scene, name)
     clear_result(scene)
     _write_sensors(contract.find_or_make(scene, contract.SENSORS), deployment.sensors)
     _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)

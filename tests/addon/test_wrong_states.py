@@ -1,0 +1,153 @@
+"""What the add-on says where something is not as it should be: one sentence, and no traceback."""
+
+import builtins
+import json
+from pathlib import Path
+
+import bpy
+import pytest
+
+from seip_addon import live, preferences, state
+from seip_addon.core.background import Background
+from seip_addon.operators import results, work
+from seip_addon.panels import incomplete
+from seip_addon.scene import contract
+from seip_addon.scene.sensors import placed_sensors
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+
+
+@pytest.fixture
+def scene(add_on):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
+    survey = bpy.context.scene.seip.survey
+    survey.heights, survey.grid, survey.spacing = "8", 4.0, 12.0
+    return bpy.context.scene
+
+
+@pytest.fixture
+def placed(scene):
+    scene.seip.goal.count = 2
+    bpy.ops.seip.solve_placement()
+    return scene
+
+
+@pytest.fixture
+def linked(add_on):
+    with bpy.data.libraries.load(str(SCENE), link=True) as (theirs, ours):
+        ours.scenes = theirs.scenes
+    own = bpy.context.scene
+    bpy.context.window.scene = next(scene for scene in bpy.data.scenes if scene.library is not None)
+    yield bpy.context.scene
+    bpy.context.window.scene = own
+
+
+@pytest.mark.parametrize("button", ["compute_visibility", "solve_placement", "add_area", "assign_role", "load_traffic"])
+def test_a_linked_scene_is_not_written_into(linked, button):
+    with pytest.raises(RuntimeError, match="linked from another file"):
+        getattr(bpy.ops.seip, button)()
+
+
+def test_an_object_in_edit_mode_counts_as_it_is_shown_there(scene):
+    bpy.ops.seip.compute_visibility()
+    key = state.find(scene).grid.key
+    bpy.context.view_layer.objects.active = bpy.data.objects["Building 1"]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.seip.compute_visibility()
+    assert state.find(scene).grid.key == key
+
+
+def test_a_record_of_a_newer_version_is_not_shown(placed):
+    placed.seip.result.record = json.dumps({"what": "nobody knows"})
+    assert not results.no_placement(placed)
+    placed.seip.version = state.VERSION + 1
+    assert "newer version" in results.no_placement(placed)
+
+
+@pytest.mark.parametrize("picture", ["", "/", "{folder}/"])
+def test_a_picture_needs_a_name(placed, tmp_path, picture):
+    placed.seip.view.picture = picture.format(folder=tmp_path)
+    with pytest.raises(RuntimeError, match="name a file for the picture"):
+        bpy.ops.seip.save_picture()
+
+
+def test_an_export_needs_a_folder(placed):
+    placed.seip.result.folder = ""
+    with pytest.raises(RuntimeError, match="Name a folder"):
+        bpy.ops.seip.export_result()
+
+
+def test_a_cache_that_cannot_be_written_is_named_before_anything_is_cast(scene, tmp_path, monkeypatch):
+    file = tmp_path / "file"
+    file.touch()
+    monkeypatch.setattr(preferences, "cache_folder", lambda: file)
+    with pytest.raises(RuntimeError, match=r"cannot write to .*file.* as Cache in the add-on's preferences"):
+        bpy.ops.seip.compute_visibility()
+
+
+def test_a_package_that_is_gone_is_named(placed, tmp_path, monkeypatch):
+    come = builtins.__import__
+
+    def gone(name, *rest, **more):
+        if name.startswith("PIL"):
+            raise ModuleNotFoundError("No module named 'PIL'", name="PIL")
+        return come(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", gone)
+    placed.seip.view.picture, placed.seip.view.picture_of = str(tmp_path / "picture"), "RENDER"
+    with pytest.raises(RuntimeError, match=r"No module named 'PIL'.*install its zip again"):
+        bpy.ops.seip.save_picture()
+
+
+def test_a_linked_copy_of_a_scene_gets_sensors_of_its_own(placed):
+    before = dict(placed_sensors(placed))
+    copy = placed.copy()
+    copy.seip.goal.count = 1
+    with bpy.context.temp_override(scene=copy, view_layer=copy.view_layers[0]):
+        bpy.ops.seip.solve_placement()
+    assert placed_sensors(placed) == before
+    assert len(before) == 2
+    assert len(placed_sensors(copy)) == 1
+    assert contract.find(copy, contract.COVERAGE) != contract.find(placed, contract.COVERAGE)
+
+
+def endless():
+    while True:
+        yield state.Progress(0, 0, "endless")
+
+
+def test_work_under_way_ends_with_the_add_on(add_on):
+    running = state.running = state.Running("seip.check_site", Background(endless()))
+    running.timer = bpy.context.window_manager.event_timer_add(1.0, window=bpy.context.window)
+    work.detach()
+    assert state.running is None
+    assert running.timer is None
+    assert running.work.join(5.0)
+
+
+def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
+    from seip_addon import registration  # noqa: PLC0415  # registered here by hand
+
+    def broken(name, package=None):
+        if name == ".properties":
+            raise ImportError("libgeos.so: cannot open shared object file", name="shapely.lib")
+        return come(name, package)
+
+    come = registration.importlib.import_module
+    monkeypatch.setattr(registration.importlib, "import_module", broken)
+    registration.register()
+    assert hasattr(bpy.types, "SEIP_PT_incomplete")
+    assert incomplete.MISSING == "shapely.lib"
+    registration.unregister()
+    assert not hasattr(bpy.types, "SEIP_PT_incomplete")
+
+
+def test_an_undo_is_followed(placed):
+    bpy.ops.ed.undo_push(message="placed")
+    bpy.ops.seip.follow_sensors()
+    bpy.ops.ed.undo_push(message="followed")
+    bpy.context.scene.cursor.location.x += 1.0
+    bpy.ops.ed.undo_push(message="something else")
+    bpy.ops.ed.undo()
+    assert bpy.app.timers.is_registered(live.look)
+    live.stop()
