@@ -1,0 +1,28 @@
+"""A row of the page of stability: one method in one regime."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Row:
+    """Where one method begins to fail.
+
+    Parameters
+    ----------
+    method : str
+        What was driven to where it fails.
+    regime : str
+        What was turned up until it failed.
+    begins : str
+        Where it begins to fail, with units and the interval of the estimate.
+    how : str
+        How that was found.
+    answer : str
+        What the tool does about it.
+    """
+
+    method: str
+    regime: str
+    begins: str
+    how: str
+    answer: str
