@@ -6,6 +6,7 @@ about z as those of an upright sensor are; only rays go out in the site's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,11 +51,20 @@ class Onlooker:
         (t,) bool
             The same as a full scan's.
         """
-        turned = _TurnedCaster(self._caster, xyz, orientation)
-        place = Place(turned, np.zeros(3), 0.0, [model], self._settings.delta, self._settings.min_intensity)
-        seen, _ = seen_by_near_rays(place, turned_surfaces(self._surfaces, xyz, orientation))
-        only: Boolean = seen[0]
+        only: Boolean = self.see_all([model], xyz, orientation)[0]
         return only
+
+    def see_all(self, models: Sequence[LidarModel], xyz: Float, orientation: Float) -> Boolean:
+        """Find which targets sensors of several models see from one place, sharing rays; see `see`.
+
+        Returns
+        -------
+        (models, t) bool
+        """
+        turned = _TurnedCaster(self._caster, xyz, orientation)
+        place = Place(turned, np.zeros(3), 0.0, models, self._settings.delta, self._settings.min_intensity)
+        seen, _ = seen_by_near_rays(place, turned_surfaces(self._surfaces, xyz, orientation))
+        return seen
 
 
 def onlooker(site: Site, settings: VisibilitySettings, engine: Engine = "auto") -> Onlooker:
