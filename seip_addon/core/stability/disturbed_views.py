@@ -47,9 +47,11 @@ class DisturbedViews:
         """Return what one pose sees in each draw, (n, t) bool."""
         return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
 
-    def pick(self, poses: Integer | list[int]) -> DisturbedViews:
-        """Return the views of some of the poses."""
-        return DisturbedViews(self.packed[:, poses], self.targets)
+    def spread_to(self, poses: Integer, number: int) -> DisturbedViews:
+        """Return views of that many poses, of which these are ``poses`` and the others see nothing."""
+        packed = np.zeros((len(self), number, self.packed.shape[2]), dtype=np.uint8)
+        packed[:, poses] = self.packed
+        return DisturbedViews(packed, self.targets)
 
 
 def disturbed_views(
