@@ -9,8 +9,8 @@ With K scenarios of pose errors, V of each known for every candidate,
 
 X being the placements of the problem (number, budget, one sensor per position,
 mandatory and forbidden places, least distance) and P that of `risk`. The
-expectation is the maximal covering location problem of K × t targets and is
-solved as such. For all else, any p in P gives an upper bound,
+expectation is the maximal covering location problem of K × t targets. Any p in P
+gives an upper bound,
 
 .. math::
     \max_{x \in X} T(x) \le \max_{x \in X} F_p(x),
@@ -18,13 +18,19 @@ solved as such. For all else, any p in P gives an upper bound,
 of which p = 1/K says that nothing exceeds the largest expectation. A p with a
 small bound comes of fictitious play (Brown 1951): placements answer the mean of
 the scenarios that were worst for the placements before. Branch and bound on F_p
-then proves the best T (`robust_search`).
+then proves the best T (`robust_search`), where it comes to an end. Another bound
+knows each scenario beforehand (Madansky 1960), and takes K problems of t targets:
+
+.. math::
+    \max_{x \in X} T(x) \le \min_{p \in P} \sum_k p_k \max_{x \in X} f_k(x),
+
+the mean of the m smallest of the K largest coverages.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,13 +42,20 @@ from ..placement.clock import Clock
 from ..placement.feasibility import starting_choice
 from ..placement.instance import Instance, common_unit, make_instance, merge_targets
 from ..placement.problem import TIE, relative_gap
-from ..progress import Progress
+from ..progress import Progress, within
 from .disturbed_views import DisturbedViews
 from .risk import Risk
 from .robust_search import CountedCover, RobustSearch, exchanged
 
 ROUNDS = 16
 """Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
+
+
+FORESEEING = 0.5
+"""Share of the time for the problems of single scenarios."""
+
+LEAST_SECONDS = 1.0
+"""For what comes after them, however slow they were."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +84,7 @@ def solve_robust(
     *,
     solver: str = "highs",
     time_limit: float = 60.0,
+    foreseen: Sequence[Placement] | None = None,
 ) -> Generator[Progress, None, RobustPlacement]:
     """Choose the placement that has the least to fear.
 
@@ -86,6 +100,8 @@ def solve_robust(
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds
         After it the best placement found is returned with its bound and gap.
+    foreseen : sequence of Placement, optional
+        See `foresee`; found within the time limit if not given.
 
     Yields
     ------
@@ -107,11 +123,79 @@ def solve_robust(
         raise SeipError(f"{risk.in_words()} needs at least {risk.least_sensors} sensors, not {most}; allow more")
     different = _without_copies(scenarios)
     plain = risk.seen_by == 1 and risk.failure == "none"
-    if plain and (risk.tail == 1 or len(different) == 1):
-        placement = yield from _expected(problem, different, solver, time_limit)
-    else:
-        placement = yield from _searched(problem, different, risk, solver, time_limit)
+    if plain and len(different) == 1:
+        placement = yield from solve(
+            replace(problem, visible=different.seen(0)), solver=solver, time_limit=time_limit
+        )
+        placement = replace(placement, covered=_covered(problem, placement.chosen))
+        return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
+    clock = Clock(time_limit)
+    if foreseen is None:
+        foreseen = yield from foresee(problem, different, solver=solver, time_limit=FORESEEING * time_limit)
+    placement = yield from _searched(problem, different, risk, solver, max(clock.left, LEAST_SECONDS))
+    placement = _with_foresight(problem, different, risk, placement, foreseen)
+    placement = replace(placement, seconds=clock.elapsed)
     return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
+
+
+def foresee(
+    problem: PlacementProblem, scenarios: DisturbedViews, *, solver: str = "highs", time_limit: float = 60.0
+) -> Generator[Progress, None, tuple[Placement, ...]]:
+    """Solve each scenario as if it were known that it comes: no placement does better there.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+    scenarios : DisturbedViews
+    solver : str
+    time_limit : float, seconds
+        For all of them.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    tuple of Placement
+        One for each scenario; one alone where all are the same.
+    """
+    scenarios = _without_copies(scenarios)
+    found = []
+    for scenario in range(len(scenarios)):
+        here = Progress(scenario, len(scenarios), "solving each scenario by itself")
+        yield here
+        alone = replace(problem, visible=scenarios.seen(scenario))
+        found.append((yield from within(here, solve(alone, solver=solver, time_limit=time_limit / len(scenarios)))))
+    return tuple(found)
+
+
+def _with_foresight(
+    problem: PlacementProblem,
+    scenarios: DisturbedViews,
+    risk: Risk,
+    placement: Placement,
+    foreseen: Sequence[Placement],
+) -> Placement:
+    """Lower the bound to what foresight could reach, and take a scenario's own placement where that is better."""
+    value, chosen = placement.objective, placement.chosen
+    for other in foreseen:
+        reached = risk.of(outcomes_of(problem, scenarios, risk, other.chosen))
+        if reached > value * (1 + TIE) and placement.status != "optimal":
+            value, chosen = reached, other.chosen
+    bound = max(min(placement.bound, risk.of(np.array([other.bound for other in foreseen]))), value)
+    optimal = placement.status == "optimal" or bound <= value * (1 + TIE)
+    return replace(
+        placement,
+        chosen=chosen,
+        objective=value,
+        bound=value if optimal else bound,
+        gap=0.0 if optimal else relative_gap(value, bound),
+        status="optimal" if optimal else "feasible",
+        covered=_covered(problem, chosen),
+        price=math.fsum(problem.prices[chosen]),
+        notes=() if optimal else placement.notes,
+    )
 
 
 def outcomes_of(problem: PlacementProblem, scenarios: DisturbedViews, risk: Risk, chosen: Integer) -> Float:
@@ -138,20 +222,6 @@ def _without_copies(scenarios: DisturbedViews) -> DisturbedViews:
 
 def _seen(scenarios: DisturbedViews, chosen: Integer) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     return np.unpackbits(scenarios.packed[:, chosen], axis=2, count=scenarios.targets)
-
-
-def _expected(
-    problem: PlacementProblem, scenarios: DisturbedViews, solver: str, time_limit: float
-) -> Generator[Progress, None, Placement]:
-    """Maximise the expectation: each scenario has targets of its own."""
-    number = len(scenarios)
-    placement = yield from solve(_stacked(problem, scenarios, np.ones(number)), solver=solver, time_limit=time_limit)
-    return replace(
-        placement,
-        objective=placement.objective / number,
-        bound=placement.bound / number,
-        covered=_covered(problem, placement.chosen),
-    )
 
 
 def _stacked(problem: PlacementProblem, scenarios: DisturbedViews, share: Float) -> PlacementProblem:

@@ -20,7 +20,7 @@ from .estimates import Estimate, mean_of, quantile_of
 from .pose_errors import PoseErrors
 from .pose_study import draws_for
 from .risk import Risk
-from .robust_placement import RobustPlacement, solve_robust
+from .robust_placement import RobustPlacement, foresee, solve_robust
 from .rows import Row
 
 LOW = 0.05
@@ -156,10 +156,13 @@ def robust_study(  # a site, its problem, and what is asked
     spread = scenarios.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
     placements = [("the poses as planned", nominal)]
+    foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.in_words()}")
         yield here
-        steps = solve_robust(problem, spread, risk, solver=settings.solver, time_limit=settings.time_limit)
+        steps = solve_robust(
+            problem, spread, risk, solver=settings.solver, time_limit=settings.time_limit, foreseen=foreseen
+        )
         found: RobustPlacement = yield from within(here, steps)
         placements.append((risk.in_words(), found.placement))
     first, *others = yield from _judged(site, models, sight, problem, objects, settings, placements)
