@@ -25,11 +25,12 @@ from seip_addon.core.deployment import deploy
 from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
 from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
 from seip_addon.core.results.placement_record import versions
+from seip_addon.core.stability.disturbed_views import Surroundings
 from seip_addon.core.stability.pose_errors import PoseErrors
 from seip_addon.core.stability.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_study import Contender, RobustSettings, RobustStudy, robust_study
-from seip_addon.core.survey import Circumstances, record_of
+from seip_addon.core.survey import Circumstances, Layout, record_of
 from seip_addon.scene.result_folder import write_result_folder
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
@@ -80,19 +81,10 @@ def _placed(
         scenarios=options.scenarios,
         unseen=options.draws,
         seed=options.seed,
-        engine=layout.settings.engine,
         solver=layout.settings.solver,
         time_limit=layout.settings.time_limit,
     )
-    steps = robust_study(
-        layout.site,
-        layout.models,
-        layout.settings.visibility,
-        problem,
-        layout.geometry.occluders,
-        settings,
-        risks=[risk],
-    )
+    steps = robust_study(_around(layout), problem, settings, [risk])
     return surveyed.stopwatch.run("robust placement", steps)
 
 
@@ -102,14 +94,17 @@ def _plan(
     """Return the placement as a plan, noted what it was chosen for, and what pose errors do to it."""
     layout = surveyed.layout
     deployment = deploy(layout.site, layout.models, surveyed.grid.visible, chosen.placement.chosen)
-    settings = StudySettings(errors, options.draws, min(100, options.draws), options.seed + 1, layout.settings.engine)
-    steps = pose_study(
-        layout.site, layout.models, layout.settings.visibility, deployment, layout.geometry.occluders, settings
-    )
+    settings = StudySettings(errors, options.draws, min(100, options.draws), options.seed + 1)
+    steps = pose_study(_around(layout), deployment, settings)
     judged = surveyed.stopwatch.run("pose errors", steps)
     note = f"chosen for {chosen.name} over {options.scenarios} scenarios: objective, bound and gap are of that"
     placement = replace(chosen.placement, notes=(note, *chosen.placement.notes, *pose_warnings(judged)))
     return Plan(goal, placement, None, deployment), judged
+
+
+def _around(layout: Layout) -> Surroundings:
+    settings = layout.settings
+    return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
 
 
 def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:
@@ -154,8 +149,8 @@ def _parser() -> argparse.ArgumentParser:
     risk.add_argument(
         "--objective",
         choices=("expected", "cvar", "worst"),
-        default="expected",
-        help="mean of all scenarios, of the worst, or the worst alone",
+        default="cvar",
+        help="coverage of all scenarios on average, of the worst of them, or of the very worst",
     )
     risk.add_argument("--tail", type=float, default=0.25, metavar="SHARE", help="worst scenarios that cvar counts")
     risk.add_argument("--seen-by", type=int, default=1, metavar="K", help="sensors that must see a target")

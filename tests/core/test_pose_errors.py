@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from engines import ANY
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 from synthetic_junction import junction_site, prism
@@ -16,7 +16,7 @@ from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.scene_geometry import Mesh
-from seip_addon.core.stability.disturbed_views import disturbed_views
+from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views
 from seip_addon.core.stability.estimates import mean_of, quantile_of
 from seip_addon.core.stability.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
 from seip_addon.core.stability.pose_study import StudySettings, pose_rows, pose_study, pose_warnings
@@ -120,12 +120,16 @@ def placed():
 
 def study_of(placed, **changed):
     site, deployment = placed
-    chosen = StudySettings(**{"draws": 40, "draws_of_kind": 10, "engine": ANY} | changed)
-    return finish(pose_study(site, MODELS, VisibilitySettings(delta=2.0), deployment, (), chosen))
+    chosen = StudySettings(**{"draws": 40, "draws_of_kind": 10} | changed)
+    return finish(pose_study(around(site), deployment, chosen))
+
+
+def around(site):
+    return Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
 
 
 def test_without_errors_every_draw_covers_what_was_planned(placed):
-    site, deployment = placed
+    _, deployment = placed
     study = study_of(placed, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), draws=2)
     assert study.planned.whole.tolist() == [deployment.coverage]
     assert study.planned.central.tolist() == [deployment.central]
@@ -154,5 +158,5 @@ def test_sensor_alone_is_its_row_beside_the_planned_rows(placed):
     still = PoseDraws(*(getattr(drawn, name).copy() for name in ("shift", "yaw", "pitch", "roll")))
     for name in ("shift", "yaw", "pitch", "roll"):
         getattr(still, name)[:, 1] = 0.0
-    views = finish(disturbed_views(site, MODELS, VisibilitySettings(delta=2.0), poses, still, ANY))
+    views = finish(disturbed_views(around(site), poses, still))
     assert study.alone[0].whole.tolist() == [views.seen(draw).any(axis=0).mean() for draw in range(6)]

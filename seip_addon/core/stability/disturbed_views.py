@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from ..arrays import Boolean, Integer
 from ..lidar import LidarModel
 from ..progress import Progress
+from ..scene_geometry import Mesh
 from ..site import Site
 from ..visibility.grid import VisibilitySettings
 from ..visibility.observer import places
 from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
 from ..visibility.turned import Onlooker
-from .pose_errors import PoseDraws
+from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,27 +55,49 @@ class DisturbedViews:
         return DisturbedViews(packed, self.targets)
 
 
-def disturbed_views(
-    site: Site,
-    models: Mapping[str, LidarModel],
-    settings: VisibilitySettings,
-    poses: Integer,
-    draws: PoseDraws,
-    engine: Engine = "auto",
-) -> Generator[Progress, None, DisturbedViews]:
-    """Look from poses as draws of errors leave them; sensors of several types at one place share rays.
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Where sensors may hang, and what they see there.
 
     Parameters
     ----------
     site : Site
     models : mapping of str to LidarModel
-        At least those that the poses name.
-    settings : VisibilitySettings
+        At least those that the candidates name.
+    sight : VisibilitySettings
+    objects : sequence of Mesh
+        Nothing hangs inside these: the scene's occluders.
+    engine : {"auto", "bvh", "embree"}
+    """
+
+    site: Site
+    models: Mapping[str, LidarModel]
+    sight: VisibilitySettings
+    objects: Sequence[Mesh] = ()
+    engine: Engine = "auto"
+
+
+def draws_for(
+    around: Surroundings, poses: Integer, errors: PoseErrors, draws: int, seed: int
+) -> tuple[PoseDraws, Boolean]:
+    """Draw errors of some of a site's poses, none of which ends inside an object; see `out_of_objects`."""
+    candidates = around.site.candidates
+    drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
+    return out_of_objects(drawn, candidates.xyz[poses], around.objects)
+
+
+def disturbed_views(
+    around: Surroundings, poses: Integer, draws: PoseDraws
+) -> Generator[Progress, None, DisturbedViews]:
+    """Look from poses as draws of errors leave them; sensors of several types at one place share rays.
+
+    Parameters
+    ----------
+    around : Surroundings
     poses : (s,) int64
         Among the site's candidates.
     draws : PoseDraws
         Of n draws for these poses; poses of one place must err alike.
-    engine : {"auto", "bvh", "embree"}
 
     Yields
     ------
@@ -85,10 +108,11 @@ def disturbed_views(
     -------
     DisturbedViews
     """
+    site, models = around.site, around.models
     candidates = site.candidates
     keys, xyz, yaw = candidates.sensor[poses].tolist(), candidates.xyz[poses], candidates.yaw[poses]
-    caster = make_ray_caster(site.triangles, engine_name(engine))
-    onlooker = Onlooker(site, settings, caster)
+    caster = make_ray_caster(site.triangles, engine_name(around.engine))
+    onlooker = Onlooker(site, around.sight, caster)
     together = places(xyz, yaw)
     packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
     orientations = draws.orientations(yaw)

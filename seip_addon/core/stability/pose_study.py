@@ -8,22 +8,18 @@ same standard ones, tell which kind hurts most.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import Boolean, Float, Integer
+from ..arrays import Boolean, Float
 from ..deployment import Deployment
-from ..lidar import LidarModel
 from ..progress import Progress
-from ..scene_geometry import Mesh
 from ..site import Site
-from ..visibility.grid import VisibilitySettings
-from ..visibility.ray_casting import Engine
-from .disturbed_views import DisturbedViews, disturbed_views
+from .disturbed_views import DisturbedViews, Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_of
-from .pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
+from .pose_errors import KINDS, PoseErrors
 from .rows import Row
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -44,14 +40,12 @@ class StudySettings:
     draws_of_kind : int
         With one kind of error alone.
     seed : int
-    engine : {"auto", "bvh", "embree"}
     """
 
     errors: PoseErrors = field(default_factory=PoseErrors)
     draws: int = 500
     draws_of_kind: int = 100
     seed: int = 0
-    engine: Engine = "auto"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +109,9 @@ class PoseStudy:
         """Return the sensor whose error costs most, and whether the draws tell it from every other."""
         losses = self.loss_by_sensor()
         worst = max(range(len(losses)), key=lambda number: losses[number].value)
-        behind = [self.alone[number].whole - self.alone[worst].whole for number in range(len(losses)) if number != worst]
+        behind = [
+            self.alone[number].whole - self.alone[worst].whole for number in range(len(losses)) if number != worst
+        ]
         return self.labels[worst], all(mean_of(difference).low > 0 for difference in behind)
 
     def is_converged(self) -> bool:
@@ -127,24 +123,17 @@ class PoseStudy:
 
 
 def pose_study(
-    site: Site,
-    models: Mapping[str, LidarModel],
-    sight: VisibilitySettings,
+    around: Surroundings,
     deployment: Deployment,
-    objects: Sequence[Mesh],
     settings: StudySettings,
 ) -> Generator[Progress, None, PoseStudy]:
     """Find what a placement covers when its poses err.
 
     Parameters
     ----------
-    site : Site
-    models : mapping of str to LidarModel
-    sight : VisibilitySettings
+    around : Surroundings
     deployment : Deployment
         The placement, at poses of the site.
-    objects : sequence of Mesh
-        Nothing hangs inside these: the scene's occluders.
     settings : StudySettings
 
     Yields
@@ -155,11 +144,12 @@ def pose_study(
     -------
     PoseStudy
     """
+    site = around.site
     poses = np.array([sensor.pose for sensor in deployment.sensors], dtype=np.int64)
 
     def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[DisturbedViews, Boolean]]:
-        drawn, blocked = draws_for(site, poses, errors, draws, settings.seed, objects)
-        seen = yield from disturbed_views(site, models, sight, poses, drawn, settings.engine)
+        drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
+        seen = yield from disturbed_views(around, poses, drawn)
         return seen, blocked
 
     as_planned, _ = yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)
@@ -179,15 +169,6 @@ def pose_study(
         by_kind=by_kind,
         blocked=float(blocked.mean()),
     )
-
-
-def draws_for(  # what errs, how much, how often
-    site: Site, poses: Integer, errors: PoseErrors, draws: int, seed: int, objects: Sequence[Mesh]
-) -> tuple[PoseDraws, Boolean]:
-    """Draw errors of some of a site's poses, none of which ends inside an object; see `out_of_objects`."""
-    candidates = site.candidates
-    drawn = draw_errors(errors, candidates.position[candidates.position_of[poses]], draws, seed)
-    return out_of_objects(drawn, candidates.xyz[poses], objects)
 
 
 def _coverages(site: Site, views: Sequence[Boolean]) -> Coverages:
@@ -210,10 +191,11 @@ def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
         return ()
     worst, certain = study.worst_sensor()
     which = f"{worst}'s error costs most" if certain else "no sensor's error stands out"
-    return (
+    sentence = (
         f"with errors of {errors.position:g} m and {np.degrees(errors.tilt):.3g}° of tilt (standard deviations) the "
-        f"placement covers less than {low.value:.1%} in one of twenty cases, {lost:.1%} less than planned; {which}",
+        f"placement covers less than {low.value:.1%} in one of twenty cases, {lost:.1%} less than planned; {which}"
     )
+    return (sentence,)
 
 
 def pose_rows(study: PoseStudy) -> tuple[Row, ...]:

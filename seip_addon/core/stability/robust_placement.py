@@ -35,7 +35,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Boolean, Float, Integer
+from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..placement import Placement, PlacementProblem, solve
 from ..placement.clock import Clock
@@ -124,9 +124,7 @@ def solve_robust(
     different = _without_copies(scenarios)
     plain = risk.seen_by == 1 and risk.failure == "none"
     if plain and len(different) == 1:
-        placement = yield from solve(
-            replace(problem, visible=different.seen(0)), solver=solver, time_limit=time_limit
-        )
+        placement = yield from solve(replace(problem, visible=different.seen(0)), solver=solver, time_limit=time_limit)
         placement = replace(placement, covered=_covered(problem, placement.chosen))
         return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
     clock = Clock(time_limit)
@@ -297,11 +295,10 @@ class _Game:
 
     def cover(self, share: Integer) -> CountedCover:
         """Return F for whole shares of the scenarios."""
-        columns: list[Boolean] = []
         weight = np.rint(self._weight[self._used] / self._unit)
-        for scenario in np.flatnonzero(share):
-            columns.append(self._scenarios.seen(int(scenario))[np.ix_(self._whole.original, self._used)])
-        weights = np.concatenate([share[k] * weight for k in np.flatnonzero(share)])
+        scenarios = np.flatnonzero(share).tolist()
+        columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
+        weights = np.concatenate([share[k] * weight for k in scenarios])
         visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
         return CountedCover(replace(self._whole, visible=visible, weight=merged), self._steps)
 

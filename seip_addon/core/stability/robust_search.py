@@ -69,7 +69,8 @@ class CountedCover:
 
     def added(self, times: Integer) -> Float:
         """Return what one more sensor adds at each target that is seen so many times, (t,) float64."""
-        return self.instance.weight * self.steps[np.minimum(times, len(self.steps) - 1)]
+        more: Float = self.instance.weight * self.steps[np.minimum(times, len(self.steps) - 1)]
+        return more
 
     def gains(self, per_target: Float) -> Float:
         """Return what each candidate sees of figures per target, (c, …) float64."""
@@ -120,12 +121,12 @@ def _best_exchange(cover: CountedCover, chosen: Integer) -> tuple[int, int, floa
     times = cover.times(chosen)
     left = [times - cover.instance.visible[candidate] for candidate in chosen]
     gains = cover.gains(np.stack([cover.added(each) for each in left], axis=1)).T
-    for row, candidate in zip(gains, chosen, strict=True):
+    values = gains + np.array([[cover.value(chosen[chosen != candidate])] for candidate in chosen])
+    for row, candidate in zip(values, chosen, strict=True):
         others = chosen[chosen != candidate]
-        row += cover.value(others)
         row[~addable(cover.instance, others)] = -np.inf
-    row, new = np.unravel_index(int(np.argmax(gains)), gains.shape)
-    return int(chosen[row]), int(new), float(gains[row, new])
+    gone, new = np.unravel_index(int(np.argmax(values)), values.shape)
+    return int(chosen[gone]), int(new), float(values[gone, new])
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,9 +348,7 @@ class RobustSearch:
             self._take(chosen)
             bound = min(node.bound, values[row] + reach[row])
             some = follows[row]
-            kept.append(
-                _node(chosen, float(values[row]), bound, followers[some], after[row, some], node.multipliers)
-            )
+            kept.append(_node(chosen, float(values[row]), bound, followers[some], after[row, some], node.multipliers))
         return kept
 
     def _take(self, chosen: tuple[int, ...]) -> None:

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..arrays import Float
-from ..lidar import LidarModel
 from ..placement import Placement, PlacementProblem, solve
 from ..progress import Progress, within
-from ..scene_geometry import Mesh
-from ..site import Site
-from ..visibility.grid import VisibilitySettings
-from ..visibility.ray_casting import Engine
-from .disturbed_views import disturbed_views
+from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_of
 from .pose_errors import PoseErrors
-from .pose_study import draws_for
 from .risk import Risk
 from .robust_placement import RobustPlacement, foresee, solve_robust
 from .rows import Row
@@ -43,7 +37,6 @@ class RobustSettings:
         Draws to judge by.
     seed : int
         Of the scenarios; the unseen draws have the next one.
-    engine : {"auto", "bvh", "embree"}
     solver : str
     time_limit : float, seconds
         For each placement.
@@ -53,7 +46,6 @@ class RobustSettings:
     scenarios: int = 20
     unseen: int = 500
     seed: int = 0
-    engine: Engine = "auto"
     solver: str = "highs"
     time_limit: float = 60.0
 
@@ -118,27 +110,16 @@ class RobustStudy:
         return contender.low.value - self.nominal.low.value
 
 
-def robust_study(  # a site, its problem, and what is asked
-    site: Site,
-    models: Mapping[str, LidarModel],
-    sight: VisibilitySettings,
-    problem: PlacementProblem,
-    objects: Sequence[Mesh],
-    settings: RobustSettings,
-    *,
-    risks: Sequence[Risk] = RISKS,
+def robust_study(
+    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, risks: Sequence[Risk] = RISKS
 ) -> Generator[Progress, None, RobustStudy]:
     """Place for the poses as planned and for each risk, and judge all by unseen draws.
 
     Parameters
     ----------
-    site : Site
-    models : mapping of str to LidarModel
-    sight : VisibilitySettings
+    around : Surroundings
     problem : PlacementProblem
         Of all candidates of the site.
-    objects : sequence of Mesh
-        Nothing hangs inside these: the scene's occluders.
     settings : RobustSettings
     risks : sequence of Risk
 
@@ -151,8 +132,8 @@ def robust_study(  # a site, its problem, and what is asked
     RobustStudy
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
-    drawn, _ = draws_for(site, every, settings.errors, settings.scenarios, settings.seed, objects)
-    scenarios = yield from disturbed_views(site, models, sight, every, drawn, settings.engine)
+    drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
+    scenarios = yield from disturbed_views(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
     placements = [("the poses as planned", nominal)]
@@ -165,23 +146,20 @@ def robust_study(  # a site, its problem, and what is asked
         )
         found: RobustPlacement = yield from within(here, steps)
         placements.append((risk.in_words(), found.placement))
-    first, *others = yield from _judged(site, models, sight, problem, objects, settings, placements)
+    first, *others = yield from _judged(around, problem, settings, placements)
     return RobustStudy(settings, first, tuple(others), float(problem.weights.sum()))
 
 
-def _judged(  # noqa: PLR0913, PLR0917 -- what `robust_study` is given, and what it found
-    site: Site,
-    models: Mapping[str, LidarModel],
-    sight: VisibilitySettings,
+def _judged(
+    around: Surroundings,
     problem: PlacementProblem,
-    objects: Sequence[Mesh],
     settings: RobustSettings,
     placements: Sequence[tuple[str, Placement]],
 ) -> Generator[Progress, None, list[Contender]]:
     """Look from all chosen poses at once, in draws of another seed."""
     used = np.unique(np.concatenate([placement.chosen for _, placement in placements]))
-    drawn, _ = draws_for(site, used, settings.errors, settings.unseen, settings.seed + 1, objects)
-    views = yield from disturbed_views(site, models, sight, used, drawn, settings.engine)
+    drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
+    views = yield from disturbed_views(around, used, drawn)
     total = float(problem.weights.sum())
     contenders = []
     for name, placement in placements:
