@@ -117,8 +117,8 @@ def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, {study.price(chosen):.2%} less than the nominal optimum's",
-            f"5 % quantile over {study.settings.unseen} unseen draws {chosen.low.in_words()}, "
-            f"the nominal optimum's {nominal.low.in_words()}",
+            f"5 % quantile over {study.settings.unseen} unseen draws {chosen.low.in_words()}, the nominal optimum's "
+            + nominal.low.in_words(),
             f"mean {chosen.mean.in_words()}, the nominal optimum's {nominal.mean.in_words()}",
             plan.certificate,
             *plan.placement.notes,
