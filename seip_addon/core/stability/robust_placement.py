@@ -159,12 +159,15 @@ def foresee(
         One for each scenario; one alone where all are the same.
     """
     scenarios = _without_copies(scenarios)
+    clock = Clock(time_limit)
     found = []
     for scenario in range(len(scenarios)):
         here = Progress(scenario, len(scenarios), "solving each scenario by itself")
         yield here
         alone = replace(problem, visible=scenarios.seen(scenario))
-        found.append((yield from within(here, solve(alone, solver=solver, time_limit=time_limit / len(scenarios)))))
+        # what the quick ones leave goes to those that follow
+        seconds = max(clock.left / (len(scenarios) - scenario), LEAST_SECONDS)
+        found.append((yield from within(here, solve(alone, solver=solver, time_limit=seconds))))
     return tuple(found)
 
 
