@@ -21,11 +21,12 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.goal_options import add_goal_options, goal_of
 
 import bpy
 
 from seip_addon.core.convergence import coarsest_settings
-from seip_addon.core.goal import DEFAULT_COUNT, Goal, Plan, check_goal
+from seip_addon.core.goal import Plan, check_goal
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.survey import Circumstances, place, record_of
 from seip_addon.scene.result_folder import write_result_folder
@@ -34,7 +35,7 @@ from seip_addon.scene.result_folder import write_result_folder
 def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal = _goal(options)
+    goal = goal_of(options, options.coverage)
     refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal), refine)
     layout, watch = surveyed.layout, surveyed.stopwatch
@@ -55,18 +56,6 @@ def main(argv: list[str]) -> None:
             render=not options.no_render,
         )
     session.say(f"written to {options.output}/")
-
-
-def _goal(options: argparse.Namespace) -> Goal:
-    return Goal(
-        count=options.count,
-        budget=options.budget,
-        coverage=options.coverage,
-        central_weight="scene" if options.weighted and options.central_weight is None else options.central_weight,
-        min_distance=options.min_distance,
-        forbidden=tuple(options.forbid),
-        mandatory=tuple(options.require),
-    )
 
 
 def _in_words(plan: Plan) -> str:
@@ -93,17 +82,8 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=survey.HelpWithDefaults,
     )
     survey.add_options(parser)
-    goal = parser.add_argument_group("goal")
-    goal.add_argument(
-        "--count", type=int, metavar="N", help=f"largest number of sensors ({DEFAULT_COUNT} if no goal is given)"
-    )
-    goal.add_argument("--budget", type=float, metavar="USD", help="largest total price")
+    goal = add_goal_options(parser)
     goal.add_argument("--coverage", type=float, metavar="SHARE", help="reach this share (0 to 1) at the least price")
-    goal.add_argument("--weighted", action="store_true", help="count targets by the weights of their regions")
-    goal.add_argument("--central-weight", type=float, metavar="W", help="one weight for all weighted regions")
-    goal.add_argument("--min-distance", type=float, default=0.0, metavar="M", help="between two sensors")
-    goal.add_argument("--forbid", nargs="+", default=[], metavar="POSITION", help="positions without sensor")
-    goal.add_argument("--require", nargs="+", default=[], metavar="POSITION", help="positions with a sensor")
     parser.add_argument(
         "--tolerance",
         type=float,

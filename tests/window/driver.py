@@ -26,6 +26,7 @@ ROW = 10
 """Pixels between two places that are asked: buttons are 20 high."""
 HEADING = 38
 """Pixels from near the upper edge of a button down to the heading below it."""
+TRIES = 3
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
 NAMES = dict(
@@ -158,12 +159,16 @@ class Window:
         yield from self.press("LEFTMOUSE", place)
         yield 0.2
 
-    def open_below(self, what: str) -> Steps:
-        """Open the panel whose heading stands below a button."""
-        x, y = yield from self.find(what)
-        yield from self._hover((x, y - HEADING), 10 * BEAT)
-        yield from self.press("LEFTMOUSE", (x, y - HEADING))
-        yield 0.5
+    def open_below(self, what: str, inside: str) -> Steps:
+        """Open the panel whose heading stands below a button, and in which there is another button."""
+        for _ in range(TRIES):
+            x, y = yield from self.find(what)
+            yield from self._hover((x, y - HEADING), 10 * BEAT)
+            yield from self.press("LEFTMOUSE", (x, y - HEADING))
+            yield 0.5
+            if (yield from self._find_here(inside, (0.6,))):
+                return
+        raise LookupError(f"there is no panel with {inside} below {what}")
 
     def enter(self, what: str, text: str) -> Steps:
         """Type into a field of the sidebar, in place of what is there."""

@@ -106,7 +106,7 @@ def _save_and_reopen(window: Window) -> Steps:
     yield from window.press("NUMPAD_0")  # the camera's view
     assert _known() is None
     assert _scene().seip.result.record == record
-    yield from window.open_below("seip.follow_sensors(")
+    yield from window.open_below("seip.follow_sensors(", "seip.rank_candidates(")
     yield from window.click("seip.rank_candidates(")
     yield from window.until(lambda: len(_scene().seip.result.ranking), 60)
     yield from window.find("seip.rank_candidates(")

@@ -7,6 +7,7 @@ about z as those of an upright sensor are; only rays go out in the site's.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,17 +55,25 @@ class Onlooker:
         (t,) bool
             The same as a full scan's.
         """
+        only: Boolean = self.see_all([model], xyz, orientation)[0]
+        return only
+
+    def see_all(self, models: Sequence[LidarModel], xyz: Float, orientation: Float) -> Boolean:
+        """Find which targets sensors of several models see from one place, sharing rays; see `see`.
+
+        Returns
+        -------
+        (models, t) bool
+        """
         delta, least = self._settings.delta, self._settings.min_intensity
         if math.hypot(*orientation[2, :2]) < _LEVEL:
             yaw = math.atan2(orientation[1, 0], orientation[0, 0])
-            place, surfaces = Place(self._caster, xyz, yaw, [model], delta, least), self._surfaces
+            place, surfaces = Place(self._caster, xyz, yaw, models, delta, least), self._surfaces
         else:
             turned = _TurnedCaster(self._caster, xyz, orientation)
-            place = Place(turned, np.zeros(3), 0.0, [model], delta, least)
+            place = Place(turned, np.zeros(3), 0.0, models, delta, least)
             surfaces = turned_surfaces(self._surfaces, xyz, orientation)
-        seen, _ = seen_by_near_rays(place, surfaces)
-        only: Boolean = seen[0]
-        return only
+        return seen_by_near_rays(place, surfaces)[0]
 
 
 def onlooker(site: Site, settings: VisibilitySettings, engine: Engine = "auto") -> Onlooker:

@@ -1,0 +1,157 @@
+r"""What a placement is judged by when poses err, sensors fail and one look is not enough.
+
+In scenario k the chosen sensors S see target j :math:`n_{jk}(S)` times. The
+outcome of the scenario is the weight of the targets seen often enough,
+
+.. math::
+    f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge κ],
+
+or what is left of it after one of the sensors failed: at worst
+:math:`\min_{i \in S} f_k(S \setminus i)`, or on average, each of the N sensors
+that are allowed failing alike (had the chosen alone part in it, a sensor that sees
+nothing would be worth adding). Of K outcomes the mean of the m smallest counts, :math:`m = \lceil αK \rceil`:
+
+.. math::
+    T(S) = \min_{p \in P} \sum_k p_k f_k(S), \qquad
+    P = \{p : 0 \le p_k \le 1/m,\; \textstyle\sum_k p_k = 1\},
+
+the conditional value at risk of the coverage (Rockafellar and Uryasev 2000):
+the expectation for α = 1, the worst scenario for α up to 1/K.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float, Integer
+from ..errors import SeipError
+
+Failure = Literal["none", "worst", "mean"]
+
+
+@dataclass(frozen=True)
+class Risk:
+    """What is to be large.
+
+    Parameters
+    ----------
+    tail : float
+        α: the share of the scenarios, the worst ones, whose mean counts; 1 for the expectation, 0 for the worst alone.
+    seen_by : int
+        κ: by so many sensors a target must be seen.
+    failure : {"none", "worst", "mean"}
+        Whether one of the sensors has failed: the one that is missed most, or any.
+    """
+
+    tail: float = 1.0
+    seen_by: int = 1
+    failure: Failure = "none"
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.tail <= 1:
+            raise SeipError(f"the tail must be a share of the scenarios from 0 to 1, not {self.tail:g}")
+        if self.seen_by < 1:
+            raise SeipError(f"targets cannot be seen by {self.seen_by} sensors; ask for at least 1")
+
+    @property
+    def least_sensors(self) -> int:
+        """Fewer sensors than these have no outcome but zero."""
+        return self.seen_by + (self.failure != "none")
+
+    def in_words(self) -> str:
+        """Name what is to be large."""
+        of = {1.0: "expected coverage", 0.0: "coverage in the worst scenario"}.get(
+            self.tail, f"mean coverage of the worst {self.tail:.0%} of the scenarios"
+        )
+        twice = "" if self.seen_by == 1 else f", seen by at least {self.seen_by}"
+        lost = {"none": "", "worst": ", the most important sensor lost", "mean": ", any one sensor lost"}[self.failure]
+        return of + twice + lost
+
+    def counted(self, scenarios: int) -> int:
+        """Return m, the number of worst scenarios that count."""
+        return max(1, math.ceil(self.tail * scenarios - 1e-9))
+
+    def outcomes(self, seen: NDArray[np.uint8], weight: Float, sensors: int) -> Float:
+        """Return what becomes of a placement in each scenario.
+
+        Parameters
+        ----------
+        seen : (K, s, t) uint8
+            1 where a chosen sensor sees a target.
+        weight : (t,) float64
+        sensors : int
+            N, the largest number of sensors.
+
+        Returns
+        -------
+        (K,) float64
+        """
+        times = seen.sum(axis=1, dtype=np.uint8)
+        whole: Float = (times >= self.seen_by) @ weight
+        if self.failure == "none":
+            return whole
+        if seen.shape[1] == 0:
+            return np.zeros(len(seen))
+        lost: Float = ((times == self.seen_by)[:, None] & seen.view(bool)) @ weight  # what each is needed for, (K, s)
+        after: Float = whole - (lost.max(axis=1) if self.failure == "worst" else lost.sum(axis=1) / sensors)
+        return after
+
+    def of(self, outcomes: Float) -> float:
+        """Return T of outcomes (K,)."""
+        counted = self.counted(len(outcomes))
+        return math.fsum(np.sort(outcomes)[:counted]) / counted
+
+    def worst(self, outcomes: Float) -> Integer:
+        """Return the scenarios that count, (m,) int64; of equal ones the first."""
+        return np.argsort(outcomes, kind="stable")[: self.counted(len(outcomes))]
+
+    def steps(self, sensors: int) -> tuple[Integer, int]:
+        r"""Return how a target's worth rises with the sensors that see it, made concave from above.
+
+        A target seen n times is worth 1 from n = κ on. After a failure among N
+        sensors it is worth :math:`1 - κ/N` on average at n = κ and 1 from
+        :math:`κ + 1` on, which no failure of the worst kind exceeds. The least
+        concave function above that makes the sum over targets submodular, and
+        an upper bound of the outcome; it is exact for one look, and for the mean
+        failure of one look.
+
+        Parameters
+        ----------
+        sensors : int
+            N, the largest number of sensors.
+
+        Returns
+        -------
+        steps : (l + 1,) int64
+            What the first, second, … sensor adds, in units; falling, the last one is 0.
+        unit : int
+            Units that make 1.
+        """
+        worth = [Fraction(0)] * self.seen_by + [Fraction(1)]
+        if self.failure != "none":
+            worth = [*worth[:-1], max(Fraction(sensors - self.seen_by, sensors), Fraction(0)), Fraction(1)]
+        corners = _upper_hull(worth)
+        rises = [(worth[b] - worth[a]) / (b - a) for a, b in pairwise(corners) for _ in range(a, b)]
+        unit = math.lcm(*(rise.denominator for rise in rises))
+        return np.array([int(rise * unit) for rise in rises] + [0], dtype=np.int64), unit
+
+
+def _upper_hull(worth: list[Fraction]) -> list[int]:
+    """Return the corners of the least concave function above the points."""
+    corners: list[int] = []
+    for right in range(len(worth)):
+        while len(corners) > 1:
+            left, middle = corners[-2:]
+            rise, run = worth[right] - worth[left], right - left
+            if (worth[middle] - worth[left]) * run > rise * (middle - left):
+                break
+            corners.pop()
+        corners.append(right)
+    return corners

@@ -1,0 +1,187 @@
+"""What it costs to place for pose errors, and what that saves: judged by draws that no placement was chosen on."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Float
+from ..placement import Placement, PlacementProblem, solve
+from ..progress import Progress, within
+from .disturbed_views import Surroundings, disturbed_views, draws_for
+from .estimates import Estimate, mean_of, quantile_of
+from .pose_errors import PoseErrors
+from .risk import Risk
+from .robust_placement import RobustPlacement, foresee, solve_robust
+from .rows import Row
+
+LOW = 0.05
+"""The quantile that judges."""
+
+RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
+"""That are compared where nothing else is asked for."""
+
+
+@dataclass(frozen=True)
+class RobustSettings:
+    """How placements under pose errors are chosen and judged.
+
+    Parameters
+    ----------
+    errors : PoseErrors
+    scenarios : int
+        Draws to choose on.
+    unseen : int
+        Draws to judge by.
+    seed : int
+        Of the scenarios; the unseen draws have the next one.
+    solver : str
+    time_limit : float, seconds
+        For each placement.
+    """
+
+    errors: PoseErrors = field(default_factory=PoseErrors)
+    scenarios: int = 20
+    unseen: int = 500
+    seed: int = 0
+    solver: str = "highs"
+    time_limit: float = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A placement and what it covers in unseen draws.
+
+    Parameters
+    ----------
+    name : str
+        What it was chosen for.
+    placement : Placement
+    planned : float
+        Share of the targets' weight that it covers as planned.
+    unseen : (n,) float64
+        The same share in each unseen draw.
+    """
+
+    name: str
+    placement: Placement
+    planned: float
+    unseen: Float
+
+    @property
+    def low(self) -> Estimate:
+        """The 5 % quantile over unseen draws."""
+        return quantile_of(self.unseen, LOW)
+
+    @property
+    def mean(self) -> Estimate:
+        """The mean over unseen draws."""
+        return mean_of(self.unseen)
+
+
+@dataclass(frozen=True, eq=False)
+class RobustStudy:
+    """The nominal optimum beside placements chosen for what may go wrong.
+
+    Parameters
+    ----------
+    settings : RobustSettings
+    nominal : Contender
+        Chosen for the poses as planned.
+    robust : tuple of Contender
+        One for each risk.
+    total : float
+        Weight of all targets, the unit of placements' objectives.
+    """
+
+    settings: RobustSettings
+    nominal: Contender
+    robust: tuple[Contender, ...]
+    total: float
+
+    def price(self, contender: Contender) -> float:
+        """Return what a contender gives away of the nominal optimum's planned coverage."""
+        return self.nominal.planned - contender.planned
+
+    def saving(self, contender: Contender) -> float:
+        """Return by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
+        return contender.low.value - self.nominal.low.value
+
+
+def robust_study(
+    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, risks: Sequence[Risk] = RISKS
+) -> Generator[Progress, None, RobustStudy]:
+    """Place for the poses as planned and for each risk, and judge all by unseen draws.
+
+    Parameters
+    ----------
+    around : Surroundings
+    problem : PlacementProblem
+        Of all candidates of the site.
+    settings : RobustSettings
+    risks : sequence of Risk
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RobustStudy
+    """
+    every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
+    drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
+    scenarios = yield from disturbed_views(around, every, drawn)
+    spread = scenarios.spread_to(every, len(problem.visible))
+    nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
+    placements = [("the poses as planned", nominal)]
+    foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
+    for number, risk in enumerate(risks):
+        here = Progress(number, len(risks), f"placing for {risk.in_words()}")
+        yield here
+        steps = solve_robust(
+            problem, spread, risk, solver=settings.solver, time_limit=settings.time_limit, foreseen=foreseen
+        )
+        found: RobustPlacement = yield from within(here, steps)
+        placements.append((risk.in_words(), found.placement))
+    first, *others = yield from _judged(around, problem, settings, placements)
+    return RobustStudy(settings, first, tuple(others), float(problem.weights.sum()))
+
+
+def _judged(
+    around: Surroundings,
+    problem: PlacementProblem,
+    settings: RobustSettings,
+    placements: Sequence[tuple[str, Placement]],
+) -> Generator[Progress, None, list[Contender]]:
+    """Look from all chosen poses at once, in draws of another seed."""
+    used = np.unique(np.concatenate([placement.chosen for _, placement in placements]))
+    drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
+    views = yield from disturbed_views(around, used, drawn)
+    total = float(problem.weights.sum())
+    contenders = []
+    for name, placement in placements:
+        rows = np.searchsorted(used, placement.chosen)
+        covered = [float(problem.weights[views.seen(draw)[rows].any(axis=0)].sum()) for draw in range(len(views))]
+        contenders.append(Contender(name, placement, placement.covered / total, np.array(covered) / total))
+    return contenders
+
+
+def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
+    """Return what the study says as a row of the page of stability for each placement."""
+    settings, nominal = study.settings, study.nominal
+    errors = settings.errors
+    regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {settings.scenarios} scenarios"
+    return tuple(
+        Row(
+            f"placement for {contender.name}",
+            regime,
+            f"gives {study.price(contender):.2%} of planned coverage; 5 % quantile {contender.low.in_words()} against "
+            f"{nominal.low.in_words()} of the nominal optimum",
+            f"{settings.unseen} draws that nothing was chosen on",
+            f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
+        )
+        for contender in study.robust
+    )

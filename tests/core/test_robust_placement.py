@@ -1,0 +1,152 @@
+"""Placements under risk, against exhaustive search over all subsets."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from placement_oracle import all_placements, covered, small_problems
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.progress import finish
+from seip_addon.core.stability.disturbed_views import DisturbedViews
+from seip_addon.core.stability.risk import Risk
+from seip_addon.core.stability.robust_placement import allowed_sensors, solve_robust
+
+RISKS = [
+    Risk(),
+    Risk(tail=0.5),
+    Risk(tail=0.3),
+    Risk(tail=0.0),
+    Risk(failure="worst"),
+    Risk(failure="mean"),
+    Risk(seen_by=2),
+    Risk(tail=0.5, seen_by=2),
+    Risk(tail=0.0, failure="mean"),
+    Risk(tail=0.3, seen_by=2, failure="worst"),
+]
+
+
+def pack(views):
+    return DisturbedViews(np.packbits(views, axis=2), views.shape[2])
+
+
+@st.composite
+def under_risk(draw, risks=RISKS):
+    problem = draw(small_problems())
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    flips = rng.random((draw(st.integers(1, 4)), *problem.visible.shape)) < draw(st.sampled_from([0.1, 0.3]))
+    views = problem.visible ^ flips
+    views[:, 0] |= problem.visible[0]
+    risk = draw(st.sampled_from(risks))
+    assume(allowed_sensors(problem) >= risk.least_sensors and all_placements(problem))
+    return problem, views, risk
+
+
+def by_hand(problem, views, risk, choice):
+    """The objective in plain Python, from its definition."""
+
+    def weight_seen(view, sensors):
+        times = [sum(bool(view[i, j]) for i in sensors) for j in range(view.shape[1])]
+        return sum(w for w, n in zip(problem.weights, times, strict=True) if n >= risk.seen_by)
+
+    outcomes = []
+    for view in views:
+        whole = weight_seen(view, choice)
+        left = [weight_seen(view, [i for i in choice if i != gone]) for gone in choice] or [0.0]
+        spare = allowed_sensors(problem) - len(choice)  # sensors that may fail without being missed
+        mean = (sum(left) + spare * whole) / allowed_sensors(problem) if choice else 0.0
+        outcomes.append({"none": whole, "worst": min(left), "mean": mean}[risk.failure])
+    counted = max(1, math.ceil(risk.tail * len(outcomes) - 1e-9))
+    return sum(sorted(outcomes)[:counted]) / counted
+
+
+@given(under_risk())
+@settings(max_examples=150, deadline=None)
+def test_no_subset_is_better(case):
+    problem, views, risk = case
+    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    best = max(by_hand(problem, views, risk, choice) for choice in all_placements(problem))
+    choice = tuple(answer.chosen.tolist())
+    assert sorted(choice) in [sorted(one) for one in all_placements(problem)]
+    assert answer.objective == pytest.approx(best, abs=1e-7)
+    assert by_hand(problem, views, risk, choice) == pytest.approx(best, abs=1e-7)
+    assert answer.status == "optimal"
+    assert answer.bound == pytest.approx(best, abs=1e-7)
+    assert answer.covered == pytest.approx(covered(problem, choice))
+
+
+@given(under_risk(risks=[Risk()]))
+@settings(max_examples=40, deadline=None)
+def test_worst_is_below_tail_is_below_expectation(case):
+    problem, views, _ = case
+    worst, tail, mean = (
+        finish(solve_robust(problem, pack(views), Risk(tail=share))).placement for share in (0.0, 0.5, 1.0)
+    )
+    assert worst.objective <= tail.objective + 1e-9
+    assert tail.objective <= mean.objective + 1e-9
+    assert mean.objective <= mean.bound + 1e-9
+
+
+@given(small_problems(), st.sampled_from(RISKS[:4]))
+@settings(max_examples=40, deadline=None)
+def test_without_errors_it_is_the_nominal_answer(problem, risk):
+    assume(all_placements(problem))
+    nominal = finish(solve(problem))
+    robust = finish(solve_robust(problem, pack(np.stack([problem.visible] * 3)), risk)).placement
+    assert robust.chosen.tolist() == nominal.chosen.tolist()
+    assert robust.objective == nominal.objective
+    assert robust.bound == nominal.bound
+
+
+@given(under_risk(), st.randoms(use_true_random=False))
+@settings(max_examples=60, deadline=None)
+def test_the_order_of_candidates_does_not_matter(case, random):
+    problem, views, risk = case
+    order = list(range(len(problem.visible)))
+    random.shuffle(order)
+    shuffled = replace(
+        problem,
+        visible=problem.visible[order],
+        prices=problem.prices[order],
+        positions=problem.positions[order],
+        xyz=problem.xyz[order],
+        labels=problem.labels[order],
+        mandatory=problem.mandatory[:, order],
+        forbidden=problem.forbidden[order],
+    )
+    one = finish(solve_robust(problem, pack(views), risk)).placement
+    other = finish(solve_robust(shuffled, pack(views[:, order]), risk)).placement
+    assert sorted(np.array(order)[other.chosen].tolist()) == sorted(one.chosen.tolist())
+    assert one.objective == pytest.approx(other.objective, abs=1e-9)
+
+
+@given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
+def test_the_bounding_function_lies_above_and_is_concave(seen_by, failure, sensors):
+    risk = Risk(seen_by=seen_by, failure=failure)
+    steps, unit = risk.steps(sensors)
+    assert (np.diff(steps) <= 0).all()
+    assert steps[-1] == 0
+    reached = np.concatenate([[0], np.cumsum(steps)]) / unit
+    for times in range(len(reached)):
+        for used in range(max(times, 1), sensors + 1):
+            after = 1 - seen_by / used if times == seen_by else float(times > seen_by)
+            worth = float(times >= seen_by) if failure == "none" else after
+            assert reached[times] >= worth - 1e-12
+
+
+def test_too_few_sensors_are_refused():
+    problem = PlacementProblem(
+        visible=np.eye(2, dtype=bool),
+        weights=np.ones(2),
+        prices=np.ones(2),
+        positions=np.arange(2),
+        xyz=np.array([[0.0, 0, 0], [1, 0, 0]]),
+        labels=np.array(["a", "a"]),
+        count=1,
+    )
+    with pytest.raises(SeipError, match="at least 2 sensors"):
+        finish(solve_robust(problem, pack(problem.visible[None]), Risk(failure="worst")))

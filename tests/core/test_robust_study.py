@@ -1,0 +1,92 @@
+"""What placing for pose errors costs and saves, and the charts of it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from engines import ANY
+from matplotlib.image import imread
+from synthetic_junction import junction_site
+
+from seip_addon.core.deployment import deploy
+from seip_addon.core.goal import Goal, placement_problem
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
+from seip_addon.core.placement import solve
+from seip_addon.core.progress import finish
+from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views, draws_for
+from seip_addon.core.stability.pose_errors import PoseErrors
+from seip_addon.core.stability.pose_study import StudySettings, pose_study
+from seip_addon.core.stability.risk import Risk
+from seip_addon.core.stability.robust_study import RobustSettings, robust_rows, robust_study
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+
+MODELS = load_catalogue()
+SETTINGS = RobustSettings(scenarios=4, unseen=30, time_limit=20.0)
+
+
+@pytest.fixture(scope="module")
+def laid_out():
+    site = junction_site(positions=12, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
+    around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
+    grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
+    goal = placement_problem(site, grid.visible, MODELS, Goal(count=2))
+    return around, replace(goal, forbidden=site.candidates.sensor == "type2")
+
+
+@pytest.fixture(scope="module")
+def study(laid_out):
+    return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)]))
+
+
+def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
+    around, problem = laid_out
+    assert study.nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
+    for contender in (study.nominal, *study.robust):
+        chosen = contender.placement.chosen
+        drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
+        views = finish(disturbed_views(around, chosen, drawn))
+        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.unseen)]
+        assert contender.unseen == pytest.approx(expected, abs=1e-12)
+        assert not problem.forbidden[chosen].any()
+
+
+def test_robustness_costs_what_was_planned(study):
+    for contender in study.robust:
+        assert study.price(contender) >= 0
+        assert contender.placement.bound >= contender.placement.objective
+    assert study.robust[1].placement.objective <= study.robust[0].placement.objective
+    assert [row.method for row in robust_rows(study)] == [
+        "placement for expected coverage",
+        "placement for coverage in the worst scenario",
+    ]
+
+
+def test_without_errors_robustness_is_free(laid_out):
+    settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, unseen=2)
+    study = finish(robust_study(*laid_out, settings, [Risk(tail=0.5)]))
+    (robust,) = study.robust
+    assert robust.placement.chosen.tolist() == study.nominal.placement.chosen.tolist()
+    assert (robust.unseen == robust.planned).all()
+
+
+def test_poses_of_one_place_err_alike(laid_out):
+    around, _ = laid_out
+    poses = np.arange(len(around.site.candidates))
+    drawn, _ = draws_for(around, poses, PoseErrors(), 2, 0)
+    together = finish(disturbed_views(around, poses, drawn))
+    some = np.array([3, 8])
+    alone, _ = draws_for(around, some, PoseErrors(), 2, 0)
+    assert (finish(disturbed_views(around, some, alone)).packed == together.packed[:, some]).all()
+
+
+def test_charts_are_drawn(laid_out, study, tmp_path):
+    around, problem = laid_out
+    deployment = deploy(around.site, MODELS, problem.visible, study.nominal.placement.chosen)
+    judged = finish(pose_study(around, deployment, StudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
+    save_spread_chart(tmp_path / "spread.png", study, "spread")
+    save_frontier_chart(tmp_path / "frontier.png", study, "frontier")
+    save_blame_chart(tmp_path / "blame.png", judged, "blame")
+    for path in tmp_path.iterdir():
+        assert imread(path).shape[1] > 1000
