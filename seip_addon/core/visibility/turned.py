@@ -66,7 +66,7 @@ class Onlooker:
         (models, t) bool
         """
         delta, least = self._settings.delta, self._settings.min_intensity
-        if math.hypot(*orientation[2, :2]) < _LEVEL:
+        if orientation[2, 2] > 0 and math.hypot(*orientation[2, :2]) < _LEVEL:
             yaw = math.atan2(orientation[1, 0], orientation[0, 0])
             place, surfaces = Place(self._caster, xyz, yaw, models, delta, least), self._surfaces
         else:
