@@ -35,6 +35,39 @@ VERSION = 1
 """Of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
 
 
+@dataclass(frozen=True)
+class Means:
+    """What the preferences give to work, which must not ask Blender itself once it is in a thread.
+
+    Parameters
+    ----------
+    cache : Path
+        Folder in which visibility is kept.
+    cores : int or None
+        Threads that may compute it, or None where nobody has said.
+    """
+
+    cache: Path
+    cores: int | None
+
+    def grid_file(self, key: str) -> Path:
+        """Return where the cache keeps a visibility grid."""
+        return self.cache / f"{key[:32]}.npz"
+
+    def check(self) -> None:
+        """See that visibility can be kept, and say where the folder is set if it cannot.
+
+        Raises
+        ------
+        SeipError
+            The folder cannot be written.
+        """
+        try:
+            check_folder(self.cache)
+        except SeipError as error:
+            raise SeipError(f"{error} as Cache in the add-on's preferences") from error
+
+
 @dataclass
 class Held:
     """What is known of a scene.
@@ -45,6 +78,8 @@ class Held:
         As the scene was when it was last read.
     watch : Watch
         Whether the scene has changed since.
+    means : Means
+        As the preferences were when this was asked for last.
     catalogues : tuple
         The user's catalogue files and when each was last written.
     said : tuple of str
@@ -63,6 +98,7 @@ class Held:
 
     layout: Layout
     watch: Watch
+    means: Means
     catalogues: tuple[tuple[Path, int], ...]
     said: tuple[str, ...] = ()
     grid: VisibilityGrid | None = None
@@ -172,17 +208,19 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
     settings = scene.seip.survey.settings()
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
+    means = Means(preferences.cache_folder(), preferences.cores())
     known = find(scene)
     if known is not None and not known.watch.look(scene) and known.catalogues == catalogues:
+        known.means = means
         if _same_grid(settings, known.layout.settings):
             known.layout = replace(known.layout, settings=settings)
             return _nothing_to_do(known)
         reading = SceneReading(known.layout.geometry, known.said)
-        return _laid_out(reading, settings, known.watch, catalogues)
+        return _laid_out(reading, settings, known.watch, means, catalogues)
     began = time.perf_counter()
     watching = watch(scene)
     reading = read_scene(scene)
-    return _laid_out(reading, settings, watching, catalogues, time.perf_counter() - began)
+    return _laid_out(reading, settings, watching, means, catalogues, time.perf_counter() - began)
 
 
 def seen(known: Held) -> Generator[Progress, None, VisibilityGrid]:
@@ -190,8 +228,8 @@ def seen(known: Held) -> Generator[Progress, None, VisibilityGrid]:
     began = time.perf_counter()
     key = grid_key(known.layout)
     if known.grid is None or known.grid.key != key:
-        _check_cache()
-        known.grid = yield from see(known.layout, grid_file(key), threads=preferences.cores())
+        known.means.check()
+        known.grid = yield from see(known.layout, known.means.grid_file(key), threads=known.means.cores)
         known.durations["visibility"] = time.perf_counter() - began
     return known.grid
 
@@ -209,19 +247,6 @@ def answered(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
     if not text:
         raise SeipError("there is no placement yet: place sensors first")
     return _answered(survey(scene), text)
-
-
-def _check_cache() -> None:
-    """See that visibility can be kept, and say where the folder is set if it cannot."""
-    try:
-        check_folder(preferences.cache_folder())
-    except SeipError as error:
-        raise SeipError(f"{error} as Cache in the add-on's preferences") from error
-
-
-def grid_file(key: str) -> Path:
-    """Return where the cache keeps a visibility grid."""
-    return preferences.cache_folder() / f"{key[:32]}.npz"
 
 
 def forget() -> None:
@@ -255,6 +280,7 @@ def _laid_out(
     reading: SceneReading,
     settings: SurveySettings,
     watching: Watch,
+    means: Means,
     catalogues: tuple[tuple[Path, int], ...],
     seconds: float = 0.0,
 ) -> Generator[Progress, None, Held]:
@@ -262,7 +288,7 @@ def _laid_out(
     began = time.perf_counter()
     layout = lay_out(reading.geometry, settings, reading.warnings)
     durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
-    return Held(layout, watching, catalogues, reading.warnings, durations=durations)
+    return Held(layout, watching, means, catalogues, reading.warnings, durations=durations)
 
 
 def _answered(surveying: Generator[Progress, None, Held], text: str) -> Generator[Progress, None, Held]:
@@ -272,7 +298,7 @@ def _answered(surveying: Generator[Progress, None, Held], text: str) -> Generato
     record, key = record_of(text), grid_key(known.layout)
     if record["inputs"]["visibility"] != key:
         raise SeipError("the scene or its settings have changed since the placement: place again")
-    if known.grid is None and not grid_file(key).exists():
+    if known.grid is None and not known.means.grid_file(key).exists():
         raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
     grid = yield from seen(known)
     known.plan, known.record = restored_plan(known.layout, grid, record), text

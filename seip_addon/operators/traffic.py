@@ -122,16 +122,7 @@ class SEIP_OT_scan_frame(_Scanning[scans.HeldScan], bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, scans.HeldScan]:
         """Read what is scanned."""
         self._scene_read = _SceneRead(scene)
-        return self._work(scans.now(scene), scans.find(scene))
-
-    def _work(self, at: float, before: scans.HeldScan | None) -> Generator[Progress, None, scans.HeldScan]:
-        run = yield from self._scene_read.run()
-        if before is not None and before.run.key == run.key:
-            run, simulation = before.run, before.simulation
-        else:
-            simulation = yield from simulation_of(run)
-        yield Progress(0, 0, "scan")
-        return scans.measure(run, simulation, at)
+        return _scanned(self._scene_read, scans.now(scene), scans.find(scene))
 
     def conclude(self, scene: bpy.types.Scene, result: scans.HeldScan) -> None:
         """Show the points."""
@@ -140,6 +131,16 @@ class SEIP_OT_scan_frame(_Scanning[scans.HeldScan], bpy.types.Operator):
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{len(result.frame):,} points in {1e3 * result.seconds:.0f} ms")
+
+
+def _scanned(read: _SceneRead, at: float, before: scans.HeldScan | None) -> Generator[Progress, None, scans.HeldScan]:
+    run = yield from read.run()
+    if before is not None and before.run.key == run.key:
+        run, simulation = before.run, before.simulation
+    else:
+        simulation = yield from simulation_of(run)
+    yield Progress(0, 0, "scan")
+    return scans.measure(run, simulation, at)
 
 
 class SEIP_OT_hide_scan(bpy.types.Operator):
@@ -154,7 +155,7 @@ class SEIP_OT_hide_scan(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_write_dataset(_Scanning[Record], bpy.types.Operator):
+class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types.Operator):
     """Scan frame after frame and write them, with the boxes of all road users, as datasets to train detectors on"""
 
     bl_idname = "seip.write_dataset"
@@ -162,25 +163,26 @@ class SEIP_OT_write_dataset(_Scanning[Record], bpy.types.Operator):
     bl_options = {"REGISTER"}  # as above
     stopped = "stopped; what is written stays, and the same run goes on from there"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Record]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
         """Read what is recorded."""
         self._scene_read = _SceneRead(scene)
         self._folder = _folder(scene)
-        return self._work()
+        return _recorded(self._scene_read, self._folder)
 
-    def _work(self) -> Generator[Progress, None, Record]:
-        run = yield from self._scene_read.run()
-        check_run_folder(self._folder, run)
-        simulation = yield from simulation_of(run)
-        self._warnings = simulation.warnings
-        return (yield from record(self._folder, run, simulation, self._scene_read.settings))
-
-    def conclude(self, scene: bpy.types.Scene, result: Record) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[Record, tuple[str, ...]]) -> None:
         """Say what was written."""
         self._scene_read.keep_traffic(scene)
-        for sentence in self._warnings:
+        written, warnings = result
+        for sentence in warnings:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{len(result['frames']):,} frames in {self._folder}")
+        self.report({"INFO"}, f"{len(written['frames']):,} frames in {self._folder}")
+
+
+def _recorded(read: _SceneRead, folder: Path) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
+    run = yield from read.run()
+    check_run_folder(folder, run)
+    simulation = yield from simulation_of(run)
+    return (yield from record(folder, run, simulation, read.settings)), tuple(simulation.warnings)
 
 
 class _SceneRead:

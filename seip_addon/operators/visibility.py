@@ -6,7 +6,7 @@ from collections.abc import Generator
 
 import bpy
 
-from .. import preferences, state
+from .. import state
 from ..core.progress import Progress
 from ..core.survey import estimate
 from .work import ForReadyScene, LongWork
@@ -56,7 +56,7 @@ def _seen(surveying: Generator[Progress, None, state.Held]) -> Generator[Progres
 
 def _estimated(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
     known = yield from surveying
-    known.estimate = yield from estimate(known.layout, preferences.cores())
+    known.estimate = yield from estimate(known.layout, known.means.cores)
     return known
 
 

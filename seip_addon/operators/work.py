@@ -17,6 +17,8 @@ Outcome = set[str]
 
 PERIOD = 0.1
 """Seconds between two looks at work that is under way."""
+PATIENCE = 3.0
+"""Seconds at most that Blender waits for work to stop before it ends: what cannot be stopped is left to itself."""
 
 
 def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
@@ -91,8 +93,9 @@ class LongWork(Generic[Result]):
         return attempt(self, lambda: self.conclude(state.scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop because Blender ends or opens another file."""
+        """Stop because Blender ends, closes the window or opens another file; no thread may outlive its data."""
         self._end(context)
+        self._running.work.join(PATIENCE)
 
     def _begin(self, context: bpy.types.Context) -> None:
         if state.running is not None:
@@ -150,4 +153,6 @@ CLASSES = (SEIP_OT_stop,)
 def detach() -> None:
     """Stop what is under way: Blender drops its operator with the add-on, and asks it nothing."""
     if state.running is not None:
-        _put_away(state.running)
+        running = state.running
+        _put_away(running)
+        running.work.join(PATIENCE)

@@ -8,9 +8,11 @@ import bpy
 
 PIXELS_PER_LETTER = 6.3
 """Of Blender's font at a scale of one, about, with its margins."""
-MARGIN = 50.0
-"""Pixels of a panel's frame, scroll bar and icon."""
-NARROWEST = 16
+MARGIN = 60.0
+"""Pixels of a panel's frame, tabs and scroll bar."""
+BESIDE_ICON = 36.0
+"""Pixels of an icon, and of a box: most sentences in boxes have one."""
+NARROWEST = 10
 """Letters of a line at least."""
 
 
@@ -18,7 +20,8 @@ def draw_sentence(layout: bpy.types.UILayout, text: str, *, icon: str = "NONE", 
     """Draw a sentence on as many lines as the sidebar's width asks for."""
     context = bpy.context
     width = context.region.width / context.preferences.system.ui_scale if context.region is not None else 250.0
-    lines = textwrap.wrap(text, max(NARROWEST, int((width - MARGIN) / PIXELS_PER_LETTER)))
+    room = width - MARGIN - (BESIDE_ICON if icon != "NONE" else 0.0)
+    lines = textwrap.wrap(text, max(NARROWEST, int(room / PIXELS_PER_LETTER)))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8

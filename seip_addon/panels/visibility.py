@@ -70,16 +70,16 @@ def _draw_state(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         return
     site = known.layout.site
     column = layout.column(align=True)
-    column.label(text=f"{len(site.targets):,} targets, {len(site.candidates.position):,} positions")
+    draw_sentence(column, f"{len(site.targets):,} targets, {len(site.candidates.position):,} positions")
     if known.grid is not None:
-        column.label(text=f"Known from {len(site.candidates):,} poses", icon="CHECKMARK")
+        draw_sentence(column, f"Known from {len(site.candidates):,} poses", icon="CHECKMARK")
     elif known.estimate is not None:
         _draw_estimate(column, known.estimate)
 
 
 def _draw_estimate(column: bpy.types.UILayout, estimate: Estimate) -> None:
-    column.label(text=f"{estimate.poses:,} poses, {estimate.triangles:,} triangles")
-    column.label(text=f"About {in_words(estimate.seconds)}, {estimate.memory / 1e9:.2g} GB", icon="TIME")
+    draw_sentence(column, f"{estimate.poses:,} poses, {estimate.triangles:,} triangles")
+    draw_sentence(column, f"About {in_words(estimate.seconds)}, {estimate.memory / 1e9:.2g} GB", icon="TIME")
 
 
 CLASSES = (SEIP_PT_visibility, SEIP_PT_visibility_details)

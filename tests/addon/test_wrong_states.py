@@ -9,6 +9,7 @@ import pytest
 
 from seip_addon import live, preferences, state
 from seip_addon.core.background import Background
+from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import results, work
 from seip_addon.panels import incomplete
 from seip_addon.scene import contract
@@ -113,7 +114,7 @@ def test_a_linked_copy_of_a_scene_gets_sensors_of_its_own(placed):
 
 def endless():
     while True:
-        yield state.Progress(0, 0, "endless")
+        yield Progress(0, 0, "endless")
 
 
 def test_work_under_way_ends_with_the_add_on(add_on):
@@ -151,3 +152,13 @@ def test_an_undo_is_followed(placed):
     bpy.ops.ed.undo()
     assert bpy.app.timers.is_registered(live.look)
     live.stop()
+
+
+def test_work_asks_blender_for_nothing_once_it_is_under_way(scene, monkeypatch):
+    def asked():
+        pytest.fail("the preferences were asked from the work")
+
+    seeing = state.seen(finish(state.survey(scene)))
+    for name in ("cache_folder", "cores", "own"):
+        monkeypatch.setattr(preferences, name, asked)
+    assert finish(seeing).visible.any()
