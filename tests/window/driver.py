@@ -26,6 +26,8 @@ ROW = 10
 """Pixels between two places that are asked: buttons are 20 high."""
 HEADING = 38
 """Pixels from near the upper edge of a button down to the heading below it."""
+FOOT = 200
+"""Pixels at the foot of the sidebar in which a button is too near to it for a panel below."""
 TRIES = 3
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
@@ -163,6 +165,9 @@ class Window:
         """Open the panel whose heading stands below a button, and in which there is another button."""
         for _ in range(TRIES):
             x, y = yield from self.find(what)
+            if y < self.region("UI").y + FOOT:  # bring into view what is below
+                yield from self._scroll(1)
+                x, y = yield from self.find(what)
             yield from self._hover((x, y - HEADING), 10 * BEAT)
             yield from self.press("LEFTMOUSE", (x, y - HEADING))
             yield 0.5
