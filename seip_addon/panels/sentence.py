@@ -12,7 +12,7 @@ MARGIN = 60.0
 """Pixels of a panel's frame, tabs and scroll bar."""
 BESIDE_ICON = 36.0
 """Pixels of an icon, and of a box: most sentences in boxes have one."""
-NARROWEST = 10
+NARROWEST = 12
 """Letters of a line at least."""
 
 
