@@ -6,7 +6,8 @@ import bpy
 
 from ..core.pictures.palette import rgb
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
-from .layers import Block, Entry, Overlay
+from .layers import Overlay
+from .legend import Block, Entry
 
 NAME = "coverage"
 SHOWN_BY = {"MATERIAL", "VERTEX"}

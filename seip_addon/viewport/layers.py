@@ -14,8 +14,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .legend import Block, Colour, draw_legend
+
 Kind = Literal["POINTS", "LINES", "TRIS"]
-Colour = tuple[float, float, float, float]
 
 POINT_SIZE = 2.0
 """Pixels, at the interface's usual scale."""
@@ -56,22 +57,6 @@ class Layer:
         if self.kind == "POINTS":
             shader.uniform_float("size", POINT_SIZE * scale)
         self._batch.draw(shader)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A line of a legend: words beside a swatch of one colour, or of several that run into one another."""
-
-    words: str
-    colours: tuple[Colour, ...]
-
-
-@dataclass(frozen=True)
-class Block:
-    """A part of a legend."""
-
-    title: str
-    entries: tuple[Entry, ...]
 
 
 @dataclass(frozen=True)
@@ -167,15 +152,18 @@ def _keep_handlers() -> None:
     redraw()
 
 
+def legend_blocks(scene: bpy.types.Scene) -> list[Block]:
+    """Return what explains all that is drawn in a scene's views."""
+    return [block for overlay in overlays(scene) if (block := overlay.legend(scene)) is not None]
+
+
 def _draw_view() -> None:
     draw_layers(bpy.context.scene)
 
 
 def _draw_pixels() -> None:
-    from .legend import draw_legend  # noqa: PLC0415  # which explains what is here
-
     context = bpy.context
-    draw_legend(context.scene, context.region, context.area, context.preferences.system.ui_scale)
+    draw_legend(legend_blocks(context.scene), context.region, context.area, context.preferences.system.ui_scale)
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import bpy
 
-from .layers import Block, Colour, Entry, overlays
+Colour = tuple[float, float, float, float]
 
 TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0
 """Pixels at the interface's usual scale."""
@@ -16,12 +18,28 @@ EDGE: Colour = (0.55, 0.58, 0.62, 1.0)
 FONT = 0
 
 
-def draw_legend(scene: bpy.types.Scene, region: bpy.types.Region, area: bpy.types.Area, scale: float) -> None:
+@dataclass(frozen=True)
+class Entry:
+    """A line of a legend: words beside a swatch of one colour, or of several that run into one another."""
+
+    words: str
+    colours: tuple[Colour, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a legend."""
+
+    title: str
+    entries: tuple[Entry, ...]
+
+
+def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.types.Area, scale: float) -> None:
     """Draw the legend into a viewport, beside its sidebar.
 
     Parameters
     ----------
-    scene : bpy.types.Scene
+    blocks : sequence of Block
     region : bpy.types.Region
         The viewport's window.
     area : bpy.types.Area
@@ -30,14 +48,13 @@ def draw_legend(scene: bpy.types.Scene, region: bpy.types.Region, area: bpy.type
     """
     overlaps = bpy.context.preferences.system.use_region_overlap
     beside = next((other.width for other in area.regions if other.type == "UI" and overlaps and other.width > 1), 0)
-    draw_legend_at(scene, region.width - beside - MARGIN * scale, MARGIN * scale, scale)
+    draw_legend_at(blocks, region.width - beside - MARGIN * scale, MARGIN * scale, scale)
 
 
-def draw_legend_at(scene: bpy.types.Scene, right: float, bottom: float, scale: float) -> None:
+def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: float) -> None:
     """Draw the legend with its lower right corner at a place in pixels."""
     import blf  # noqa: PLC0415  # of use only where there is a screen
 
-    blocks = [block for overlay in overlays(scene) if (block := overlay.legend(scene)) is not None]
     if not blocks:
         return
     blf.size(FONT, TEXT_SIZE * scale)

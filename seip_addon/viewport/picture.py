@@ -7,7 +7,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from .layers import draw_layers
+from .layers import draw_layers, legend_blocks
 from .legend import MARGIN, draw_legend_at
 
 WIDTH = 1920
@@ -52,7 +52,7 @@ def _draw_over(scene: bpy.types.Scene, view: Matrix, projection: Matrix, height:
         draw_layers(scene)
         gpu.matrix.load_matrix(Matrix.Identity(4))
         gpu.matrix.load_projection_matrix(_pixels(WIDTH, height))
-        draw_legend_at(scene, WIDTH - MARGIN, MARGIN, scale)
+        draw_legend_at(legend_blocks(scene), WIDTH - MARGIN, MARGIN, scale)
 
 
 def _pixels(width: int, height: int) -> Matrix:
