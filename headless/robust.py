@@ -26,7 +26,7 @@ from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
 from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.stability.disturbed_views import Surroundings
-from seip_addon.core.stability.pose_errors import PoseErrors
+from seip_addon.core.stability.pose_errors import PoseErrors, require_draws
 from seip_addon.core.stability.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_study import Contender, RobustSettings, RobustStudy, robust_study
@@ -40,6 +40,8 @@ def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
     goal, errors, risk = goal_of(options), _errors(options), _risk(options)
+    for number in (options.scenarios, options.draws):
+        require_draws(number)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
     study = _placed(surveyed, goal, risk, errors, options)
     (chosen,) = study.robust

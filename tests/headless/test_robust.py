@@ -35,3 +35,18 @@ def test_errors_that_cannot_be_meant_are_refused(tmp_path):
 def test_one_sensor_cannot_be_lost_of_one(tmp_path):
     with pytest.raises(SeipError, match="at least 2 sensors"):
         run(tmp_path, "--count", "1", "--failure", "worst")
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"),
+    [
+        (("--tilt-error", "-2"), "the error of tilt must be 0 to 57°, not -2°"),  # not of yaw, which follows it
+        (("--position-error", "-1"), "the error of position must be 0 to 100 m"),
+        (("--scenarios", "0"), "asked for 0 draws"),
+        (("--draws", "0"), "asked for 0 draws"),
+    ],
+)
+def test_a_slip_is_named_before_any_work(tmp_path, option, sentence):
+    with pytest.raises(SeipError, match=sentence):
+        run(tmp_path / "out", *option)
+    assert not (tmp_path / "out").exists()

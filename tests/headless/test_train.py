@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("torch", reason="torch is not installed: pip install --group detection")
+pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import simulate, train
 from headless.detection.detector import Detector

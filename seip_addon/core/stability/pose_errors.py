@@ -29,6 +29,10 @@ _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
 
 
+WIDEST, STEEPEST = 100.0, 1.0
+"""Metres and radians: larger standard deviations are slips of the keyboard."""
+
+
 @dataclass(frozen=True)
 class PoseErrors:
     """Standard deviations of what may be wrong with a sensor's pose.
@@ -49,12 +53,15 @@ class PoseErrors:
     tilt: float = math.radians(2.0)
 
     def __post_init__(self) -> None:
-        for name, unit, most in (("position", "m", 100.0), ("height", "m", 100.0), ("yaw", "", 4.0), ("tilt", "", 1.0)):
+        for name in ("position", "height"):
+            value = getattr(self, name)
+            if not 0 <= value <= WIDEST:
+                raise SeipError(f"the error of {name} must be 0 to {WIDEST:g} m, not {value:g} m")
+        for name, most in (("tilt", STEEPEST), ("yaw", math.pi)):
             value = getattr(self, name)
             if not 0 <= value <= most:
-                limit = f"{most:g} {unit}" if unit else f"{math.degrees(most):.0f}°"
-                shown = f"{value:g}" if unit else f"{math.degrees(value):g}°"
-                raise SeipError(f"the error of {name} must be 0 to {limit}, not {shown}")
+                limit, shown = math.degrees(most), math.degrees(value)
+                raise SeipError(f"the error of {name} must be 0 to {limit:.0f}°, not {shown:g}°")
 
     def alone(self, kind: str) -> PoseErrors:
         """Return the errors of one kind, with nothing else wrong."""
@@ -111,6 +118,12 @@ class PoseDraws:
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def require_draws(draws: int) -> None:
+    """Raise SeipError where there would be no draw."""
+    if draws < 1:
+        raise SeipError(f"asked for {draws} draws of pose errors; ask for at least 1")
+
+
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
     """Draw what is wrong with the poses of sensors.
 
@@ -132,8 +145,7 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
     -------
     PoseDraws
     """
-    if draws < 1:
-        raise SeipError(f"asked for {draws} draws of pose errors; ask for at least 1")
+    require_draws(draws)
     if seed < 0:
         raise SeipError(f"the seed of the pose errors is {seed}; give a whole number of at least 0")
     positions, of_position = np.unique(np.rint(foot / _MICROMETRE).astype(np.int64), axis=0, return_inverse=True)
