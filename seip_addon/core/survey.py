@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ import numpy as np
 from .candidates import CandidateSettings
 from .deployment import deploy
 from .errors import SeipError
-from .goal import Goal, Plan, make_plan, target_weights
+from .goal import Goal, Plan, make_plan, placement_problem, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
 from .placement import Placement
 from .placement.integer_program import check_solver
+from .placement.near_best import near_best
 from .progress import Progress
 from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
@@ -162,11 +163,16 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
 
 
 def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
-    """Answer a goal on a survey; see `make_plan`."""
-    settings = layout.settings
-    return make_plan(
-        layout.site, grid.visible, layout.models, goal, solver=settings.solver, time_limit=settings.time_limit
-    )
+    """Answer a goal on a survey, see `make_plan`, and note how many other answers are as good, see `near_best`."""
+    site, models, settings = layout.site, layout.models, layout.settings
+    steps = make_plan(site, grid.visible, models, goal, solver=settings.solver, time_limit=settings.time_limit)
+    plan = yield from steps
+    if goal.cheapest or plan.placement.status != "optimal":
+        return plan
+    top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
+    if top is None:
+        return plan
+    return replace(plan, placement=replace(plan.placement, notes=(*plan.placement.notes, top.sentence)))
 
 
 @dataclass(frozen=True)

@@ -154,6 +154,22 @@ def test_near_best_says_when_there_are_more() -> None:
         finish(list_near_best(problem, best.chosen, 1.5))
 
 
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: int) -> None:
+    problem, _ = random_problem(seed)
+    best = finish(solve(problem))
+    every = {tuple(row) for row in finish(list_near_best(problem, best.chosen, 0.3)).placements.tolist()}
+    with patch.object(near_best, "MOST_BRANCHES", 0):
+        top = finish(list_near_best(problem, best.chosen, 0.3))
+    found = {tuple(row) for row in top.placements.tolist()}
+    chosen = set(best.chosen.tolist())
+    assert not top.complete
+    assert top.sentence.startswith("more than")
+    assert found <= every
+    assert {row for row in every if len(chosen - set(row)) <= 1 and len(set(row) - {-1}) == len(chosen)} <= found
+
+
 def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     tie, time = TieCheck(1e-6, Share(0, 5), 0.0), TimeCheck("plane", 1.0, 1.1, 0.05, proven=False)
     study = finish(solver_study(1))

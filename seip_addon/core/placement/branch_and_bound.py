@@ -183,15 +183,15 @@ class Search:
         self.satisfied = False
         self._clock = Clock(math.inf)
 
-    def run(self, clock: Clock, seconds: float) -> Generator[Progress, None, bool]:
-        """Search depth first; return whether all was seen, or enough, before the time was up."""
+    def run(self, clock: Clock, seconds: float, most: float = math.inf) -> Generator[Progress, None, bool]:
+        """Search depth first; return whether all was seen, or enough, before the time was up, in ``most`` branches."""
         end = clock.elapsed + min(seconds, clock.left)
         self._clock = clock
         everyone = np.arange(len(self.instance))
         stack = [_sorted_node((), 0.0, -math.inf, everyone, self.matrix @ self.weight, None)]
         nodes = 0
         while stack and not self.satisfied:
-            if clock.elapsed > end:
+            if clock.elapsed > end or nodes >= most:
                 return False
             yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
             nodes += 1

@@ -11,13 +11,16 @@ import numpy as np
 from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
-from .branch_and_bound import Search
+from .branch_and_bound import Search, is_worthwhile
 from .clock import Clock
 from .instance import Instance, make_instance
 from .problem import PlacementProblem
 
-MOST_LISTED = 200_000
+MOST_LISTED = 10_000
 """Placements that are listed at most."""
+
+MOST_BRANCHES = 300
+"""Branches that are searched at most: no clock decides what is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +36,8 @@ class FlatTop:
     covered : (n,) float64
         What each covers.
     complete : bool
-        Whether these are all, but for poses that another at the same position outdoes; else there are more.
+        Whether these are all, but for poses that another at the same position outdoes; else these are those of the
+        first branches of the search, and those that differ from the best in one sensor.
     in_common : (k + 1,) int64
         How many of them have 0, 1, … k positions in common with the best one.
     positions : int
@@ -54,17 +58,20 @@ class FlatTop:
     @property
     def sentence(self) -> str:
         """How many there are, and how different."""
+        near = f"within {self.share:.0%} of the best"
+        if self.complete and len(self) == 1:
+            return f"no other placement covers {near}"
         many = f"{len(self):,}" if self.complete else f"more than {len(self):,}"
-        fewest = int(np.flatnonzero(self.in_common)[0])
-        return (
-            f"{many} placements cover within {self.share:.0%} of the best; they use {self.positions} positions, "
-            f"and some share only {fewest} of {len(self.in_common) - 1} with it"
+        fewest, sensors = int(np.flatnonzero(self.in_common)[0]), len(self.in_common) - 1
+        alike = (
+            f"some share {fewest or 'none'} of {sensors} with it" if fewest < sensors else "all where the best has its"
         )
+        return f"{many} placements cover {near}; they use {self.positions} positions, {alike}"
 
 
 def near_best(
-    problem: PlacementProblem, chosen: Integer, share: float = 0.01, time_limit: float = 60.0
-) -> Generator[Progress, None, FlatTop]:
+    problem: PlacementProblem, chosen: Integer, share: float = 0.01
+) -> Generator[Progress, None, FlatTop | None]:
     """List the placements that cover within a share of an optimal one.
 
     Parameters
@@ -75,7 +82,6 @@ def near_best(
         Its optimal placement.
     share : float
         0 to 1.
-    time_limit : float, seconds
 
     Yields
     ------
@@ -83,7 +89,8 @@ def near_best(
 
     Returns
     -------
-    FlatTop
+    FlatTop or None
+        None where there are too many sensors or candidates to search among.
 
     Raises
     ------
@@ -93,16 +100,20 @@ def near_best(
     if not 0 <= share < 1:
         raise SeipError(f"the share below the best must be at least 0 and below 1, not {share:g}")
     instance, factor = make_instance(problem)
+    if not is_worthwhile(instance, np.arange(len(instance))):
+        return None
     best = math.fsum(problem.weights[problem.visible[chosen].any(axis=0)]) * factor
     search = _NearBest(instance, (1 - share) * best)
-    finished = yield from search.run(Clock(math.inf), time_limit)
+    finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
+    if not finished:
+        search.exchange(np.flatnonzero(np.isin(instance.original, chosen)))
     rows = _in_rows([np.sort(instance.original[list(found)]) for found in search.found], len(chosen))
     used = np.append(problem.positions, -1)[rows]
     in_common = np.isin(used, problem.positions[chosen]).sum(axis=1)
     return FlatTop(
         share=share,
         placements=rows,
-        covered=np.array(search.values) / factor,
+        covered=np.array(list(search.found.values())) / factor,
         complete=finished and not search.satisfied,
         in_common=np.bincount(in_common, minlength=len(chosen) + 1),
         positions=len(np.unique(used[used >= 0])),
@@ -114,16 +125,23 @@ class _NearBest(Search):
 
     def __init__(self, instance: Instance, goal: float) -> None:
         super().__init__(instance, goal)
-        self.found: list[tuple[int, ...]] = []
-        self.values: list[float] = []
+        self.found: dict[tuple[int, ...], float] = {}
+
+    def exchange(self, chosen: Integer) -> None:
+        """Take a placement, and those that have another candidate in place of one of its own."""
+        self._take(tuple(chosen.tolist()), self.instance.covered(chosen))
+        for kept in (np.delete(chosen, number) for number in range(len(chosen))):
+            values = self.instance.covered(kept) + self.instance.gains(self.instance.uncovered(kept))
+            for other in np.setdiff1d(np.flatnonzero(values >= self.goal), kept):
+                self._take((*kept.tolist(), int(other)), float(values[other]))
 
     def _take(self, chosen: tuple[int, ...], value: float) -> float:
-        if self.instance.feasible(np.array(chosen)):
+        key = tuple(sorted(chosen))
+        if key not in self.found and self.instance.feasible(np.array(key)):
             if len(self.found) == MOST_LISTED:
                 self.satisfied = True
             else:
-                self.found.append(chosen)
-                self.values.append(value)
+                self.found[key] = value
         return self.goal
 
     def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- coverage is all
