@@ -25,12 +25,11 @@ from seip_addon.core.deployment import deploy
 from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
 from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.stability.disturbed_views import Surroundings
 from seip_addon.core.stability.pose_errors import PoseErrors, require_draws
 from seip_addon.core.stability.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_study import Contender, RobustSettings, RobustStudy, robust_study
-from seip_addon.core.survey import Circumstances, Layout, record_of
+from seip_addon.core.survey import Circumstances, record_of, surroundings
 from seip_addon.scene.result_folder import write_result_folder
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
@@ -86,7 +85,7 @@ def _placed(
         solver=layout.settings.solver,
         time_limit=layout.settings.time_limit,
     )
-    steps = robust_study(_around(layout), problem, settings, [risk])
+    steps = robust_study(surroundings(layout), problem, settings, [risk])
     return surveyed.stopwatch.run("robust placement", steps)
 
 
@@ -97,16 +96,11 @@ def _plan(
     layout = surveyed.layout
     deployment = deploy(layout.site, layout.models, surveyed.grid.visible, chosen.placement.chosen)
     settings = StudySettings(errors, options.draws, min(100, options.draws), options.seed + 1)
-    steps = pose_study(_around(layout), deployment, settings)
+    steps = pose_study(surroundings(layout), deployment, settings)
     judged = surveyed.stopwatch.run("pose errors", steps)
     note = f"chosen for {chosen.name} over {options.scenarios} scenarios: objective, bound and gap are of that"
     placement = replace(chosen.placement, notes=(note, *chosen.placement.notes, *pose_warnings(judged)))
     return Plan(goal, placement, None, deployment), judged
-
-
-def _around(layout: Layout) -> Surroundings:
-    settings = layout.settings
-    return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
 
 
 def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:

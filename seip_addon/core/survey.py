@@ -23,12 +23,17 @@ from .progress import Progress
 from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
+from .stability.disturbed_views import Surroundings
+from .stability.pose_study import StudySettings, pose_study, pose_warnings
 from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
 from .visibility.ring_resolution import resolution_warnings
 from .visibility.rounding import rounding_warnings
 from .visibility.store import stored_visibility
+
+POSES_TRIED = StudySettings(draws=100, draws_of_kind=0)
+"""What every placement is tried with."""
 
 
 @dataclass(frozen=True)
@@ -163,16 +168,28 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
 
 
 def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
-    """Answer a goal on a survey, see `make_plan`, and note how many other answers are as good, see `near_best`."""
+    """Answer a goal on a survey, and note how far the answer can be trusted.
+
+    The notes of the placement say how many others are as good (`near_best`) and what it loses where its sensors do
+    not hang quite as planned (`pose_warnings`).
+    """
     site, models, settings = layout.site, layout.models, layout.settings
     steps = make_plan(site, grid.visible, models, goal, solver=settings.solver, time_limit=settings.time_limit)
     plan = yield from steps
-    if goal.cheapest or plan.placement.status != "optimal":
-        return plan
-    top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
-    if top is None:
-        return plan
-    return replace(plan, placement=replace(plan.placement, notes=(*plan.placement.notes, top.sentence)))
+    notes = [*plan.placement.notes]
+    if plan.placement.status == "optimal" and not goal.cheapest:
+        top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
+        notes += [] if top is None else [top.sentence]
+    if plan.deployment.sensors:
+        study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
+        notes += pose_warnings(study)
+    return replace(plan, placement=replace(plan.placement, notes=tuple(notes)))
+
+
+def surroundings(layout: Layout) -> Surroundings:
+    """Return where the sensors of a survey may hang, and what they see there."""
+    settings = layout.settings
+    return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
 
 
 @dataclass(frozen=True)

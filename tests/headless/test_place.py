@@ -46,6 +46,13 @@ def test_the_folder_holds_every_result(folder):
     }
 
 
+def test_the_record_says_how_far_it_can_be_trusted(folder):
+    record = load_placement_record(folder / "placement.json")
+    assert any("within 1% of the best" in note for note in record["notes"])
+    assert any("in one of twenty cases" in note for note in record["notes"])
+    assert any("neighbouring rings" in warning for warning in record["warnings"])
+
+
 def test_tables_agree_with_the_record(folder):
     record = load_placement_record(folder / "placement.json")
     rows = list(csv.DictReader((folder / "candidates.csv").read_text(encoding="utf-8").splitlines()))

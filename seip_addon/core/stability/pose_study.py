@@ -38,7 +38,7 @@ class StudySettings:
     draws : int
         With all sensors erring in all ways.
     draws_of_kind : int
-        With one kind of error alone.
+        With one kind of error alone; 0 leaves the kinds out.
     seed : int
     """
 
@@ -157,7 +157,7 @@ def pose_study(
     together, blocked = yield from views(settings.errors, settings.draws)
     by_kind = {}
     for kind in KINDS:
-        if getattr(settings.errors, kind) > 0:
+        if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
             of_kind, _ = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
             by_kind[kind] = _coverages(site, [of_kind.seen(draw) for draw in range(len(of_kind))])
     return PoseStudy(

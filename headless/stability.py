@@ -1,0 +1,225 @@
+"""Drive every method to where it fails, and write what was found as one page with charts.
+
+python -m headless.stability scenes/junction.blend -o docs
+blender -b --python-exit-code 1 site.blend -P headless/stability.py -- -o docs
+
+Chapters that are done are kept in the folder of work: a run that was stopped goes on with the next.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session, survey
+
+from seip_addon.core.deployment import deploy
+from seip_addon.core.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
+from seip_addon.core.pictures import stability_limits_charts as limits_charts
+from seip_addon.core.pictures import stability_robust_charts as robust_charts
+from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement.near_best import FlatTop, near_best
+from seip_addon.core.progress import Progress
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.stability.arithmetic import arithmetic_rows, arithmetic_study
+from seip_addon.core.stability.criterion import criterion_rows, criterion_study
+from seip_addon.core.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
+from seip_addon.core.stability.pose_study import StudySettings, pose_rows, pose_study
+from seip_addon.core.stability.risk import Risk
+from seip_addon.core.stability.robust_study import RobustSettings, robust_rows, robust_study
+from seip_addon.core.stability.solver_limits import solver_rows, solver_study
+from seip_addon.core.storage import digest
+from seip_addon.core.survey import grid_key, surroundings
+
+FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
+"""What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
+
+PAGE, CHARTS = "stability.md", "stability"
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A scene, laid out and seen.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    charts : path
+        Folder of the charts.
+    """
+
+    surveyed: survey.Survey
+    charts: Path
+
+    @property
+    def name(self) -> str:
+        """The scene's name, for titles."""
+        return self.surveyed.layout.site.name
+
+    def problem(self, sensor: str) -> PlacementProblem:
+        """Return the placement of the usual number of sensors of one type."""
+        layout = self.surveyed.layout
+        problem = placement_problem(layout.site, self.surveyed.grid.visible, layout.models, Goal(count=DEFAULT_COUNT))
+        return replace(problem, forbidden=problem.forbidden | (layout.site.candidates.sensor != sensor))
+
+
+Work = Callable[[Stage], Generator[Progress, None, Chapter]]
+
+
+def main(argv: list[str]) -> None:
+    """Study what has not been studied yet, and write the page."""
+    options = _parser().parse_args(argv)
+    charts = options.output / CHARTS
+    session.check_folder(charts)
+    surveyed = survey.survey(
+        argparse.Namespace(**vars(options) | {"output": options.work}),
+        lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
+    )
+    stage = Stage(surveyed, charts)
+    made_from = digest(grid_key(surveyed.layout), repr(surveyed.layout.settings.as_record()), versions()["seip"])
+    chapters = []
+    for name, work in _chapters(stage):
+        kept = load_chapter(options.work / f"{name}.json", made_from)
+        if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
+            kept = surveyed.stopwatch.run(name, work(stage))
+            save_chapter(options.work / f"{name}.json", kept, made_from)
+            session.say(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
+        chapters.append(kept)
+    with session.writing(options.output):
+        save_page(options.output / PAGE, _lead(stage), chapters, CHARTS)
+    session.say(f"written to {options.output / PAGE}")
+
+
+def _chapters(stage: Stage) -> Iterator[tuple[str, Work]]:
+    yield "criterion", criterion
+    yield "arithmetic", arithmetic
+    yield "solvers", solvers
+    for sensor in stage.surveyed.layout.models:
+        yield f"poses-{sensor}", partial(poses, sensor=sensor)
+        yield f"failures-{sensor}", partial(failures, sensor=sensor)
+
+
+def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
+    """Vary what defines visibility."""
+    layout = stage.surveyed.layout
+    delta = layout.settings.visibility.delta
+    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT)
+    limits_charts.save_ring_border_chart(stage.charts / "ring_borders.png", study, delta, f"{stage.name}: rings and δ")
+    limits_charts.save_border_check_chart(stage.charts / "beyond_border.png", study, f"{stage.name}: beyond the border")
+    limits_charts.save_delta_chart(stage.charts / "delta.png", study, delta, f"{stage.name}: coverage against δ")
+    limits_charts.save_convergence_chart(stage.charts / "convergence.png", study, f"{stage.name}: spacings")
+    return Chapter(
+        "The criterion of visibility",
+        tuple(criterion_rows(study, delta)),
+        (
+            Chart("ring_borders.png", "From which distance on rings on a level road are more than 2δ apart"),
+            Chart("beyond_border.png", "Share of the targets in view that count as seen, by distance in borders"),
+            Chart("delta.png", "Coverage of the best placement, and what its sensors have in view, against δ"),
+            Chart("convergence.png", "Coverage of the best placement against the spacings of targets and posts"),
+        ),
+    )
+
+
+def arithmetic(stage: Stage) -> Generator[Progress, None, Chapter]:
+    """Hold the ray casters to float64."""
+    study = yield from arithmetic_study()
+    limits_charts.save_rounding_chart(stage.charts / "rounding.png", study, "Hits against float64")
+    return Chapter(
+        "Arithmetic",
+        tuple(arithmetic_rows(study)),
+        (Chart("rounding.png", "How far hits are off, against distance from the origin and a stray mesh's distance"),),
+    )
+
+
+def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
+    """Drive the solvers to where they fail, and see how flat the top is."""
+    study = yield from solver_study()
+    tops: list[tuple[str, FlatTop]] = []
+    for sensor in stage.surveyed.layout.models:
+        problem = stage.problem(sensor)
+        best = yield from solve(problem, solver=stage.surveyed.layout.settings.solver)
+        top = yield from near_best(problem, best.chosen)
+        if top is not None:
+            tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
+    limits_charts.save_solver_chart(stage.charts / "solvers.png", study, "Solvers at their limits")
+    limits_charts.save_flat_top_chart(stage.charts / "flat_top.png", tops, f"{stage.name}: how flat the top is")
+    return Chapter(
+        "Solvers",
+        tuple(solver_rows(study, tops)),
+        (
+            Chart("solvers.png", "What answers lose on random and adversarial instances"),
+            Chart("flat_top.png", "Placements within 1 % of the best, by how many positions they share with it"),
+        ),
+    )
+
+
+def poses(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
+    """Let the poses of one type's placements err."""
+    layout, problem = stage.surveyed.layout, stage.problem(sensor)
+    study = yield from robust_study(surroundings(stage.surveyed.layout), problem, _settings(stage))
+    chosen = study.nominal.placement.chosen
+    deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
+    judged = yield from pose_study(surroundings(stage.surveyed.layout), deployment, StudySettings())
+    title, names = f"{stage.name}: {DEFAULT_COUNT} × {sensor}", [f"{what}_{sensor}.png" for what in _POSE_CHARTS]
+    robust_charts.save_spread_chart(stage.charts / names[0], study, f"{title} under pose errors")
+    robust_charts.save_blame_chart(stage.charts / names[1], judged, f"{title}, what costs coverage")
+    robust_charts.save_frontier_chart(stage.charts / names[2], study, f"{title}, what robustness costs and saves")
+    return Chapter(
+        f"Poses that err: {DEFAULT_COUNT} × {sensor}",
+        (*pose_rows(judged), *robust_rows(study)),
+        tuple(Chart(name, caption) for name, caption in zip(names, _POSE_CHARTS.values(), strict=True)),
+    )
+
+
+_POSE_CHARTS = {
+    "spread": "Distribution of coverage over unseen draws: the nominal optimum and robust placements",
+    "blame": "Mean loss when one sensor alone errs, and when one kind of error alone occurs",
+    "frontier": "What robustness costs in planned coverage, and what it saves in the 5 % quantile",
+}
+
+
+def failures(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
+    """Let a sensor fail, and ask for more than one look."""
+    study = yield from robust_study(
+        surroundings(stage.surveyed.layout), stage.problem(sensor), _settings(stage), FAILURES
+    )
+    name = f"failures_{sensor}.png"
+    robust_charts.save_spread_chart(stage.charts / name, study, f"{stage.name}: {DEFAULT_COUNT} × {sensor}, failures")
+    caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
+    return Chapter(f"Failures: {DEFAULT_COUNT} × {sensor}", robust_rows(study), (Chart(name, caption),))
+
+
+def _settings(stage: Stage) -> RobustSettings:
+    settings = stage.surveyed.layout.settings
+    return RobustSettings(solver=settings.solver, time_limit=settings.time_limit)
+
+
+def _lead(stage: Stage) -> str:
+    site = stage.surveyed.layout.site
+    return (
+        "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
+        f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "
+        "Brackets hold 95 % intervals. The warnings stand in the panel, in the batch output and in `placement.json`."
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="stability",
+        description="Drive every method to where it fails, and write a page with charts.",
+        formatter_class=survey.HelpWithDefaults,
+    )
+    survey.add_options(parser)
+    parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for what a rerun goes on from")
+    return parser
+
+
+if __name__ == "__main__":
+    session.run(main)
