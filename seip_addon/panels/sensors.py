@@ -1,4 +1,4 @@
-"""The panel of the sensors: which types to choose from, at which heights."""
+"""The panel of the sensors: which types to choose from, at which heights, and how far tilted."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         row.separator()
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list and the heights."""
+        """Draw the list, the heights and the tilts."""
         survey = context.scene.seip.survey
         layout = self.layout
         if sensor_types.complaint:
@@ -83,6 +83,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         column.use_property_split = True
         column.use_property_decorate = False
         column.prop(survey, "heights")
+        column.prop(survey, "tilts")
 
 
 class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
