@@ -154,7 +154,8 @@ class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
             layout, f"Blue: within 2δ = {2 * preview.delta:.3g} m of the next ring inwards", icon="COLORSET_04_VEC"
         )
         draw_sentence(layout, "Orange: farther apart; road between may go unseen", icon="COLORSET_02_VEC")
-        draw_sentence(layout, f"On a level road all is within 2δ up to {preview.resolved_to():.0f} m.")
+        before_it = " before it" if preview.tilt else ""
+        draw_sentence(layout, f"On a level road all{before_it} is within 2δ up to {preview.resolved_to():.0f} m.")
 
 
 CLASSES = (SEIP_UL_sensor_types, SEIP_PT_sensors, SEIP_PT_sensor_details, SEIP_PT_beam_preview)

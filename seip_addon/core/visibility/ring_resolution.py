@@ -16,7 +16,6 @@ import numpy as np
 
 from ..arrays import Boolean, Float
 from ..lidar import LidarModel, find_models
-from ..orientation import tilt_in_words
 from ..site import Site
 from .grid import VisibilitySettings
 
@@ -62,13 +61,13 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
 def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
     """Say from where on the tilted sensors of a type, each on the side that it looks to, count beams."""
     poses = site.candidates
-    mountings = sorted({(round(h, 2), t) for h, t in zip(poses.height[tilted], poses.tilt[tilted], strict=True)})
-    limits = [unresolved_from(model, height, delta, reach, tilt) for height, tilt in mountings]
-    beyond = [
-        f"{limit:.0f} m (at {height:g} m height{tilt_in_words(tilt)})"
-        for (height, tilt), limit in zip(mountings, limits, strict=True)
-        if limit < reach
-    ]
+    height = np.round(poses.height, 2)
+    beyond = []
+    for level in np.unique(height[tilted]):
+        tilts = np.unique(poses.tilt[tilted & (height == level)])
+        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
+        if limit < reach:
+            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
     sentence = (
         f"{model.key}: where it is tilted, beyond {', '.join(beyond)} neighbouring rings on a level road before it are "
         f"more than 2δ = {2 * delta:g} m apart, and behind it sooner, so coverage there counts beams, not view"
