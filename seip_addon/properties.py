@@ -32,6 +32,7 @@ from .preferences import catalogue_files
 from .scene import contract, roles
 
 _LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
+_TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _LAYOUT.tilts)
 
 
 class SEIP_PG_junction(bpy.types.PropertyGroup):
@@ -137,7 +138,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         name="Tilts (°)",
         description="How far sensors may be turned nose down towards the region, in degrees, like 0 5 10, or a range "
         "FROM:TO:STEP; 0 is upright, negative is up",
-        default=" ".join(f"{math.degrees(tilt):g}" for tilt in _LAYOUT.tilts),
+        default=_TILTS,
     )
     grid: FloatProperty(
         name="Target Grid",

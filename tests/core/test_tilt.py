@@ -2,6 +2,9 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+
+from headless.detection.recordings import Configuration
 
 import numpy as np
 import pytest
@@ -14,8 +17,10 @@ from hypothesis import strategies as st
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.candidates import CandidateSettings, lay_candidates, tilts_of
+from seip_addon.core.convergence import Judge
 from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
+from seip_addon.core.goal import Goal
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.orientation import orientation, orientations, tilt_in_words, turned
 from seip_addon.core.progress import finish
@@ -23,9 +28,11 @@ from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.sight_lines import pose_at
 from seip_addon.core.site import Site, Targets
+from seip_addon.core.stability.criterion import in_view
 from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views
 from seip_addon.core.stability.pose_errors import PoseDraws
 from seip_addon.core.storage import digest
+from seip_addon.core.survey import SurveySettings
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import (
     FILE,
@@ -262,6 +269,37 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
         assert (sensor.orientation == candidates.orientation(sensor.pose)).all()
         looks = Onlooker(site, SIGHT, make_ray_caster(site.triangles, ANY))
         assert (looks.see(sensor.model, sensor.xyz, sensor.orientation) == visible[sensor.pose]).all()
+
+
+def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
+    settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
+    judge = Judge(street(), settings, Goal(count=1))
+    plan = finish(judge.plan(street_site(lay_candidates(street(), settings.candidates)), settings))
+    (sensor,) = plan.deployment.sensors
+    looks = Onlooker(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))
+    as_it_hangs = looks.see(sensor.model, sensor.xyz, sensor.orientation).mean()
+    assert judge.judge(plan) == pytest.approx(as_it_hangs, abs=1e-12)
+    assert as_it_hangs != looks.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw)).mean()
+
+
+def test_recordings_are_made_as_the_sensors_hang():
+    site = street_site(lay_candidates(street(), replace(CHOICE, tilts=(0.0, math.radians(20)))))
+    deployment = deploy(site, MODELS, grid_of(site).visible, [0, 1, 6])
+    mounted = Configuration(SimpleNamespace(deployment=deployment)).sensors
+    for sensor, chosen in zip(mounted, deployment.sensors, strict=True):
+        assert (sensor.orientation == site.candidates.orientation(chosen.pose)).all()
+    assert {round(math.degrees(chosen.tilt)) for chosen in deployment.sensors} == {0, 20}
+
+
+def test_what_is_in_view_turns_with_the_sensor():
+    caster, model = make_ray_caster(street_site(lay_candidates(street(), CHOICE)).triangles, ANY), MODELS["type1"]
+    xyz, near = (
+        np.array([0.0, 0.0, 5.0]),
+        np.array([[8.0, 0.0, 0.0]]),
+    )  # 32 degrees below the horizon, the beams end at 15
+    assert not in_view(caster, model, xyz, orientation(0.0, 0.0), near).any()
+    assert in_view(caster, model, xyz, orientation(0.0, math.radians(20)), near).all()
+    assert not in_view(caster, model, xyz, orientation(math.pi, math.radians(20)), near).any()
 
 
 def test_a_sensor_hangs_at_the_pose_of_its_own_tilt():
