@@ -260,7 +260,7 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
         sensor=np.tile(sensors, int(kept.sum()) * len(tilts)),
         height=np.repeat(height[kept], repeat),
         xyz=np.repeat(xyz[kept], repeat, axis=0),
-        yaw=np.where(tilt == 0, 0.0, _looks_to(foot[used], geometry.region)[position_of]),
+        yaw=_yaws(tilt, position_of, foot[used], geometry.region),
         tilt=tilt,
         mandatory=np.array([row for _, row in groups], dtype=bool).reshape(len(groups), len(used)),
         mandatory_name=np.array([title for title, _ in groups], dtype=np.str_),
@@ -336,10 +336,13 @@ def _towards(point: Float, region: BaseGeometry) -> Float:
     return way / length if length > 0 else np.array((1.0, 0.0))
 
 
-def _looks_to(foot: Float, region: BaseGeometry) -> Float:
-    """Return the yaw in which each place has the region before it, (n,) radians."""
+def _yaws(tilt: Float, position_of: Integer, foot: Float, region: BaseGeometry) -> Float:
+    """Return the yaw of each pose, (c,) radians: zero where it is upright, else that which has the region before it."""
+    if not tilt.any():
+        return np.zeros(len(tilt))
     way = np.array([_towards(point[:2], region) for point in foot])
-    return np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
+    before_it = np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
+    return np.where(tilt == 0, 0.0, before_it[position_of])
 
 
 def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[tuple[str, Boolean]]:

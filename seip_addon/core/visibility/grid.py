@@ -147,7 +147,8 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     return digest(
         *(FILE.schema, FILE.version, engine, float(settings.delta), float(settings.min_intensity)),
         *(site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, which),
-        *(*patterns, *tilts),
+        *patterns,
+        *tilts,
     )
 
 

@@ -3,8 +3,8 @@
 On a level road h below the sensor the channel of elevation -φ draws a ring of
 radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets
 between them count as unseen although nothing stands before them. A sensor that is
-tilted by θ draws the ring of elevation -φ - θ on the side that it looks to; on the
-other side its rings are as much farther apart.
+tilted by θ draws the ring of elevation -φ - θ on the side that it looks to, and that
+of -φ + θ, which lies farther from the next, on the other.
 """
 
 from __future__ import annotations
