@@ -27,6 +27,7 @@ import bpy
 
 from seip_addon.core.convergence import coarsest_settings
 from seip_addon.core.goal import Plan, check_goal
+from seip_addon.core.orientation import tilt_in_words
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.survey import Circumstances, place, record_of
 from seip_addon.scene.result_folder import write_result_folder
@@ -61,8 +62,8 @@ def main(argv: list[str]) -> None:
 def _in_words(plan: Plan) -> str:
     placement, deployment = plan.placement, plan.deployment
     lines = [
-        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m, {sensor.position_name}: "
-        f"sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
+        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt_in_words(sensor.tilt)}, "
+        f"{sensor.position_name}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"

@@ -23,6 +23,7 @@ import bpy
 
 from seip_addon.core.deployment import deploy
 from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
+from seip_addon.core.orientation import tilt_in_words
 from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.stability.pose_errors import PoseErrors, require_draws
@@ -106,7 +107,7 @@ def _plan(
 def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:
     nominal = study.nominal
     lines = [
-        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m, {sensor.position_name}"
+        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt_in_words(sensor.tilt)}, {sensor.position_name}"
         for sensor in plan.deployment.sensors
     ]
     return "\n".join(

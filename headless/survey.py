@@ -14,7 +14,7 @@ from headless import session
 import bpy
 import numpy as np
 
-from seip_addon.core.candidates import CandidateSettings, heights_of
+from seip_addon.core.candidates import CandidateSettings, heights_of, tilts_of
 from seip_addon.core.convergence import Convergence
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
@@ -73,7 +73,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     sensors.add_argument("--sensor", nargs="+", default=layout.sensors, metavar="KEY", help="types to choose from")
     sensors.add_argument("--catalogue", nargs="+", type=Path, default=[], metavar="TOML", help="catalogues of your own")
     sensors.add_argument(
-        "--heights", nargs="+", default=layout.heights, action=_Heights, metavar="M", help="metres, or FROM:TO:STEP"
+        "--heights",
+        nargs="+",
+        default=layout.heights,
+        action=_several(heights_of),
+        metavar="M",
+        help="metres, or FROM:TO:STEP",
+    )
+    sensors.add_argument(
+        "--tilts",
+        nargs="+",
+        default=layout.tilts,
+        action=_several(tilts_of),
+        metavar="DEG",
+        help="degrees nose down towards the region, or FROM:TO:STEP; up where negative; upright if not given",
     )
     metres = parser.add_argument_group("grid and candidates, in metres")
     metres.add_argument("--grid", type=float, default=1.0, help="spacing of the targets")
@@ -140,6 +153,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         candidates=CandidateSettings(
             sensors=tuple(options.sensor),
             heights=tuple(options.heights),
+            tilts=tuple(options.tilts),
             spacing=options.spacing,
             setback=options.setback,
             clearance=options.clearance,
@@ -171,15 +185,17 @@ class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
         return action.help if action.default in (None, []) else super()._get_help_string(action)
 
 
-class _Heights(argparse.Action):
-    """Heights as a list, or a range FROM:TO:STEP with both ends."""
+def _several(numbers_of: Callable[[list[str]], tuple[float, ...]]) -> type[argparse.Action]:
+    """Return what stores the numbers that several texts name, each a number or a range."""
 
-    def __call__(
-        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, *_: object
-    ) -> None:
-        """Store the heights as a tuple of metres."""
-        texts = values if isinstance(values, list) else []
-        try:
-            setattr(namespace, self.dest, heights_of(texts))
-        except SeipError as error:
-            parser.error(f"argument --heights: {error}")
+    class Several(argparse.Action):
+        def __call__(
+            self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, *_: object
+        ) -> None:
+            texts = values if isinstance(values, list) else []
+            try:
+                setattr(namespace, self.dest, numbers_of(texts))
+            except SeipError as error:
+                parser.error(f"argument {'/'.join(self.option_strings)}: {error}")
+
+    return Several

@@ -14,10 +14,10 @@ import bpy
 import numpy as np
 
 from . import preferences, state
-from .core.arrays import Boolean, Float, Integer
-from .core.deployment import Deployment
+from .core.arrays import Boolean, Integer
+from .core.deployment import Deployment, Sensor
 from .core.errors import SeipError
-from .core.scans.sensor import MountedSensor, level_orientation
+from .core.scans.sensor import MountedSensor
 from .core.visibility.turned import Onlooker
 from .scene import contract
 from .scene.sensors import read_sensors
@@ -123,24 +123,16 @@ def _moved(live: Live, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
     plan = live.known.plan
     placed = {} if plan is None else {sensor.label: sensor for sensor in plan.deployment.sensors}
     return tuple(
-        label
-        for label, sensor in sensors.items()
-        if label not in placed or not _same(sensor, _mounted(placed[label].xyz, placed[label].yaw, sensor))
+        label for label, sensor in sensors.items() if label not in placed or not _same(sensor, _mounted(placed[label]))
     )
 
 
 def _as_placed(deployment: Deployment, visible: Boolean) -> dict[str, tuple[MountedSensor, Boolean]]:
-    return {
-        sensor.label: (
-            MountedSensor(sensor.label, sensor.model, sensor.xyz, level_orientation(sensor.yaw)),
-            visible[sensor.pose],
-        )
-        for sensor in deployment.sensors
-    }
+    return {sensor.label: (_mounted(sensor), visible[sensor.pose]) for sensor in deployment.sensors}
 
 
-def _mounted(xyz: Float, yaw: float, like: MountedSensor) -> MountedSensor:
-    return MountedSensor(like.label, like.model, xyz, level_orientation(yaw))
+def _mounted(sensor: Sensor) -> MountedSensor:
+    return MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Literal
 
@@ -17,7 +18,7 @@ from bpy.props import (
 )
 
 from . import pointing, scans, state
-from .core.candidates import HIGHEST, CandidateSettings, heights_of
+from .core.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
 from .core.datasets import FORMATS, SPLITS
 from .core.goal import DEFAULT_COUNT, Goal
 from .core.recording import RecordingSettings
@@ -31,6 +32,7 @@ from .preferences import catalogue_files
 from .scene import contract, roles
 
 _LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
+_TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _LAYOUT.tilts)
 
 
 class SEIP_PG_junction(bpy.types.PropertyGroup):
@@ -131,6 +133,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         name="Heights (m)",
         description="Mounting heights above the ground in metres, like 3.5 5.4 8, or a range FROM:TO:STEP",
         default=" ".join(f"{height:g}" for height in _LAYOUT.heights),
+    )
+    tilts: StringProperty(
+        name="Tilts (°)",
+        description="How far sensors may be turned nose down towards the region, in degrees, like 0 5 10, or a range "
+        "FROM:TO:STEP; 0 is upright, negative is up",
+        default=_TILTS,
     )
     grid: FloatProperty(
         name="Target Grid",
@@ -239,6 +247,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             candidates=CandidateSettings(
                 sensors=used if len(self.types) else _LAYOUT.sensors,
                 heights=heights_of(self.heights.split()),
+                tilts=tilts_of(self.tilts.split()),
                 spacing=_written(self.spacing),
                 setback=_written(self.setback),
                 clearance=_written(self.clearance),

@@ -18,7 +18,6 @@ from seip_addon.core.scans import (
     ScanSettings,
     Simulation,
     StaticScene,
-    level_orientation,
     prepare,
 )
 from seip_addon.core.storage import digest
@@ -70,7 +69,7 @@ class Configuration:
     def sensors(self) -> tuple[MountedSensor, ...]:
         """The sensors where they hang."""
         return tuple(
-            MountedSensor(sensor.label, sensor.model, sensor.xyz, level_orientation(sensor.yaw))
+            MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
             for sensor in self.case.deployment.sensors
         )
 

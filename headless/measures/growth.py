@@ -107,7 +107,7 @@ def look(scaled: Scaled, models: dict[str, LidarModel], settings: VisibilitySett
     What is done once for a site counts once, the places count for those they stand for.
     """
     site, poses = scaled.site, scaled.site.candidates
-    every = places(poses.xyz, poses.yaw)
+    every = places(poses.xyz, poses.yaw, poses.tilt)
     sample = [every[n] for n in np.unique(np.linspace(0, len(every) - 1, scaled.looked_from).astype(int))]
     longest = max(model.max_range for model in models.values())
     once, each = Expense(), Expense()
@@ -162,7 +162,7 @@ def _shifted(xyz: Float, shift: Float) -> Float:
 def _repeated_candidates(candidates: Candidates, shift: Float) -> Candidates:
     copies, positions = len(shift), len(candidates.position)
     moved: dict[str, Any] = {name: _shifted(getattr(candidates, name), shift) for name in ("position", "xyz")}
-    for name in ("position_name", "on_pole", "sensor", "height", "yaw"):
+    for name in ("position_name", "on_pole", "sensor", "height", "yaw", "tilt"):
         moved[name] = np.tile(getattr(candidates, name), copies)
     moved["position_of"] = np.concatenate([candidates.position_of + k * positions for k in range(copies)])
     moved["mandatory"] = np.tile(candidates.mandatory, (1, copies))

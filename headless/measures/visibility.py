@@ -21,7 +21,8 @@ from seip_addon.core.site import Site
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.visibility.observer import Observer, places
 from seip_addon.core.visibility.ray_casting import Engine, RayCaster, make_ray_caster
-from seip_addon.core.visibility.scanning import Place, seen_by_all_rays
+from seip_addon.core.visibility.scanning import Place
+from seip_addon.core.visibility.sight import seen_by_tilted_full_scan
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
@@ -103,7 +104,7 @@ class Observers:
         used = [self._models[key] for key in candidates.sensor[poses].tolist()]
         origin, yaw = candidates.xyz[poses[0]], float(candidates.yaw[poses[0]])
         place = Place(self._caster, origin, yaw, used, self._settings.delta, self._settings.min_intensity)
-        return seen_by_all_rays(place, self._site.targets.xyz)
+        return seen_by_tilted_full_scan(place, float(candidates.tilt[poses[0]]), self._site.targets.xyz)
 
     def lazy(self, poses: Integer) -> tuple[Boolean, int]:
         """Cast only rays that can matter; see `full`."""
@@ -113,7 +114,7 @@ class Observers:
 
 def sampled_places(site: Site, samples: int) -> list[Integer]:
     """Return places evenly spread over a site, each as its poses."""
-    every = places(site.candidates.xyz, site.candidates.yaw)
+    every = places(site.candidates.xyz, site.candidates.yaw, site.candidates.tilt)
     return [every[number] for number in np.unique(np.linspace(0, len(every) - 1, samples).astype(int))]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from .arrays import Boolean, Float, Integer, Text
 from .errors import SeipError
 from .obstruction import inside_any, post_blocked
+from .orientation import orientation
 from .pavement_sampling import spread
 from .plan_geometry import outline, surface_height
 from .scene_geometry import NamedArea, Pole, SceneGeometry, joined
@@ -21,6 +23,9 @@ _ABOVE_POLE = 0.5
 
 HIGHEST = 100.0
 """Metres: a sensor higher than this is a slip of the keyboard."""
+
+STEEPEST = 90.0
+"""Degrees: tilts are less than this, up or down."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,9 @@ class CandidateSettings:
         Catalogue keys of the sensor types to choose from.
     heights : tuple of float, metres
         Mounting heights above the ground point.
+    tilts : tuple of float, radians
+        How far a sensor's nose is turned down towards the region, the way that a
+        bracket points; negative is up. At 0 it hangs upright.
     spacing : float, metres
         Least distance between two positions on the pavement.
     setback : float, metres
@@ -45,6 +53,7 @@ class CandidateSettings:
 
     sensors: tuple[str, ...] = ("type1", "type2", "type3")
     heights: tuple[float, ...] = (3.5, 5.4, 8.0)
+    tilts: tuple[float, ...] = (0.0,)
     spacing: float = 4.0
     setback: float = 0.5
     clearance: float = 0.3
@@ -60,12 +69,24 @@ class CandidateSettings:
                 raise SeipError(
                     f"a mounting height must be a positive number of metres up to {HIGHEST:g}, not {height}"
                 )
+        self._check_tilts()
         if not 0.1 <= self.spacing <= 1000:
             raise SeipError(f"the candidate spacing must be 0.1 to 1000 m, not {self.spacing}")
         for name in ("setback", "clearance", "bracket"):
             value = getattr(self, name)
             if not 0 <= value <= 100:
                 raise SeipError(f"the {name} must be 0 to 100 m, not {value}")
+
+    def _check_tilts(self) -> None:
+        if not self.tilts:
+            raise SeipError("no tilt is given: name at least one, in degrees; 0 is upright")
+        for number, tilt in enumerate(self.tilts):
+            if not abs(math.degrees(tilt)) < STEEPEST:
+                raise SeipError(
+                    f"a tilt must be more than -{STEEPEST:g}° and less than {STEEPEST:g}°, not {math.degrees(tilt):g}°"
+                )
+            if tilt in self.tilts[:number]:
+                raise SeipError(f"the tilt of {math.degrees(tilt):g}° is given twice: name each tilt once")
 
 
 def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
@@ -78,26 +99,58 @@ def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
     """
     heights: list[float] = []
     for text in texts:
-        try:
-            numbers = [float(part) for part in text.split(":")]
-        except ValueError:
-            numbers = []
-        if len(numbers) == 1:
-            heights += numbers
-        elif len(numbers) == 3 and 0 < numbers[0] <= numbers[1] <= HIGHEST and numbers[2] >= 0.01:
-            first, last, step = numbers
-            heights += np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
-        else:
+        named = _named_by(text, 0.0, HIGHEST)
+        if not named:
             raise SeipError(
                 f"{text!r} is neither a height in metres nor a range FROM:TO:STEP "
-                f"up to {HIGHEST:g} m in steps of at least 0.01 m"
+                f"up to {HIGHEST:g} m in steps of at least {_FINEST:g} m"
             )
+        heights += named
     return tuple(heights)
+
+
+def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the tilts in radians that texts name in degrees: each a tilt, or a range FROM:TO:STEP with both ends.
+
+    Raises
+    ------
+    SeipError
+        One is neither.
+    """
+    tilts: list[float] = []
+    for text in texts:
+        named = _named_by(text, -STEEPEST, STEEPEST)
+        if not named:
+            raise SeipError(
+                f"{text!r} is neither a tilt in degrees nor a range FROM:TO:STEP within "
+                f"±{STEEPEST:g}° in steps of at least {_FINEST:g}°"
+            )
+        tilts += [math.radians(tilt) + 0.0 for tilt in named]
+    return tuple(tilts)
+
+
+_FINEST = 0.01
+"""Metres or degrees: a finer range is a slip of the keyboard."""
+
+
+def _named_by(text: str, above: float, most: float) -> list[float]:
+    """Return the number that a text is, or the range FROM:TO:STEP; nothing where it is neither."""
+    try:
+        numbers = [float(part) for part in text.split(":")]
+    except ValueError:
+        return []
+    if len(numbers) == 1:
+        return numbers
+    if len(numbers) == 3 and above < numbers[0] <= numbers[1] <= most and numbers[2] >= _FINEST:
+        first, last, step = numbers
+        steps: list[float] = np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
+        return steps
+    return []
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Where a sensor may hang: positions (in plan), and poses (position × height × sensor type).
+    """Where a sensor may hang: positions (in plan), and poses (position × height × tilt × sensor type).
 
     Parameters
     ----------
@@ -116,7 +169,11 @@ class Candidates:
     xyz : (c, 3) float64, metres
         Optical centre. On a pole it stands off the shaft by the bracket.
     yaw : (c,) float64, radians
-        Direction of azimuth zero of the beam pattern, counter-clockwise from +x.
+        Direction of azimuth zero of the beam pattern, counter-clockwise from +x. An upright sensor sees all around
+        alike, and its azimuth zero is +x. A tilted one looks towards the region: to the nearest point of it, or to
+        its middle from within.
+    tilt : (c,) float64, radians
+        How far azimuth zero is turned down, nose first, towards where the yaw points; see `orientation`.
     mandatory : (g, p) bool
         Each row is a group of positions of which at least one must carry a sensor.
     mandatory_name : (g,) str
@@ -133,6 +190,7 @@ class Candidates:
     height: Float
     xyz: Float
     yaw: Float
+    tilt: Float
     mandatory: Boolean
     mandatory_name: Text
     dropped: dict[str, int]
@@ -140,6 +198,10 @@ class Candidates:
     def __len__(self) -> int:
         """Return the number of poses."""
         return len(self.xyz)
+
+    def orientation(self, pose: int) -> Float:
+        """Return how a pose's sensor is turned, (3, 3) float64, from its axes to the site's."""
+        return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 
 def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
@@ -154,7 +216,7 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
     -------
     Candidates
         Positions in order of x, y, z with pavement positions named in that
-        order; poses by position, height, sensor type.
+        order; poses by position, height, tilt, sensor type.
 
     Raises
     ------
@@ -185,17 +247,21 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
 
     used, compact = np.unique(position_of[kept], return_inverse=True)
     sensors = np.array(list(dict.fromkeys(settings.sensors)))
-    repeat = len(sensors)
+    tilts = np.array(sorted(settings.tilts), dtype=np.float64)
+    repeat = len(tilts) * len(sensors)
+    position_of = np.repeat(compact.astype(np.int64), repeat)
+    tilt = np.tile(np.repeat(tilts, len(sensors)), int(kept.sum()))
     groups = _mandatory_groups(geometry, foot[used], name[used])
     return Candidates(
         position=foot[used],
         position_name=name[used],
         on_pole=on_pole[used],
-        position_of=np.repeat(compact.astype(np.int64), repeat),
-        sensor=np.tile(sensors, int(kept.sum())),
+        position_of=position_of,
+        sensor=np.tile(sensors, int(kept.sum()) * len(tilts)),
         height=np.repeat(height[kept], repeat),
         xyz=np.repeat(xyz[kept], repeat, axis=0),
-        yaw=np.zeros(int(kept.sum()) * repeat),
+        yaw=_yaws(tilt, position_of, foot[used], geometry.region),
+        tilt=tilt,
         mandatory=np.array([row for _, row in groups], dtype=bool).reshape(len(groups), len(used)),
         mandatory_name=np.array([title for title, _ in groups], dtype=np.str_),
         dropped={reason: count for reason, count in dropped.items() if count},
@@ -268,6 +334,15 @@ def _towards(point: Float, region: BaseGeometry) -> Float:
     way = goal - point
     length = np.hypot(*way)
     return way / length if length > 0 else np.array((1.0, 0.0))
+
+
+def _yaws(tilt: Float, position_of: Integer, foot: Float, region: BaseGeometry) -> Float:
+    """Return the yaw of each pose, (c,) radians: zero where it is upright, else that which has the region before it."""
+    if not tilt.any():
+        return np.zeros(len(tilt))
+    way = np.array([_towards(point[:2], region) for point in foot])
+    before_it = np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
+    return np.where(tilt == 0, 0.0, before_it[position_of])
 
 
 def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[tuple[str, Boolean]]:

@@ -19,7 +19,6 @@ from .deployment import weighted_share
 from .errors import SeipError
 from .goal import Goal, Plan, make_plan, target_weights
 from .progress import Progress, within
-from .scans.sensor import level_orientation
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
 from .survey import SurveySettings
@@ -223,7 +222,7 @@ class Judge:
         """Return the share of the fine grid's weight that a placement sees."""
         seen = np.zeros(len(self.site.targets), dtype=bool)
         for sensor in plan.deployment.sensors:
-            seen |= self._onlooker.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw))
+            seen |= self._onlooker.see(sensor.model, sensor.xyz, sensor.orientation)
         return weighted_share(seen, self.weights)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from .arrays import Boolean, Float, Integer
 from .lidar import LidarModel
+from .orientation import orientation
 from .site import Site
 
 
@@ -36,6 +37,8 @@ class Sensor:
         Height above the ground point.
     yaw : float, radians
         Direction of azimuth zero, counter-clockwise from +x.
+    tilt : float, radians
+        How far azimuth zero is turned down.
     alone : float
         Share of the targets that it sees.
     added : float
@@ -53,9 +56,15 @@ class Sensor:
     xyz: Float
     height: float
     yaw: float
+    tilt: float
     alone: float
     added: float
     marginal: float
+
+    @property
+    def orientation(self) -> Float:
+        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
+        return orientation(self.yaw, self.tilt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +179,7 @@ def _sensor(
         xyz=candidates.xyz[pose],
         height=float(candidates.height[pose]),
         yaw=float(candidates.yaw[pose]),
+        tilt=float(candidates.tilt[pose]),
         alone=alone,
         added=added,
         marginal=marginal,

@@ -18,6 +18,8 @@ SEED = 0
 """Of the sample."""
 SAME_PLACE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
+SAME_TURN = 5e-5
+"""Cosines by which it may be turned otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +74,23 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
     )
 
 
-def pose_at(candidates: Candidates, sensor: str, xyz: Float) -> int | None:
-    """Return the candidate pose of a sensor type at a place, None where there is none."""
+def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float) -> int | None:
+    """Return the candidate pose of a sensor type at a place and turned so, None where there is none.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    sensor : str
+        Its catalogue key.
+    xyz : (3,) float64, metres
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
+    """
     same = np.flatnonzero(candidates.sensor == sensor)
     away = np.linalg.norm(candidates.xyz[same] - xyz, axis=1)
-    if not len(away) or away.min() > SAME_PLACE:
-        return None
-    return int(same[away.argmin()])
+    near = same[np.argsort(away, kind="stable")][: np.count_nonzero(away <= SAME_PLACE)]
+    turned_alike = (np.abs(candidates.orientation(int(pose)) - orientation).max() <= SAME_TURN for pose in near)
+    return next((int(pose) for pose, alike in zip(near, turned_alike, strict=True) if alike), None)
 
 
 def _sample(numbers: Integer) -> Integer:

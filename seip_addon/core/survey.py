@@ -20,6 +20,7 @@ from .placement import Placement
 from .placement.integer_program import check_solver
 from .placement.near_best import near_best
 from .progress import Progress
+from .results.headings import tilt_degrees
 from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
@@ -82,7 +83,7 @@ class SurveySettings:
         """Return the settings as records hold them: defaults included, values that JSON knows."""
         return {
             "grid_spacing_m": self.grid_spacing,
-            "candidates": asdict(self.candidates),
+            "candidates": _candidates_record(self.candidates),
             "visibility": asdict(self.visibility),
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
@@ -90,6 +91,12 @@ class SurveySettings:
             "time_limit_s": self.time_limit,
             "spacings_because": self.spacings_because,
         }
+
+
+def _candidates_record(settings: CandidateSettings) -> dict[str, Any]:
+    record = asdict(settings)
+    tilts = record.pop("tilts")
+    return record | {"tilts_deg": [tilt_degrees(tilt) for tilt in tilts]}
 
 
 @dataclass(frozen=True, eq=False)

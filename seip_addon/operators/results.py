@@ -12,6 +12,7 @@ from .. import live, pointing, state
 from ..core.comparison import compare, unpacked_counts
 from ..core.errors import SeipError
 from ..core.goal import Plan, target_weights
+from ..core.orientation import tilt_in_words
 from ..core.progress import Progress
 from ..core.ranking import Ranked, rank_added, rank_alone
 from ..core.storage import check_folder
@@ -109,7 +110,8 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Rank
             line = ranking.add()
             line.pose, line.share = one.pose, one.share
             position = candidates.position_name[candidates.position_of[one.pose]]
-            line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m {position}"
+            tilt = tilt_in_words(candidates.tilt[one.pose])
+            line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m{tilt} {position}"
 
 
 def _ranked(

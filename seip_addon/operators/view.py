@@ -16,7 +16,7 @@ from ..core.goal import Plan
 from ..core.progress import Progress
 from ..core.sight_lines import pose_at, sight_lines
 from ..scene import contract
-from ..scene.sensors import placed_sensors
+from ..scene.sensors import placed_sensors, pose_of
 from ..scene.write import colour_coverage, coverage_of
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
@@ -133,7 +133,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[state.Held], bpy.types.Ope
             raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
         key = str(thing.get(contract.SENSOR))
         site = result.layout.site
-        pose = pose_at(site.candidates, key, thing.matrix_world.translation)
+        pose = pose_at(site.candidates, key, *pose_of(thing))
         if pose is None:
             raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
         sight = sight_lines(site, pose, result.layout.models[key], result.grid.sees(pose))

@@ -1,4 +1,4 @@
-"""The panel of the sensors: which types to choose from, at which heights."""
+"""The panel of the sensors: which types to choose from, at which heights, and how far tilted."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         row.separator()
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list and the heights."""
+        """Draw the list, the heights and the tilts."""
         survey = context.scene.seip.survey
         layout = self.layout
         if sensor_types.complaint:
@@ -83,6 +83,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         column.use_property_split = True
         column.use_property_decorate = False
         column.prop(survey, "heights")
+        column.prop(survey, "tilts")
 
 
 class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
@@ -153,7 +154,8 @@ class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
             layout, f"Blue: within 2δ = {2 * preview.delta:.3g} m of the next ring inwards", icon="COLORSET_04_VEC"
         )
         draw_sentence(layout, "Orange: farther apart; road between may go unseen", icon="COLORSET_02_VEC")
-        draw_sentence(layout, f"On a level road all is within 2δ up to {preview.resolved_to():.0f} m.")
+        before_it = " before it" if preview.tilt else ""
+        draw_sentence(layout, f"On a level road all{before_it} is within 2δ up to {preview.resolved_to():.0f} m.")
 
 
 CLASSES = (SEIP_UL_sensor_types, SEIP_PT_sensors, SEIP_PT_sensor_details, SEIP_PT_beam_preview)

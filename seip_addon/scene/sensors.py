@@ -73,11 +73,22 @@ def _mounted(thing: bpy.types.Object, label: str, catalogue: Mapping[str, LidarM
         model = find_models(catalogue, [key])[key]
     except SeipError as error:
         raise SeipError(f"empty {thing.name!r}: {error}") from error
+    return MountedSensor(label, model, *pose_of(thing))
+
+
+def pose_of(thing: bpy.types.Object) -> tuple[Float, Float]:
+    """Return where a sensor's empty is, (3,) metres, and how it is turned, (3, 3) from its axes to the site's.
+
+    Raises
+    ------
+    SeipError
+        It has no proper transform.
+    """
     matrix = np.array(thing.matrix_world, dtype=np.float64)
     length = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.isfinite(matrix).all() and (length > 0).all()):
         raise SeipError(f"empty {thing.name!r} has no place, or a scale of zero: set its transform anew")
-    return MountedSensor(label, model, matrix[:3, 3], _orthonormal(matrix[:3, :3] / length))
+    return matrix[:3, 3], _orthonormal(matrix[:3, :3] / length)
 
 
 def _orthonormal(matrix: Float) -> Float:

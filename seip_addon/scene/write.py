@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..core.arrays import Float, Integer
+from ..core.arrays import Integer
 from ..core.colouring import Aspect, Colouring, as_placed, colouring
 from ..core.deployment import Deployment, Sensor
 from ..core.errors import SeipError
+from ..core.orientation import tilt_in_words
 from ..core.site import Site, Targets
 from ..core.streetscape.model import VEILS
 from ..core.streetscape.street_furniture import Solid, join, prism, tube
@@ -86,13 +87,14 @@ def _write_sensors(collection: bpy.types.Collection, sensors: Sequence[Sensor]) 
 
 
 def _empty(sensor: Sensor) -> bpy.types.Object:
-    empty = bpy.data.objects.new(f"{sensor.model.key} @ {sensor.height:.3g} m · {sensor.position_name}", None)
+    mounting = f"{sensor.height:.3g} m{tilt_in_words(sensor.tilt)}"
+    empty = bpy.data.objects.new(f"{sensor.model.key} @ {mounting} · {sensor.position_name}", None)
     empty.empty_display_type = "ARROWS"
     empty.empty_display_size = 0.8
     empty.show_name = True
     empty.show_in_front = True
     empty.location = sensor.xyz
-    empty.rotation_euler = (0.0, 0.0, sensor.yaw)
+    empty.rotation_euler = (0.0, sensor.tilt, sensor.yaw)
     properties = {
         MARK: True,
         contract.LABEL: sensor.label,
@@ -102,6 +104,7 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
         "seip_on_pole": sensor.on_pole,
         "seip_height": sensor.height,
         "seip_yaw_deg": math.degrees(sensor.yaw),
+        "seip_tilt_deg": math.degrees(sensor.tilt),
         "seip_range": sensor.model.max_range,
         "seip_price": sensor.model.price,
         "seip_coverage": sensor.alone,
@@ -118,19 +121,17 @@ def _hardware(sensor: Sensor) -> Solid:
     angle = 2.0 * np.pi * np.arange(BODY_SIDES) / BODY_SIDES
     circle = BODY_RADIUS * np.column_stack((np.cos(angle), np.sin(angle)))
     body = prism(circle, -BODY_HEIGHT / 2, BODY_HEIGHT / 2, side="sensor")
-    foot = _turned(sensor.foot - sensor.xyz, -sensor.yaw)
+    upright = sensor.orientation.T  # from the site's axes to the sensor's
+    foot = upright @ (sensor.foot - sensor.xyz)
     top = np.array((0.0, 0.0, -BODY_HEIGHT / 2))  # of the post; the optical centre is the body's middle
     if not sensor.on_pole:
         return join(body, tube(foot, top, (POST_RADIUS, POST_RADIUS), "post"))
-    if math.hypot(*foot[:2]) > SAME_PLACE:
-        shaft = np.array((foot[0], foot[1], top[2]))
+    aside = sensor.foot[:2] - sensor.xyz[:2]
+    if math.hypot(*aside) > SAME_PLACE:
+        below = (sensor.orientation @ top)[2]
+        shaft = upright @ np.array((*aside, below))  # on the pole's axis, as high as the underside of the body
         return join(body, tube(shaft, top, (BRACKET_RADIUS, BRACKET_RADIUS), "post"))
     return body
-
-
-def _turned(vector: Float, angle: float) -> Float:
-    cos, sin = math.cos(angle), math.sin(angle)
-    return np.array((cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1], vector[2]))
 
 
 def coverage_of(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -21,6 +21,8 @@ DENSE, WIDE, CONE = (0.30, 0.75, 1.0, 0.9), (1.0, 0.55, 0.10, 0.9), (1.0, 1.0, 1
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
 WIDTH = 1.5
 """Pixels."""
+UPRIGHT = 1e-5
+"""Radians."""
 LIFT = 0.05
 """Metres of the rings above the road."""
 
@@ -53,8 +55,14 @@ class Preview:
         return beam_rings(self.model, self.place, self.axes, ground, 2 * self.delta)
 
     def resolved_to(self) -> float:
-        """Return the radius, metres, to which all rings of a level sensor are within 2δ of each other."""
-        return unresolved_from(self.model, self.height, self.delta, self.range_on_road())
+        """Return the radius, metres, to which all rings before the sensor are within 2δ of each other."""
+        return unresolved_from(self.model, self.height, self.delta, self.range_on_road(), self.tilt)
+
+    @property
+    def tilt(self) -> float:
+        """How far azimuth zero is turned down, radians: zero where that is what single precision makes of it."""
+        tilt = math.asin(max(-1.0, min(1.0, -float(self.axes[2, 0]))))
+        return tilt if abs(tilt) > UPRIGHT else 0.0
 
     def range_on_road(self) -> float:
         """Return the radius, metres, at which the range ends on the road."""

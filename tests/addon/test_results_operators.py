@@ -161,3 +161,24 @@ def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
     bpy.data.scenes.remove(placed)
     with pytest.raises(SeipError, match="is gone: nothing was written"):
         state.scene_of(number)
+
+
+def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them(placed):
+    placed.seip.survey.tilts = "12"
+    bpy.ops.seip.solve_placement()
+    known = state.find(placed)
+    assert {sensor.tilt for sensor in known.plan.deployment.sensors} == {np.radians(12)}
+    bpy.ops.seip.rank_candidates()
+    assert all("8 m, tilted 12° " in line.name for line in placed.seip.result.ranking)
+    bpy.ops.seip.show_sight_lines(sensor="S1")
+
+    bpy.ops.seip.follow_sensors()
+    assert live.following.moved == ()
+    coverage = live.following.coverage
+    first = pointing.sensor_empties(placed)["S1"]
+    first.rotation_euler.y = 0.0
+    live.look()
+    assert live.following.moved == ("S1",)
+    assert live.following.coverage != coverage
+    with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
+        bpy.ops.seip.show_sight_lines(sensor="S1")

@@ -6,8 +6,11 @@ import pytest
 
 from seip_addon import preferences, sensor_types
 from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.orientation import orientation
 from seip_addon.core.visibility.ray_casting import MOST_THREADS
+from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.viewport import beam_preview
 
 OWN = """
@@ -119,15 +122,17 @@ def test_without_preferences_catalogues_cannot_be_kept(survey, catalogue):
         bpy.ops.seip.add_catalogue(filepath=str(catalogue))
 
 
-def test_a_preset_brings_types_and_heights_back(survey, tmp_path, monkeypatch):
+def test_a_preset_brings_types_heights_and_tilts_back(survey, tmp_path, monkeypatch):
     folder = tmp_path / "presets" / "seip" / "survey"
     monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, path="", create=False: _made(tmp_path / path))
     survey.heights, survey.grid, survey.types["vlp16"].use = "4 6", 2.5, True
+    survey.tilts = "0 10"
     assert bpy.ops.seip.add_survey_preset(name="Two heights") == {"FINISHED"}
     (file,) = folder.glob("*.py")
     survey.heights, survey.grid, survey.types["vlp16"].use = "8", 1.0, False
+    survey.tilts = "0"
     bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SEIP_MT_survey_presets")
-    assert (survey.heights, survey.grid) == ("4 6", 2.5)
+    assert (survey.heights, survey.grid, survey.tilts) == ("4 6", 2.5, "0 10")
     assert used(survey) == (*CandidateSettings().sensors, "vlp16")
     assert [one.name for one in survey.types] == list(load_catalogue())
 
@@ -196,3 +201,28 @@ def test_cores_are_those_that_the_user_allows(own):
     assert preferences.cores() == 1
     own.cores = 1000
     assert preferences.cores() == MOST_THREADS
+
+
+def test_tilts_are_degrees_in_the_panel_and_radians_inside(survey):
+    assert survey.settings().candidates.tilts == (0.0,)
+    survey.tilts = "-5 0:10:5"
+    assert np.degrees(survey.settings().candidates.tilts) == pytest.approx([-5, 0, 5, 10])
+    for text, sentence in (
+        ("0 0", "given twice"),
+        ("90", "less than 90°"),
+        ("", "no tilt"),
+        ("down", "neither a tilt"),
+    ):
+        survey.tilts = text
+        with pytest.raises(SeipError, match=sentence):
+            survey.settings()
+
+
+def test_the_preview_of_a_tilted_sensor_says_what_lies_before_it(survey):
+    model = sensor_types.known["type1"]
+    place = np.array([0.0, 0.0, 5.4])
+    upright, tilted = (beam_preview.Preview(model, place, orientation(0.5, tilt), 5.4, 1.0) for tilt in (0.0, 0.2))
+    assert upright.tilt == 0.0
+    assert tilted.tilt == pytest.approx(0.2)
+    assert upright.resolved_to() == unresolved_from(model, 5.4, 1.0, upright.range_on_road())
+    assert tilted.resolved_to() == pytest.approx(unresolved_from(model, 5.4, 1.0, upright.range_on_road(), 0.2))

@@ -111,7 +111,11 @@ def junction_site(
 
 
 def make_candidates(
-    xyz: Float, sensor: Sequence[str] | NDArray[np.str_], height: Float, yaw: Float | None = None
+    xyz: Float,
+    sensor: Sequence[str] | NDArray[np.str_],
+    height: Float,
+    yaw: Float | None = None,
+    tilt: Float | None = None,
 ) -> Candidates:
     count = len(xyz)
     return Candidates(
@@ -123,6 +127,7 @@ def make_candidates(
         height=np.asarray(height, dtype=np.float64),
         xyz=xyz,
         yaw=np.zeros(count) if yaw is None else yaw,
+        tilt=np.zeros(count) if tilt is None else tilt,
         mandatory=np.zeros((0, count), dtype=bool),
         mandatory_name=np.zeros(0, dtype=np.str_),
         dropped={},

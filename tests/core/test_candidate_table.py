@@ -1,4 +1,5 @@
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,3 +48,13 @@ def test_ranks_are_a_permutation_that_falls_with_weighted_coverage(rows):
 def test_the_chosen_poses_carry_their_labels(example, rows):
     chosen = {int(row["pose"]): row["chosen"] for row in rows if row["chosen"]}
     assert chosen == {sensor.pose: sensor.label for sensor in example.deployment.sensors}
+
+
+def test_a_tilt_stands_beside_the_yaw(example, tmp_path):
+    count = len(example.site.candidates)
+    candidates = replace(example.site.candidates, tilt=np.radians(np.where(np.arange(count) % 2, 12.5, -3.0)))
+    site, path = replace(example.site, candidates=candidates), tmp_path / "candidates.csv"
+    save_candidate_table(path, site, example.models, example.visible, example.deployment)
+    rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+    assert [row["tilt_deg"] for row in rows[:2]] == ["-3.000", "12.500"]
+    assert COLUMNS[COLUMNS.index("yaw_deg") + 1] == "tilt_deg"

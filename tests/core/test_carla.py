@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.orientation import orientations
 from seip_addon.core.results.carla import carla_spawns, save_carla_spawns
 from tests.small_junction import make_example
 
@@ -32,6 +33,18 @@ def test_the_sensor_faces_the_same_way_in_left_handed_axes(example, yaw):
     # Unreal turns +x towards +y, and its y is our -y.
     assert (math.cos(turn), -math.sin(turn)) == pytest.approx((math.cos(yaw), math.sin(yaw)), abs=1e-7)
     assert -180 <= spawn["transform"]["rotation"]["yaw"] < 180
+
+
+@pytest.mark.parametrize(("yaw", "tilt"), [(0.0, 0.2), (1.0, -0.4), (-2.5, 1.3), (4.0, 0.0)])
+def test_a_tilted_sensor_hangs_the_same_in_left_handed_axes(example, yaw, tilt):
+    sensor = replace(example.deployment.sensors[0], yaw=yaw, tilt=tilt)
+    turn = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["transform"]["rotation"]
+    p, y, r = (math.radians(turn[name]) for name in ("pitch", "yaw", "roll"))
+    # Unreal's forward vector: up where the pitch is positive; its y is our -y.
+    forward = (math.cos(p) * math.cos(y), -math.cos(p) * math.sin(y), math.sin(p))
+    assert forward == pytest.approx(tuple(sensor.orientation[:, 0]), abs=1e-7)
+    # CARLA: right-handed roll, pitch and yaw are its own, its own negated, its own negated.
+    assert orientations(np.array(-y), np.array(-p), np.array(r)) == pytest.approx(sensor.orientation, abs=1e-7)
 
 
 def test_attributes_are_text_that_set_attribute_takes(example):

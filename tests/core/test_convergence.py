@@ -108,8 +108,8 @@ def test_lines_of_sight() -> None:
     model = load_catalogue()["type3"]
     targets = np.array([[5.0, 0, 0], [20, 0, 0], [-20, 0, 0], [0.01, 0, 0], [-400, 0, 0]])
     caster = make_ray_caster(np.concatenate([road, wall]), ANY)
-    assert in_view(caster, model, np.array([0.0, 0, 5]), targets[2:3]).all()
-    seen = in_view(caster, model, np.array([0.0, 0, 5]), targets)
+    assert in_view(caster, model, np.array([0.0, 0, 5]), np.eye(3), targets[2:3]).all()
+    seen = in_view(caster, model, np.array([0.0, 0, 5]), np.eye(3), targets)
     assert not seen[1]  # behind the wall
     assert not seen[3]  # below the lowest channel
     assert not seen[4]  # out of range

@@ -73,7 +73,9 @@ def only_positions(example, count) -> tuple[Site, np.ndarray]:
     """The example with its first few positions alone, and its grid."""
     candidates = example.site.candidates
     kept = candidates.position_of < count
-    per_pose = {name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw")}
+    per_pose = {
+        name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt")
+    }
     per_position = {name: getattr(candidates, name)[:count] for name in ("position", "position_name", "on_pole")}
     fewer = replace(candidates, **per_pose, **per_position, mandatory=np.zeros((0, count), bool))
     return replace(example.site, candidates=fewer), example.visible[kept]
@@ -125,7 +127,9 @@ def test_a_mandatory_pole_without_pose_at_a_height_leaves_that_height_empty(exam
     kept = (candidates.position_of != 0) | (candidates.height == 5.4)
     mandatory = np.zeros((1, len(candidates.position)), bool)
     mandatory[0, 0] = True
-    per_pose = {name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw")}
+    per_pose = {
+        name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt")
+    }
     fewer = replace(candidates, **per_pose, mandatory=mandatory, mandatory_name=np.array(["pole A"]))
     study = solved(example, replace(example.site, candidates=fewer), example.visible[kept])
     empty = [cell for cell in study.cells if isinstance(cell, EmptyCell)]
@@ -165,6 +169,7 @@ def test_the_table_gives_each_sensors_height(study, tmp_path):
         assert [float(height) for height in row["heights_used_m"].split()] == [
             sensor.height for sensor in case.deployment.sensors
         ]
+        assert row["tilts_used_deg"].split() == ["0"] * len(case.deployment.sensors)
 
 
 def test_a_name_with_a_bar_stays_in_its_markdown_cell(tmp_path, study):

@@ -63,6 +63,16 @@ def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, t
     assert loaded["settings"]["heights_m"] == [3.5, 5.4]
 
 
+def test_a_tilt_is_in_degrees_and_upright_is_zero(example, run):
+    first, *others = example.deployment.sensors
+    deployment = replace(example.deployment, sensors=(replace(first, tilt=math.radians(-12.5)), *others))
+    record = make_record(replace(example, deployment=deployment), run)
+    assert [sensor["tilt_deg"] for sensor in record["sensors"]] == [-12.5, *(0.0 for _ in others)]
+    assert violations(json.loads(json.dumps(record)), SCHEMA) == []
+    record["sensors"][0]["tilt_deg"] = 91.0
+    assert violations(json.loads(json.dumps(record)), SCHEMA)
+
+
 def test_every_required_part_is_missed_when_it_is_absent(example, run):
     record = json.loads(json.dumps(make_record(example, run)))
     for part in SCHEMA["required"]:

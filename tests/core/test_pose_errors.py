@@ -65,10 +65,11 @@ def turned(yaw, pitch, roll):
     return level_orientation(yaw) @ nod @ lean
 
 
-@given(*(st.floats(-3, 3) for _ in range(4)))
-def test_orientations_are_yaw_then_pitch_then_roll(planned, yaw, pitch, roll):
+@given(*(st.floats(-3, 3) for _ in range(5)))
+def test_orientations_are_yaw_then_pitch_then_roll(planned, tilt, yaw, pitch, roll):
     draws = PoseDraws(np.zeros((1, 1, 3)), *(np.array([[angle]]) for angle in (yaw, pitch, roll)))
-    assert draws.orientations(np.array([planned]))[0, 0] == pytest.approx(turned(planned + yaw, pitch, roll), abs=1e-12)
+    drawn = draws.orientations(np.array([planned]), np.array([tilt]))[0, 0]
+    assert drawn == pytest.approx(turned(planned + yaw, tilt + pitch, roll), abs=1e-12)
 
 
 def test_a_sensor_leaves_the_object_that_it_would_be_in():

@@ -102,6 +102,19 @@ def test_heights_come_as_a_list_or_a_range(tmp_path):
     assert record["settings"]["candidates"]["heights"] == [4.0, 4.5, 5.0, 8.0]
 
 
+def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(tmp_path):
+    record = run(tmp_path, "--count", "2", "--tilts", "0", "5:15:5")
+    assert record["settings"]["candidates"]["tilts_deg"] == [0.0, 5.0, 10.0, 15.0]
+    assert {sensor["tilt_deg"] for sensor in record["sensors"]} <= {0.0, 5.0, 10.0, 15.0}
+    assert max(sensor["tilt_deg"] for sensor in record["sensors"]) > 0
+    upright = run(tmp_path / "upright", "--count", "2")
+    assert record["counts"]["poses"] == 4 * upright["counts"]["poses"]
+    assert record["coverage"]["whole"] > upright["coverage"]["whole"]
+    spawned = json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))
+    pitches = [entry["transform"]["rotation"]["pitch"] for entry in spawned]
+    assert pitches == [-sensor["tilt_deg"] + 0.0 for sensor in record["sensors"]]
+
+
 def test_the_reverse_problem_by_command(tmp_path):
     record = run(tmp_path, "--coverage", "0.2")
     assert record["coverage"]["whole"] >= 0.2
@@ -113,6 +126,8 @@ def test_the_reverse_problem_by_command(tmp_path):
     [
         (["--count", "0"], "asked for 0 sensors"),
         (["--count", "999"], "asked for 999 sensors"),
+        (["--tilts", "0", "90"], "a tilt must be more than -90° and less than 90°, not 90°"),
+        (["--tilts", "5", "5"], "the tilt of 5° is given twice"),
         (["--budget", "5"], "below the cheapest sensor"),
         (["--delta", "0"], "delta must be"),
         (["--grid", "0"], "grid spacing must be"),

@@ -2,18 +2,21 @@
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from scene_by_hand import make_scene
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar import beam_directions, load_catalogue
+from seip_addon.core.orientation import orientation, turned
 from seip_addon.core.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.scene import contract
 from seip_addon.scene.materials import REFLECTIVITY, material
@@ -50,6 +53,56 @@ def test_sensors_are_read_as_they_were_written(scene, example):
         np.testing.assert_allclose(
             read.orientation, np.column_stack([forward, (-forward[1], forward[0], 0), (0, 0, 1)]), atol=1e-6
         )
+
+
+@pytest.fixture
+def tilted(example):
+    """A deployment that looks about itself, nose down by different angles."""
+    sensors = tuple(
+        replace(sensor, yaw=0.7 * number - 1.0, tilt=math.radians(8 + 9 * number))
+        for number, sensor in enumerate(example.deployment.sensors)
+    )
+    return replace(example.deployment, sensors=sensors)
+
+
+def test_tilted_sensors_are_read_as_they_were_written_and_their_rays_go_where_the_empties_point(scene, example, tilted):
+    write_result(scene, example.site, tilted)
+    for read, written in zip(read_sensors(scene, CATALOGUE), tilted.sensors, strict=True):
+        np.testing.assert_allclose(read.orientation, written.orientation, atol=1e-6)
+        thing = next(thing for thing in empties(scene) if thing["seip_label"] == written.label)
+        assert thing["seip_tilt_deg"] == pytest.approx(math.degrees(written.tilt))
+        assert thing.name.startswith(f"{written.model.key} @ {written.height:.3g} m, tilted ")
+        rays = beam_directions(written.model).reshape(-1, 3)[::997]
+        pointed = np.array([thing.matrix_world.to_3x3() @ Vector(ray) for ray in rays])
+        np.testing.assert_allclose(turned(rays, written.orientation), pointed, atol=1e-6)
+        ahead = read.orientation[:, 0]
+        assert -math.degrees(math.asin(ahead[2])) == pytest.approx(math.degrees(written.tilt), abs=1e-4)
+
+
+def test_a_tilted_sensor_that_a_hand_moves_keeps_its_tilt(scene, example, tilted):
+    write_result(scene, example.site, tilted)
+    thing = empties(scene)[0]
+    thing.location.x += 3.0
+    thing.rotation_euler.z += 0.5
+    read = next(sensor for sensor in read_sensors(scene, CATALOGUE) if sensor.label == thing["seip_label"])
+    written = next(sensor for sensor in tilted.sensors if sensor.label == thing["seip_label"])
+    np.testing.assert_allclose(read.orientation, orientation(written.yaw + 0.5, written.tilt), atol=1e-6)
+    np.testing.assert_allclose(read.xyz, written.xyz + np.array((3.0, 0.0, 0.0)), atol=1e-5)
+
+
+def test_posts_of_tilted_sensors_stand_on_the_ground_and_brackets_reach_the_pole(scene, example, tilted):
+    write_result(scene, example.site, tilted)
+    bpy.context.view_layer.update()
+    for written in tilted.sensors:
+        thing = next(thing for thing in empties(scene) if thing["seip_label"] == written.label)
+        (body,) = thing.children
+        corners = np.array([body.matrix_world @ v.co for v in body.data.vertices])
+        if written.on_pole:
+            assert np.hypot(*(corners[:, :2] - written.foot[:2]).T).min() < 0.05
+            assert corners[:, 2].min() > written.xyz[2] - 0.35
+        else:
+            lowest = corners[corners[:, 2].argmin()]
+            assert np.linalg.norm(lowest - written.foot) < 0.1
 
 
 def test_what_a_hand_has_done_counts(scene):

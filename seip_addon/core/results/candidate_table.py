@@ -13,7 +13,7 @@ from ..deployment import Deployment, weighted_share
 from ..lidar import LidarModel
 from ..site import Site
 from ..storage import whole_file
-from .headings import degrees
+from .headings import degrees, tilt_degrees
 
 COLUMNS = (
     "pose",
@@ -28,6 +28,7 @@ COLUMNS = (
     "map_y_m",
     "map_z_m",
     "yaw_deg",
+    "tilt_deg",
     "price_usd",
     "targets_seen",
     "coverage",
@@ -79,6 +80,7 @@ def save_candidate_table(
                     *(f"{value:.3f}" for value in xyz),
                     *(f"{value:.3f}" for value in xyz + site.origin),
                     f"{degrees(candidates.yaw[pose]):.3f}",
+                    f"{tilt_degrees(candidates.tilt[pose]):.3f}",
                     f"{model.price:.2f}",
                     seen[pose],
                     f"{seen[pose] / len(site.targets):.6f}",

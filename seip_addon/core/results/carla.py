@@ -2,12 +2,14 @@
 
 CARLA stands on Unreal's left-handed axes. A town's world coordinates are those
 of its OpenDRIVE map with y negated, so a yaw that is counter-clockwise here is
-clockwise there [1]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
+clockwise there [1]_; its pitch turns the nose up where it is positive, so that a
+tilt has the opposite sign [3]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
 ``upper_fov`` to ``lower_fov``, both included, and
 ``points_per_second / rotation_frequency / channels`` steps over a turn [2]_.
 
 .. [1] CARLA documentation, "Coordinates and transformations".
 .. [2] CARLA documentation, "Sensors reference", LIDAR sensor.
+.. [3] CARLA documentation, class ``carla::geom::RightHandedRotation``.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 from ..deployment import Deployment, Sensor
 from ..lidar import LidarModel
 from ..storage import save_json
-from .headings import clockwise_degrees
+from .headings import clockwise_degrees, tilt_degrees
 
 BLUEPRINT = "sensor.lidar.ray_cast"
 EVEN_WITHIN = math.radians(0.02)  # a hundredth is what data sheets print
@@ -58,7 +60,11 @@ def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
         "blueprint": BLUEPRINT,
         "transform": {
             "location": {"x": x, "y": -y + 0.0, "z": z},
-            "rotation": {"pitch": 0.0, "yaw": clockwise_degrees(sensor.yaw), "roll": 0.0},
+            "rotation": {
+                "pitch": -tilt_degrees(sensor.tilt) + 0.0,
+                "yaw": clockwise_degrees(sensor.yaw),
+                "roll": 0.0,
+            },
         },
         "attributes": _attributes(sensor),
         "note": _note(sensor.model),

@@ -1,4 +1,4 @@
-"""Headings as files write them: degrees to the millionth, which hides the last bits in which platforms differ."""
+"""Angles as files write them: degrees to the millionth, which hides the last bits in which platforms differ."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ import math
 def degrees(heading: float) -> float:
     """Return a heading in degrees counter-clockwise, 0 <= degrees < 360."""
     return (round(math.degrees(heading), 6) + 0.0) % 360.0
+
+
+def tilt_degrees(tilt: float) -> float:
+    """Return a tilt in degrees, nose down positive, -90 < degrees < 90."""
+    return round(math.degrees(tilt), 6) + 0.0
 
 
 def clockwise_degrees(heading: float) -> float:

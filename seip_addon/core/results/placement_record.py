@@ -24,11 +24,11 @@ from ..goal import Plan
 from ..placement import Placement
 from ..site import Site
 from ..storage import save_json
-from .headings import degrees
+from .headings import degrees, tilt_degrees
 
 Record = dict[str, Any]
 
-SCHEMA = "seip-placement/1"
+SCHEMA = "seip-placement/2"
 LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
@@ -163,6 +163,7 @@ def _sensor(sensor: Sensor, origin: Float) -> Record:
         "map_m": _metres(sensor.xyz + origin),
         "height_m": _rounded(sensor.height, 6),
         "yaw_deg": degrees(sensor.yaw),
+        "tilt_deg": tilt_degrees(sensor.tilt),
         "price_usd": _rounded(sensor.model.price, 2),
         "coverage_alone": _share(sensor.alone),
         "coverage_added": _share(sensor.added),

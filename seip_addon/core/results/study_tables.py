@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from ..coverage_study import Case, Claim, CoverageStudy, EmptyCell
 from ..storage import whole_file
+from .headings import tilt_degrees
 
 COLUMNS = (
     "sensor",
@@ -16,6 +17,7 @@ COLUMNS = (
     "central_weight",
     "sensors_used",
     "heights_used_m",
+    "tilts_used_deg",
     "coverage",
     "central_coverage",
     "seen_twice",
@@ -65,6 +67,7 @@ def _figures(case: Case) -> dict[str, str]:
     return {
         "sensors_used": f"{len(deployment.sensors)}",
         "heights_used_m": " ".join(f"{sensor.height:g}" for sensor in deployment.sensors),
+        "tilts_used_deg": " ".join(f"{tilt_degrees(sensor.tilt):g}" for sensor in deployment.sensors),
         "coverage": f"{deployment.coverage:.6f}",
         "central_coverage": "" if deployment.central is None else f"{deployment.central:.6f}",
         "seen_twice": f"{deployment.seen_twice:.6f}",

@@ -281,6 +281,7 @@ def _site(scene: HardScene) -> Site:
             height=pose[:, 2],
             xyz=pose,
             yaw=np.zeros(1),
+            tilt=np.zeros(1),
             mandatory=np.zeros((0, 1), dtype=bool),
             mandatory_name=np.zeros(0, dtype=np.str_),
             dropped={},

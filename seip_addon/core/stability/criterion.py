@@ -259,7 +259,7 @@ def ring_borders(
     )
 
 
-def in_view(caster: RayCaster, model: LidarModel, xyz: Float, targets: Float) -> Boolean:
+def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float, targets: Float) -> Boolean:
     """Return to which targets a sensor has a free line of sight, within its range and its channels' elevations.
 
     Parameters
@@ -267,6 +267,8 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, targets: Float) ->
     caster : RayCaster
     model : LidarModel
     xyz : (3,) float64, metres
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
     targets : (t, 3) float64, metres
 
     Returns
@@ -275,7 +277,7 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, targets: Float) ->
     """
     way = targets - xyz
     distance = np.linalg.norm(way, axis=1)
-    elevation = np.arcsin(way[:, 2] / distance)
+    elevation = np.arcsin(np.clip(way @ orientation[:, 2] / distance, -1.0, 1.0))
     end, _ = caster.cast(xyz, way / distance[:, None], float(distance.max()) + 1.0)
     free: Boolean = end >= distance - CLEAR
     free &= (distance >= model.min_range) & (distance <= model.max_range)
@@ -307,16 +309,17 @@ def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle:
 
 
 def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) -> SeenByRatio:
-    """Count targets in view, and those that count as seen, by distance in multiples of the border."""
+    """Count targets in view, and those seen, from upright sensors, by distance in multiples of the border."""
     caster, look, targets = make_ray_caster(site.triangles), onlooker(site, settings), site.targets.xyz
     poses = site.candidates
     total, seen = np.zeros(len(RATIOS) - 1, dtype=int), np.zeros(len(RATIOS) - 1, dtype=int)
-    for height in np.unique(poses.height[poses.sensor == model.key]):
-        own = np.flatnonzero((poses.sensor == model.key) & (poses.height == height))
+    upright = (poses.sensor == model.key) & (poses.tilt == 0)
+    for height in np.unique(poses.height[upright]):
+        own = np.flatnonzero(upright & (poses.height == height))
         for pose in own[np.linspace(0, len(own) - 1, PLACES).astype(int)]:
-            xyz = poses.xyz[pose]
-            view = in_view(caster, model, xyz, targets)
-            sees = look.see(model, xyz, level_orientation(float(poses.yaw[pose]))) & view
+            xyz, orientation = poses.xyz[pose], poses.orientation(pose)
+            view = in_view(caster, model, xyz, orientation, targets)
+            sees = look.see(model, xyz, orientation) & view
             ratio = np.hypot(*(targets - xyz)[:, :2].T) / unresolved_from(model, height, settings.delta, math.inf)
             total += np.histogram(ratio[view], RATIOS)[0]
             seen += np.histogram(ratio[sees], RATIOS)[0]
@@ -338,7 +341,7 @@ def _by_delta(
         tried = replace(settings, visibility=replace(settings.visibility, delta=delta))
         plan = yield from within(Progress(0, 0, f"{sensor}: δ = {delta:g} m"), judge.plan(site, tried))
         sensors = plan.deployment.sensors
-        view = np.any([in_view(caster, s.model, s.xyz, site.targets.xyz) for s in sensors], axis=0)
+        view = np.any([in_view(caster, s.model, s.xyz, s.orientation, site.targets.xyz) for s in sensors], axis=0)
         seen = plan.deployment.seen_by > 0
         moved = _moved(plan.deployment, asked.deployment)
         coverage = plan.deployment.coverage
@@ -383,7 +386,7 @@ def _coverage(site: Site, settings: SurveySettings, deployment: Deployment, turn
     look = onlooker(site, settings.visibility, settings.engine)
     turns = turn or [0.0] * len(deployment.sensors)
     seen = [
-        look.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw + by))
+        look.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))
         for sensor, by in zip(deployment.sensors, turns, strict=True)
     ]
     return float(np.any(seen, axis=0).mean())

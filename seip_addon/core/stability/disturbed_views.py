@@ -110,12 +110,13 @@ def disturbed_views(
     """
     site, models = around.site, around.models
     candidates = site.candidates
-    keys, xyz, yaw = candidates.sensor[poses].tolist(), candidates.xyz[poses], candidates.yaw[poses]
+    keys, xyz = candidates.sensor[poses].tolist(), candidates.xyz[poses]
+    yaw, tilt = candidates.yaw[poses], candidates.tilt[poses]
     caster = make_ray_caster(site.triangles, engine_name(around.engine))
     onlooker = Onlooker(site, around.sight, caster)
-    together = places(xyz, yaw)
+    together = places(xyz, yaw, tilt)
     packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
-    orientations = draws.orientations(yaw)
+    orientations = draws.orientations(yaw, tilt)
 
     def look(work: tuple[int, Integer]) -> None:
         draw, members = work

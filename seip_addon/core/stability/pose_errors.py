@@ -1,10 +1,9 @@
 r"""Where sensors really hang: errors of position, height, yaw and tilt, drawn from normal distributions.
 
-A sensor planned at p with the level orientation :math:`R_z(ψ)` hangs at p + e
-and is turned as
+A sensor planned at p with the yaw ψ and the tilt θ hangs at p + e and is turned as
 
 .. math::
-    R = R_z(ψ + δ_ψ)\, R_y(δ_θ)\, R_x(δ_φ), \qquad
+    R = R_z(ψ + δ_ψ)\, R_y(θ + δ_θ)\, R_x(δ_φ), \qquad
     e_x, e_y \sim N(0, σ_p^2),\; e_z \sim N(0, σ_h^2),\;
     δ_ψ \sim N(0, σ_ψ^2),\; δ_θ, δ_φ \sim N(0, σ_t^2),
 
@@ -23,6 +22,7 @@ import numpy as np
 from ..arrays import Boolean, Float
 from ..errors import SeipError
 from ..obstruction import inside_any
+from ..orientation import orientations
 from ..scene_geometry import Mesh
 
 _MICROMETRE = 1e-6
@@ -92,30 +92,14 @@ class PoseDraws:
         """Return the number of draws."""
         return len(self.shift)
 
-    def orientations(self, planned_yaw: Float) -> Float:
-        """Return how sensors hang that were to be level, (n, s, 3, 3) float64, from their axes to the site's.
+    def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:
+        """Return how sensors hang, (n, s, 3, 3) float64, from their axes to the site's.
 
         Parameters
         ----------
-        planned_yaw : (s,) float64, radians
+        planned_yaw, planned_tilt : (s,) float64, radians
         """
-        sin_yaw, cos_yaw = np.sin(planned_yaw + self.yaw), np.cos(planned_yaw + self.yaw)
-        sin_pitch, cos_pitch = np.sin(self.pitch), np.cos(self.pitch)
-        sin_roll, cos_roll = np.sin(self.roll), np.cos(self.roll)
-        rows = [
-            [
-                cos_yaw * cos_pitch,
-                cos_yaw * sin_pitch * sin_roll - sin_yaw * cos_roll,
-                cos_yaw * sin_pitch * cos_roll + sin_yaw * sin_roll,
-            ],
-            [
-                sin_yaw * cos_pitch,
-                sin_yaw * sin_pitch * sin_roll + cos_yaw * cos_roll,
-                sin_yaw * sin_pitch * cos_roll - cos_yaw * sin_roll,
-            ],
-            [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll],
-        ]
-        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        return orientations(planned_yaw + self.yaw, planned_tilt + self.pitch, self.roll)
 
 
 def require_draws(draws: int) -> None:

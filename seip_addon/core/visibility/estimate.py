@@ -100,7 +100,7 @@ def estimate_visibility(
     longest = max(model.max_range for model in used.values())
     needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
     task = ObserverTask(site, used, settings.delta, settings.min_intensity, engine_name(engine), needed.keep)
-    everywhere = places(poses.xyz, poses.yaw)
+    everywhere = places(poses.xyz, poses.yaw, poses.tilt)
     drawn = [everywhere[place] for place in _spread_lot(len(everywhere), seed)]
     with threads_of(task, threads) as submit:
         setting_up = time.perf_counter() - began
@@ -122,7 +122,8 @@ def estimate_visibility(
 def _spread_lot(count: int, seed: int) -> list[int]:
     """Return numbers below a count in an order drawn by lot, the first few of which are spread evenly over them all.
 
-    Places are in the order of positions and heights, so that an even sample has near and far ones, high and low ones.
+    Places are in the order of positions, heights and tilts, so that an even sample has near and far ones, high and low
+    ones, upright and tilted ones.
     Multiples of the golden ratio modulo 1 are spread so, from
     whatever start.
     """

@@ -26,7 +26,8 @@ from ..storage import ArrayFile, digest
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
 from .ray_casting import Engine, RayCaster, engine_name
-from .scanning import Place, seen_by_all_rays
+from .scanning import Place
+from .sight import seen_by_tilted_full_scan
 from .work_force import ObserverTask, cluster, threads_of
 
 FILE = ArrayFile("seip.visibility", 1, "visibility grid", "delete it and compute it again")
@@ -142,10 +143,12 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
         )
     ]
     which = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
+    tilts = (site.candidates.tilt,) if site.candidates.tilt.any() else ()  # a level grid has the key that it always had
     return digest(
         *(FILE.schema, FILE.version, engine, float(settings.delta), float(settings.min_intensity)),
         *(site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, which),
         *patterns,
+        *tilts,
     )
 
 
@@ -218,7 +221,7 @@ def full_scan_visibility(
         place = Place(
             caster, poses.xyz[pose], float(poses.yaw[pose]), [used[key]], settings.delta, settings.min_intensity
         )
-        packed[pose] = np.packbits(seen_by_all_rays(place, targets)[0])
+        packed[pose] = np.packbits(seen_by_tilted_full_scan(place, float(poses.tilt[pose]), targets)[0])
     yield Progress(len(poses), len(poses), "full scan")
     return _grid(site, used, settings, caster.name, packed, {"rays_cast": _rays_of_full_scan(site, used)})
 
@@ -252,7 +255,13 @@ def _require_finite(site: Site) -> None:
         raise SeipError("there is no candidate pose to compute visibility for")
     if len(site.targets) == 0:
         raise SeipError("there is no target to be seen")
-    arrays = {"target": site.targets.xyz, "candidate": site.candidates.xyz, "candidate's yaw": site.candidates.yaw}
+    poses = site.candidates
+    arrays = {
+        "target": site.targets.xyz,
+        "candidate": poses.xyz,
+        "candidate's yaw": poses.yaw,
+        "candidate's tilt": poses.tilt,
+    }
     for what, array in arrays.items():
         if not np.isfinite(array).all():
             raise SeipError(f"the coordinates of a {what} are not finite; check the scene's meshes")

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Float, Integer
+from ..orientation import turned
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 
@@ -167,14 +168,15 @@ def turned_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -
         Rotation from the sensor's axes to the site's.
     """
     cuts, tolerance = surfaces.discs.cuts, surfaces.tolerance
-    turned = replace(
+    turned_cuts = replace(
         cuts,
         # as one list of points: for each triangle by itself the product is many times slower
         corners=((cuts.corners - origin).reshape(-1, 3) @ orientation).reshape(-1, 3, 3),
         normal=cuts.normal @ orientation,
         middle=(cuts.middle - origin) @ orientation,
     )
-    return _about((surfaces.xyz - origin) @ orientation, surfaces.radius, turned.bounds(tolerance), tolerance)
+    targets = turned(surfaces.xyz - origin, orientation.T)
+    return _about(targets, surfaces.radius, turned_cuts.bounds(tolerance), tolerance)
 
 
 def _about(targets: Float, radius: float, discs: Discs, tolerance: float) -> NearSurfaces:

@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float, Integer
+from ..arrays import Boolean, Float, Integer
 from ..lidar import LidarModel
 from ..progress import PAUSE, Progress
 from ..site import Site
 from .near_surfaces import near_surfaces
 from .ray_casting import RayCaster
-from .scanning import Place, seen_by_near_rays
+from .sight import Sight
 
 _PLACES_IN_A_PIECE = 16  # a second's work or less
 
@@ -54,14 +54,14 @@ class Observer:
     def __init__(
         self, site: Site, models: Mapping[str, LidarModel], delta: float, min_intensity: float, caster: RayCaster
     ) -> None:
-        self._poses, self._models, self._caster = site.candidates, models, caster
-        self._delta, self._min_intensity = delta, min_intensity
-        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, delta)
+        self._poses, self._models = site.candidates, models
+        surfaces = near_surfaces(site.triangles, site.targets.xyz, delta)
+        self._sight = Sight(caster, surfaces, delta, min_intensity)
 
     @property
     def targets(self) -> int:
         """Number of targets."""
-        return len(self._surfaces.xyz)
+        return len(self._sight.surfaces.xyz)
 
     def see(self, poses: Integer) -> Rows:
         """Find what poses see; those at one place, of different sensors, share rays.
@@ -72,31 +72,35 @@ class Observer:
         """
         packed = np.zeros((len(poses), (self.targets + 7) // 8), dtype=np.uint8)
         rays = 0
-        for members in places(self._poses.xyz[poses], self._poses.yaw[poses]):
+        for members in places(self._poses.xyz[poses], self._poses.yaw[poses], self._poses.tilt[poses]):
             here = poses[members]
             models = [self._models[key] for key in self._poses.sensor[here].tolist()]
-            origin, yaw = self._poses.xyz[here[0]], float(self._poses.yaw[here[0]])
-            place = Place(self._caster, origin, yaw, models, self._delta, self._min_intensity)
-            seen, cast = seen_by_near_rays(place, self._surfaces)
+            seen, cast = self._look(int(here[0]), models)
             packed[members] = np.packbits(seen, axis=1)
             rays += cast
         return Rows(packed, rays)
 
+    def _look(self, pose: int, models: Sequence[LidarModel]) -> tuple[Boolean, int]:
+        poses = self._poses
+        if poses.tilt[pose] == 0:
+            return self._sight.level(models, poses.xyz[pose], float(poses.yaw[pose]))
+        return self._sight.turned(models, poses.xyz[pose], poses.orientation(pose))
 
-def places(xyz: Float, yaw: Float) -> list[Integer]:
-    """Group poses that have position and yaw in common.
+
+def places(xyz: Float, yaw: Float, tilt: Float) -> list[Integer]:
+    """Group poses that have position, yaw and tilt in common: their sensors can share rays.
 
     Parameters
     ----------
     xyz : (c, 3) float64, metres
-    yaw : (c,) float64, radians
+    yaw, tilt : (c,) float64, radians
 
     Returns
     -------
     list of (k,) int64
         In the order of their first poses.
     """
-    _, first, place = np.unique(np.column_stack([xyz, yaw]), axis=0, return_index=True, return_inverse=True)
+    _, first, place = np.unique(np.column_stack([xyz, yaw, tilt]), axis=0, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))[place.ravel()]
     order = np.argsort(rank, kind="stable")
     return np.split(order, np.cumsum(np.bincount(rank))[:-1])
@@ -104,7 +108,7 @@ def places(xyz: Float, yaw: Float) -> list[Integer]:
 
 def pieces_of(site: Site) -> list[Integer]:
     """Divide the poses of a site into pieces of work, places kept whole."""
-    whole = places(site.candidates.xyz, site.candidates.yaw)
+    whole = places(site.candidates.xyz, site.candidates.yaw, site.candidates.tilt)
     groups = range(0, len(whole), _PLACES_IN_A_PIECE)
     return [np.concatenate(whole[begin : begin + _PLACES_IN_A_PIECE]) for begin in groups]
 

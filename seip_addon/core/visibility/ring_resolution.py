@@ -2,7 +2,9 @@
 
 On a level road h below the sensor the channel of elevation -φ draws a ring of
 radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets
-between them count as unseen although nothing stands before them.
+between them count as unseen although nothing stands before them. A sensor that is
+tilted by θ draws the ring of elevation -φ - θ on the side that it looks to, and that
+of -φ + θ, which lies farther from the next, on the other.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Float
+from ..arrays import Boolean, Float
 from ..lidar import LidarModel, find_models
 from ..site import Site
 from .grid import VisibilitySettings
@@ -38,7 +40,8 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
     for key, model in find_models(models, np.unique(poses.sensor).tolist()).items():
         of_type = poses.sensor == key
         reach = min(model.max_range, _farthest(poses.xyz[of_type], site.targets.xyz))
-        heights = np.unique(np.round(poses.height[of_type], 2))
+        upright = of_type & (poses.tilt == 0)
+        heights = np.unique(np.round(poses.height[upright], 2))
         limits = [(height, unresolved_from(model, float(height), settings.delta, reach)) for height in heights]
         beyond = [f"{limit:.0f} m (at {height:g} m height)" for height, limit in limits if limit < reach]
         if beyond:
@@ -46,6 +49,7 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
                 f"{key}: beyond {', '.join(beyond)} neighbouring rings on a level road are more than "
                 f"2δ = {2 * settings.delta:g} m apart, so coverage there counts beams, not view"
             )
+        warnings += _of_tilted(model, site, of_type & ~upright, settings.delta, reach)
     if settings.delta < site.targets.spacing / math.sqrt(2):
         warnings.append(
             f"targets are {site.targets.spacing:g} m apart and δ is {settings.delta:g} m: road between them "
@@ -54,7 +58,24 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
     return tuple(warnings)
 
 
-def unresolved_from(model: LidarModel, height: float, delta: float, reach: float) -> float:
+def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
+    """Say from where on the tilted sensors of a type, each on the side that it looks to, count beams."""
+    poses = site.candidates
+    height = np.round(poses.height, 2)
+    beyond = []
+    for level in np.unique(height[tilted]):
+        tilts = np.unique(poses.tilt[tilted & (height == level)])
+        limit = min(unresolved_from(model, float(level), delta, reach, float(tilt)) for tilt in tilts)
+        if limit < reach:
+            beyond.append(f"{limit:.0f} m (at {level:g} m height)")
+    sentence = (
+        f"{model.key}: where it is tilted, beyond {', '.join(beyond)} neighbouring rings on a level road before it are "
+        f"more than 2δ = {2 * delta:g} m apart, and behind it sooner, so coverage there counts beams, not view"
+    )
+    return [sentence] if beyond else []
+
+
+def unresolved_from(model: LidarModel, height: float, delta: float, reach: float, tilt: float = 0.0) -> float:
     """Return the radius from which some neighbouring returns on a level road are more than 2δ apart.
 
     Parameters
@@ -64,13 +85,16 @@ def unresolved_from(model: LidarModel, height: float, delta: float, reach: float
         Of the sensor above the road.
     delta, reach : float, metres
         Nothing is looked for beyond ``reach``.
+    tilt : float, radians
+        Of the sensor, towards where it is looked for.
 
     Returns
     -------
     float, metres
         ``reach`` if all is resolved.
     """
-    down = np.sort(-model.elevations[model.elevations < 0])[::-1]
+    down = tilt - model.elevations
+    down = np.sort(down[(down > 0) & (down <= math.pi / 2)])[::-1]
     rings = height / np.tan(down)
     rings = np.append(rings[rings < reach], reach)
     wide = np.flatnonzero(np.diff(rings) > 2 * delta)
