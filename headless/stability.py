@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -44,6 +44,29 @@ FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 PAGE, CHARTS = "stability.md", "stability"
 
 
+@dataclass(frozen=True)
+class Scope:
+    """How much is tried.
+
+    Parameters
+    ----------
+    grids : int
+        Grids of targets, and azimuths, that are drawn at random.
+    rays : int
+        That are held to float64 on each scene.
+    instances : int
+        Random placement problems of each kind.
+    poses : StudySettings
+    robust : RobustSettings
+    """
+
+    grids: int = 40
+    rays: int = 20_000
+    instances: int = 60
+    poses: StudySettings = field(default_factory=StudySettings)
+    robust: RobustSettings = field(default_factory=RobustSettings)
+
+
 @dataclass(frozen=True, eq=False)
 class Stage:
     """A scene, laid out and seen.
@@ -53,10 +76,12 @@ class Stage:
     surveyed : Survey
     charts : path
         Folder of the charts.
+    scope : Scope
     """
 
     surveyed: survey.Survey
     charts: Path
+    scope: Scope
 
     @property
     def name(self) -> str:
@@ -73,8 +98,8 @@ class Stage:
 Work = Callable[[Stage], Generator[Progress, None, Chapter]]
 
 
-def main(argv: list[str]) -> None:
-    """Study what has not been studied yet, and write the page."""
+def main(argv: list[str], scope: Scope | None = None) -> None:
+    """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
     session.check_folder(charts)
@@ -82,8 +107,8 @@ def main(argv: list[str]) -> None:
         argparse.Namespace(**vars(options) | {"output": options.work}),
         lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
     )
-    stage = Stage(surveyed, charts)
-    made_from = digest(grid_key(surveyed.layout), repr(surveyed.layout.settings.as_record()), versions()["seip"])
+    stage = Stage(surveyed, charts, scope or Scope())
+    made_from = digest(grid_key(surveyed.layout), repr(surveyed.layout.settings), repr(stage.scope), versions()["seip"])
     chapters = []
     for name, work in _chapters(stage):
         kept = load_chapter(options.work / f"{name}.json", made_from)
@@ -110,7 +135,7 @@ def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Vary what defines visibility."""
     layout = stage.surveyed.layout
     delta = layout.settings.visibility.delta
-    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT)
+    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=stage.scope.grids)
     limits_charts.save_ring_border_chart(stage.charts / "ring_borders.png", study, delta, f"{stage.name}: rings and δ")
     limits_charts.save_border_check_chart(stage.charts / "beyond_border.png", study, f"{stage.name}: beyond the border")
     limits_charts.save_delta_chart(stage.charts / "delta.png", study, delta, f"{stage.name}: coverage against δ")
@@ -129,7 +154,7 @@ def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
 
 def arithmetic(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Hold the ray casters to float64."""
-    study = yield from arithmetic_study()
+    study = yield from arithmetic_study(stage.scope.rays)
     limits_charts.save_rounding_chart(stage.charts / "rounding.png", study, "Hits against float64")
     return Chapter(
         "Arithmetic",
@@ -140,7 +165,7 @@ def arithmetic(stage: Stage) -> Generator[Progress, None, Chapter]:
 
 def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Drive the solvers to where they fail, and see how flat the top is."""
-    study = yield from solver_study()
+    study = yield from solver_study(stage.scope.instances)
     tops: list[tuple[str, FlatTop]] = []
     for sensor in stage.surveyed.layout.models:
         problem = stage.problem(sensor)
@@ -166,7 +191,7 @@ def poses(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
     study = yield from robust_study(surroundings(stage.surveyed.layout), problem, _settings(stage))
     chosen = study.nominal.placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
-    judged = yield from pose_study(surroundings(stage.surveyed.layout), deployment, StudySettings())
+    judged = yield from pose_study(surroundings(stage.surveyed.layout), deployment, stage.scope.poses)
     title, names = f"{stage.name}: {DEFAULT_COUNT} × {sensor}", [f"{what}_{sensor}.png" for what in _POSE_CHARTS]
     robust_charts.save_spread_chart(stage.charts / names[0], study, f"{title} under pose errors")
     robust_charts.save_blame_chart(stage.charts / names[1], judged, f"{title}, what costs coverage")
@@ -198,7 +223,7 @@ def failures(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
 
 def _settings(stage: Stage) -> RobustSettings:
     settings = stage.surveyed.layout.settings
-    return RobustSettings(solver=settings.solver, time_limit=settings.time_limit)
+    return replace(stage.scope.robust, solver=settings.solver, time_limit=settings.time_limit)
 
 
 def _lead(stage: Stage) -> str:

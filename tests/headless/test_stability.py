@@ -1,0 +1,62 @@
+"""The command that drives every method to where it fails, on the shipped junction with little of everything."""
+
+import json
+from pathlib import Path
+
+from headless import stability
+
+import pytest
+
+from seip_addon.core.stability.pose_study import StudySettings
+from seip_addon.core.stability.robust_study import RobustSettings
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+COARSE = [
+    "--sensor",
+    "type1",
+    "--heights",
+    "5.4",
+    "--grid",
+    "8",
+    "--spacing",
+    "25",
+    "--delta",
+    "6",
+    "--time-limit",
+    "2",
+]
+LITTLE = stability.Scope(
+    grids=4,
+    rays=200,
+    instances=2,
+    poses=StudySettings(draws=20, draws_of_kind=5),
+    robust=RobustSettings(scenarios=3, unseen=20),
+)
+
+
+def run(folder):
+    stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE], LITTLE)
+    return (folder / "docs" / "stability.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
+    page = run(tmp_path)
+    charts = tmp_path / "docs" / "stability"
+    named = {part.split(")")[0] for part in page.split("](stability/")[1:]}
+    assert named == {path.name for path in charts.iterdir()}
+    chapters = sorted(path.stem for path in (tmp_path / "work").glob("*.json"))
+    assert page.count("\n## ") == len(chapters)
+    for name in chapters:
+        kept = json.loads((tmp_path / "work" / f"{name}.json").read_text(encoding="utf-8"))
+        assert kept["rows"]
+        assert all(row["begins"] in page for row in kept["rows"])
+
+    (charts / "solvers.png").unlink()
+    (tmp_path / "work" / "arithmetic.json").write_text("{", encoding="utf-8")
+    capsys.readouterr()
+    assert run(tmp_path).count("\n## ") == len(chapters)
+    said = capsys.readouterr().out
+    assert "Solvers:" in said
+    assert "Arithmetic:" in said
+    assert "Poses" not in said
