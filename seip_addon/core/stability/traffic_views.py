@@ -76,7 +76,7 @@ def traffic_views(
     caster = make_ray_caster(site.triangles, engine)
     crowds = [_crowd(around, one, caster) for one in instants]
     delta, least = around.sight.delta, around.sight.min_intensity
-    wanted = site.targets.xyz + (0.0, 0.0, HEIGHT if layer == "height" else 0.0)
+    wanted = site.targets.xyz + np.array([0.0, 0.0, HEIGHT if layer == "height" else 0.0])
     index = TargetIndex(wanted, delta)
     packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
 
