@@ -104,7 +104,7 @@ def beams_past(bodies, pose):
     (model,) = place.models
     directions = BeamPattern(model, place.yaw).directions(np.arange(model.channels * model.azimuth_count))
     end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
-    points = SITE.targets.xyz + [0.0, 0.0, HEIGHT]
+    points = SITE.targets.xyz + np.array([0.0, 0.0, HEIGHT])
     passed = np.zeros(len(points), dtype=bool)
     for number, point in enumerate(points):
         ahead = directions @ (point - place.origin)

@@ -7,8 +7,8 @@ stretches of time (`mean_over_time`).
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from .risk import Risk
 from .robust_placement import solve_robust
 from .rows import Row
 from .traffic_instants import NOBODY, Instants
-from .traffic_views import HEIGHT, traffic_views
+from .traffic_views import HEIGHT, Layer, traffic_views
 from .views import Views
 
 NOTABLE = 0.01
@@ -30,23 +30,27 @@ NOTABLE = 0.01
 MOSTLY = 0.9
 """Share of time from which on a target counts as mostly seen."""
 
+WHAT: Mapping[Layer, str] = {"road": "road", "height": f"points {HEIGHT:g} m above the road"}
+"""What is seen, in words."""
 
-@dataclass(frozen=True)
-class TrafficSettings:
-    """How placements in traffic are chosen.
+
+@dataclass(frozen=True, eq=False)
+class Scenarios:
+    """What all candidates see at the instants that a placement is chosen on.
 
     Parameters
     ----------
-    solver : str
-    time_limit : float, seconds
-        For each placement.
-    risk : Risk
-        What of the instants is to be large: the expectation, their worst tail, …
+    layer : {"road", "height"}
+        What is to be seen.
+    empty : (c, t) bool
+        On the empty road.
+    views : Views
+        At each instant.
     """
 
-    solver: str = "highs"
-    time_limit: float = 60.0
-    risk: Risk = field(default_factory=Risk)
+    layer: Layer
+    empty: Boolean
+    views: Views
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +67,34 @@ class Seen:
         Which targets on the empty road.
     time : (t,) float64
         Share of the instants at which each target is seen.
+    stretch : (n,) int64
+        Of the instants.
     """
 
     empty: float
     at: Float
     empty_targets: Boolean
     time: Float
+    stretch: Integer
+
+    @property
+    def held(self) -> Estimate:
+        """The share of the targets' weight that is seen, on average over time."""
+        return mean_over_time(self.at, self.stretch)
+
+    @property
+    def lost(self) -> Estimate:
+        """How much less that is than on the empty road."""
+        return mean_over_time(self.empty - self.at, self.stretch)
 
     @property
     def rarely(self) -> float:
         """Of the targets seen on the empty road, the share that is seen less than `MOSTLY` of the time."""
         return float((self.time[self.empty_targets] < MOSTLY).mean()) if self.empty_targets.any() else 0.0
+
+    def more_than(self, other: Seen) -> Estimate:
+        """Estimate how much more of the weight is seen than by another placement at the same instants."""
+        return mean_over_time(self.at - other.at, self.stretch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,35 +106,13 @@ class InTraffic:
     name : str
         What it was chosen for.
     placement : Placement
-    road : Seen
-        The targets themselves.
-    height : Seen
-        The points `HEIGHT` above them.
-    stretch : (n,) int64
-        Of the instants.
+    seen : mapping of {"road", "height"} to Seen
+        Of the targets, and of the points `HEIGHT` metres above them.
     """
 
     name: str
     placement: Placement
-    road: Seen
-    height: Seen
-    stretch: Integer
-
-    def held(self) -> Estimate:
-        """Estimate the share of the targets' weight that is seen, on average over time."""
-        return mean_over_time(self.road.at, self.stretch)
-
-    def lost(self) -> Estimate:
-        """Estimate how much less that is than on the empty road."""
-        return mean_over_time(self.road.empty - self.road.at, self.stretch)
-
-    def held_above(self) -> Estimate:
-        """Estimate the share of the points above the targets that is seen, by weight, on average over time."""
-        return mean_over_time(self.height.at, self.stretch)
-
-    def lost_above(self) -> Estimate:
-        """Estimate how much less that is than on the empty road."""
-        return mean_over_time(self.height.empty - self.height.at, self.stretch)
+    seen: Mapping[Layer, Seen]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +121,8 @@ class TrafficStudy:
 
     Parameters
     ----------
+    layer : {"road", "height"}
+        What both were to see.
     chosen_at : int
         Instants of traffic that one of the two was chosen on.
     road_users : float
@@ -132,45 +133,42 @@ class TrafficStudy:
         Chosen on traffic.
     """
 
+    layer: Layer
     chosen_at: int
     road_users: float
     empty: InTraffic
     traffic: InTraffic
 
-    def won(self) -> Estimate:
-        """Estimate how much more of the targets' weight the placement chosen on traffic sees in traffic."""
-        return mean_over_time(self.traffic.road.at - self.empty.road.at, self.empty.stretch)
-
-    def won_above(self) -> Estimate:
-        """Estimate the same of the points above the targets."""
-        return mean_over_time(self.traffic.height.at - self.empty.height.at, self.empty.stretch)
+    def won(self, layer: Layer) -> Estimate:
+        """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
+        return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
     def is_converged(self) -> bool:
         """Whether every other instant says the same as all: means whose intervals meet."""
-        halved = slice(None, None, 2)
-        pairs = [
-            (mean_over_time(values[halved], self.empty.stretch[halved]), mean_over_time(values, self.empty.stretch))
-            for values in (
-                self.empty.road.at,
-                self.traffic.road.at,
-                self.empty.height.at,
-                self.traffic.road.at - self.empty.road.at,
-            )
-        ]
-        return all(half.agrees_with(whole) for half, whole in pairs)
+        rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
+        rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
+        stretch = self.empty.seen[self.layer].stretch
+        return all(mean_over_time(row[::2], stretch[::2]).agrees_with(mean_over_time(row, stretch)) for row in rows)
 
 
-def views_to_choose_on(
-    around: Surroundings, problem: PlacementProblem, instants: Instants
-) -> Generator[Progress, None, Views]:
+def look_at_traffic(
+    around: Surroundings, problem: PlacementProblem, instants: Instants, layer: Layer = "road"
+) -> Generator[Progress, None, Scenarios]:
     """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
     every = np.flatnonzero(problem.allowed)
-    views = yield from traffic_views(around, every, instants.standing())
-    return views.spread_to(every, len(problem.visible))
+    views = yield from traffic_views(around, every, [NOBODY, *instants.standing()], layer)
+    spread = views.spread_to(every, len(problem.visible))
+    return Scenarios(layer, spread.seen(0), Views(spread.packed[1:], spread.targets))
 
 
 def traffic_study(
-    around: Surroundings, problem: PlacementProblem, scenarios: Views, judged: Instants, settings: TrafficSettings
+    around: Surroundings,
+    problem: PlacementProblem,
+    scenarios: Scenarios,
+    judged: Instants,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
 ) -> Generator[Progress, None, TrafficStudy]:
     """Place for the empty road and on traffic, and judge both at other instants.
 
@@ -178,12 +176,13 @@ def traffic_study(
     ----------
     around : Surroundings
     problem : PlacementProblem
-        Of all candidates of the site, on the empty road.
-    scenarios : Views
-        See `views_to_choose_on`.
+        Of all candidates of the site; what they see is taken from the scenarios.
+    scenarios : Scenarios
     judged : Instants
         Of runs that are not those of the scenarios.
-    settings : TrafficSettings
+    solver : str
+    time_limit : float, seconds
+        For each placement.
 
     Yields
     ------
@@ -193,80 +192,73 @@ def traffic_study(
     -------
     TrafficStudy
     """
-    empty = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
-    found = yield from solve_robust(
-        problem, scenarios, settings.risk, solver=settings.solver, time_limit=settings.time_limit
-    )
-    placements = [("the empty road", empty), (f"{settings.risk.in_words()} in traffic", found.placement)]
-    used = np.unique(np.concatenate([placement.chosen for _, placement in placements]))
+    problem = replace(problem, visible=scenarios.empty)
+    empty = yield from solve(problem, solver=solver, time_limit=time_limit)
+    found = yield from solve_robust(problem, scenarios.views, Risk(), solver=solver, time_limit=time_limit)
+    used = np.unique(np.concatenate([empty.chosen, found.placement.chosen]))
     crowds = judged.standing()
-    road = yield from traffic_views(around, used, [NOBODY, *crowds])
-    height = yield from traffic_views(around, used, [NOBODY, *crowds], "height")
-    one, other = (
-        InTraffic(
-            name,
-            placement,
-            _seen(road, np.searchsorted(used, placement.chosen), problem.weights),
-            _seen(height, np.searchsorted(used, placement.chosen), problem.weights),
-            judged.stretch,
-        )
-        for name, placement in placements
+    layers: tuple[Layer, ...] = ("road", "height")
+    views: dict[Layer, Views] = {}
+    for layer in layers:
+        views[layer] = yield from traffic_views(around, used, [NOBODY, *crowds], layer)
+
+    def judge(name: str, placement: Placement) -> InTraffic:
+        rows = np.searchsorted(used, placement.chosen)
+        seen = {layer: _seen(views[layer], rows, problem.weights, judged.stretch) for layer in layers}
+        return InTraffic(name, placement, seen)
+
+    return TrafficStudy(
+        layer=scenarios.layer,
+        chosen_at=len(scenarios.views),
+        road_users=float(np.mean([len(crowd.hulls) for crowd in crowds])),
+        empty=judge("the empty road", empty),
+        traffic=judge("the road in traffic", found.placement),
     )
-    return TrafficStudy(len(scenarios), float(np.mean([len(crowd.hulls) for crowd in crowds])), one, other)
 
 
-def _seen(views: Views, rows: Integer, weight: Float) -> Seen:
+def _seen(views: Views, rows: Integer, weight: Float, stretch: Integer) -> Seen:
     """Return what some poses see together; the first of the views is of the empty road."""
     seen = views.seen_by_any(rows)
     share = seen @ weight / weight.sum()
-    return Seen(float(share[0]), share[1:], seen[0], seen[1:].mean(axis=0))
+    return Seen(float(share[0]), share[1:], seen[0], seen[1:].mean(axis=0), stretch)
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
-    """Say where a placement for the empty road does not hold in traffic what it promises, in a sentence."""
-    lost = study.empty.lost()
-    if lost.value < NOTABLE:
-        return ()
-    sentence = (
-        f"in traffic ({study.road_users:.0f} road users at a time) the placement for the empty road sees "
-        f"{study.empty.held().value:.1%} on average over time, not {study.empty.road.empty:.1%}: "
-        f"vehicles hide {lost.value:.1%}"
+    """Say where a placement for the empty road does not hold in traffic what it promises, in sentences."""
+    return tuple(
+        f"in traffic ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
+        f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
+        f"vehicles hide {seen.lost.value:.1%}"
+        for layer, seen in study.empty.seen.items()
+        if seen.lost.value >= NOTABLE
     )
-    return (sentence,)
 
 
 def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     """Return what the study says as rows of the page of stability."""
-    empty, traffic = study.empty, study.traffic
     regime = f"{study.road_users:.0f} road users at a time"
-    instants, stretches = len(empty.stretch), len(np.unique(empty.stretch))
+    stretch = study.empty.seen[study.layer].stretch
     how = (
-        f"{instants} instants in {stretches} stretches of time, of runs that nothing was chosen on; every other one "
-        f"{'says the same' if study.is_converged() else 'says something else: take more'}"
+        f"{len(stretch)} instants in {len(np.unique(stretch))} stretches of time, of runs that nothing was chosen on; "
+        f"every other one {'says the same' if study.is_converged() else 'says something else: take more'}"
     )
-    return (
+    losses = tuple(
         Row(
-            "coverage of a placement",
+            f"view of the {WHAT[layer]}",
             regime,
-            f"the empty road promises {empty.road.empty:.2%}, traffic leaves {empty.held().in_words()} of the time; "
-            f"{empty.road.rarely:.1%} of the targets that count as seen are seen less than {MOSTLY:.0%} of the time",
+            f"the empty road promises {seen.empty:.2%}, traffic leaves {seen.held.in_words()} on average over time; "
+            f"{seen.rarely:.1%} of what counts as seen is seen less than {MOSTLY:.0%} of the time",
             how,
             f"a warning where vehicles hide {NOTABLE:.0%} or more, and a map of the share of time",
-        ),
-        Row(
-            f"coverage {HEIGHT:g} m above the road",
-            regime,
-            f"the empty road promises {empty.height.empty:.2%}, traffic leaves {empty.held_above().in_words()}; "
-            f"{empty.height.rarely:.1%} of the points that count as seen are seen less than {MOSTLY:.0%} of the time",
-            how,
-            "the same map for points above the road",
-        ),
-        Row(
-            "placement for the empty road",
-            regime,
-            f"placing on traffic holds {traffic.held().in_words()}, {study.won().in_words()} more, and "
-            f"{study.won_above().in_words()} more {HEIGHT:g} m above the road",
-            f"chosen on {study.chosen_at} instants; {how}",
-            f"placement over instants of traffic, certificate: within {traffic.placement.gap:.2%} of the best possible",
-        ),
+        )
+        for layer, seen in study.empty.seen.items()
     )
+    gain = Row(
+        f"placement for the empty road, to see the {WHAT[study.layer]}",
+        regime,
+        f"placing on traffic holds {study.traffic.seen[study.layer].held.in_words()}, "
+        f"{study.won(study.layer).in_words()} more",
+        f"chosen on {study.chosen_at} instants; {how}",
+        f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
+    )
+    return (*losses, gain)
