@@ -164,6 +164,7 @@ def test_neither_order_nor_company_of_instants_matters(layer):
         crowd([(0.0, 0.0, 0.8)], ["truck"]),
     ]
     expected = views(instants, layer)
+    assert (views(instants, layer) == expected).all()
     for order in itertools.islice(itertools.permutations(range(4)), 5, 24, 9):
         assert (views([instants[number] for number in order], layer) == expected[list(order)]).all()
     assert (views([instants[2]], layer)[0] == expected[2]).all()

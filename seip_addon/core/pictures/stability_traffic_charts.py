@@ -27,8 +27,8 @@ from .palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from .plan_view import CRACK, draw_area
 from .study_charts import SERIES
 
-TIME = LinearSegmentedColormap.from_list("time", SEEN_COLOURS)
-"""From never seen to always seen: the colours of targets that no sensor sees and that two see."""
+TIME = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae", *SEEN_COLOURS[1:]))
+"""From never seen to always seen: from the colour of targets that no sensor sees to that of those that two see."""
 
 OBSTACLE = "#8b9285"
 SIDE = 6.4  # inches
