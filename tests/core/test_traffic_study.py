@@ -82,6 +82,8 @@ def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study)
             rows = np.array([views.seen(instant).any(axis=0) for instant in range(16)])
             assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
+            assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
+            assert seen.hidden.value >= seen.lost.value - 1e-12
         assert (placed.seen["height"].at <= placed.seen["height"].empty + 1e-12).all()
 
 
@@ -106,7 +108,7 @@ def test_it_says_what_traffic_hides(study):
     _, found = study
     hidden = found.empty.seen["height"]
     assert hidden.lost.value > 0.01
-    assert any(f"vehicles hide {hidden.lost.value:.1%}" in sentence for sentence in traffic_warnings(found))
+    assert any(f"{hidden.lost.value:.1%} less" in sentence for sentence in traffic_warnings(found))
     nothing = replace(hidden, at=np.full_like(hidden.at, hidden.empty - 0.004))
     quiet = replace(found, empty=replace(found.empty, seen={"road": nothing, "height": nothing}))
     assert traffic_warnings(quiet) == ()

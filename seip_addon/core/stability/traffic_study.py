@@ -63,6 +63,8 @@ class Seen:
         Share of the targets' weight on the empty road.
     at : (n,) float64
         The same share at each instant.
+    hidden_at : (n,) float64
+        Share of the weight that is seen on the empty road and not at each instant.
     empty_targets : (t,) bool
         Which targets on the empty road.
     time : (t,) float64
@@ -73,6 +75,7 @@ class Seen:
 
     empty: float
     at: Float
+    hidden_at: Float
     empty_targets: Boolean
     time: Float
     stretch: Integer
@@ -84,8 +87,13 @@ class Seen:
 
     @property
     def lost(self) -> Estimate:
-        """How much less that is than on the empty road."""
+        """How much less that is than on the empty road: what is hidden, less what returns from vehicles show."""
         return mean_over_time(self.empty - self.at, self.stretch)
+
+    @property
+    def hidden(self) -> Estimate:
+        """The share of the weight that is seen on the empty road and hidden by vehicles, on average over time."""
+        return mean_over_time(self.hidden_at, self.stretch)
 
     @property
     def rarely(self) -> float:
@@ -219,8 +227,8 @@ def traffic_study(
 def _seen(views: Views, rows: Integer, weight: Float, stretch: Integer) -> Seen:
     """Return what some poses see together; the first of the views is of the empty road."""
     seen = views.seen_by_any(rows)
-    share = seen @ weight / weight.sum()
-    return Seen(float(share[0]), share[1:], seen[0], seen[1:].mean(axis=0), stretch)
+    share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
+    return Seen(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
@@ -228,7 +236,7 @@ def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     return tuple(
         f"in traffic ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
         f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
-        f"vehicles hide {seen.lost.value:.1%}"
+        f"{seen.lost.value:.1%} less"
         for layer, seen in study.empty.seen.items()
         if seen.lost.value >= NOTABLE
     )
@@ -246,10 +254,11 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
         Row(
             f"view of the {WHAT[layer]}",
             regime,
-            f"the empty road promises {seen.empty:.2%}, traffic leaves {seen.held.in_words()} on average over time; "
+            f"the empty road promises {seen.empty:.2%}, traffic leaves {seen.held.in_words()} on average over time "
+            f"and hides {seen.hidden.in_words()} of it; "
             f"{seen.rarely:.1%} of what counts as seen is seen less than {MOSTLY:.0%} of the time",
             how,
-            f"a warning where vehicles hide {NOTABLE:.0%} or more, and a map of the share of time",
+            f"a warning where {NOTABLE:.0%} or more is lost, and a map of the share of time",
         )
         for layer, seen in study.empty.seen.items()
     )
