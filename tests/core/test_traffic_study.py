@@ -111,7 +111,13 @@ def test_it_says_what_traffic_hides(study):
     assert any(f"{hidden.lost.value:.1%} less" in sentence for sentence in traffic_warnings(found))
     nothing = replace(hidden, at=np.full_like(hidden.at, hidden.empty - 0.004))
     quiet = replace(found, empty=replace(found.empty, seen={"road": nothing, "height": nothing}))
+    quiet = replace(quiet, traffic=quiet.empty)
     assert traffic_warnings(quiet) == ()
+    other = replace(found.traffic, placement=replace(found.traffic.placement, chosen=np.array([0, 1])))
+    doubtful = replace(quiet, traffic=replace(other, seen=quiet.empty.seen))
+    assert ["not known to see more" in sentence for sentence in traffic_warnings(doubtful)] == [True]
+    better = replace(nothing, at=nothing.at + 0.1)
+    assert traffic_warnings(replace(quiet, traffic=replace(other, seen={"road": better, "height": better}))) == ()
     rows = traffic_rows(found)
     assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime

@@ -232,14 +232,22 @@ def _seen(views: Views, rows: Integer, weight: Float, stretch: Integer) -> Seen:
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
-    """Say where a placement for the empty road does not hold in traffic what it promises, in sentences."""
-    return tuple(
+    """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
+    losses = tuple(
         f"in traffic ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
         f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
         f"{seen.lost.value:.1%} less"
         for layer, seen in study.empty.seen.items()
         if seen.lost.value >= NOTABLE
     )
+    won = study.won(study.layer)
+    if won.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
+        return losses
+    doubt = (
+        "in traffic that it was not chosen on this placement is not known to see more than the best one for the empty "
+        f"road: {won.in_words()} more; choose on more --instants, or keep that one"
+    )
+    return (*losses, doubt)
 
 
 def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
