@@ -57,7 +57,7 @@ def main(argv: list[str]) -> None:
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
     study = _studied(surveyed, goal, options)
     layout = surveyed.layout
-    plan = _plan(surveyed, goal, study)
+    plan = _plan(surveyed, goal, study, options)
     record = record_of(
         layout,
         surveyed.grid,
@@ -116,14 +116,15 @@ def _runs(surveyed: survey.Survey, options: argparse.Namespace) -> tuple[list[Tr
     return runs[:-judges], runs[-judges:]
 
 
-def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy) -> Plan:
+def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: argparse.Namespace) -> Plan:
     """Return the placement as a plan, noted what it was chosen for."""
     layout, placement = surveyed.layout, study.traffic.placement
     note = (
         f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "
         "bound and gap are of that"
     )
-    noted = replace(placement, notes=(note, *placement.notes, *traffic_warnings(study)))
+    weighed = ("targets weigh as many seconds as road users are there",) if options.weights_from_traffic else ()
+    noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
     return Plan(goal, noted, None, deploy(layout.site, layout.models, surveyed.grid.visible, placement.chosen))
 
 

@@ -42,6 +42,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     assert {*FILES, *in_traffic.CHARTS, "visibility.npz"} - {"view.png"} <= names
     notes = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))["notes"]
     assert "in traffic, on average over 4 instants" in notes[0]
+    assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
     assert "placing on traffic sees" in said

@@ -220,7 +220,7 @@ def traffic_study(
         chosen_at=len(scenarios.views),
         road_users=float(np.mean([len(crowd.hulls) for crowd in crowds])),
         empty=judge("the empty road", empty),
-        traffic=judge("the road in traffic", found.placement),
+        traffic=judge("traffic", found.placement),
     )
 
 
