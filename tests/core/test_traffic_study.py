@@ -22,7 +22,13 @@ from seip_addon.core.stability.disturbed_views import Surroundings
 from seip_addon.core.stability.estimates import Estimate, mean_of, mean_over_time
 from seip_addon.core.stability.traffic_instants import NOBODY, WARM_UP, spread_instants
 from seip_addon.core.stability.traffic_presence import road_user_seconds
-from seip_addon.core.stability.traffic_study import look_at_traffic, traffic_rows, traffic_study, traffic_warnings
+from seip_addon.core.stability.traffic_study import (
+    at_least,
+    look_at_traffic,
+    traffic_rows,
+    traffic_study,
+    traffic_warnings,
+)
 from seip_addon.core.stability.traffic_views import traffic_views
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
@@ -121,6 +127,16 @@ def test_it_says_what_traffic_hides(study):
     rows = traffic_rows(found)
     assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime
+
+
+def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_empty_road(study):
+    _, found = study
+    short = replace(found.traffic.placement, objective=10.0, bound=16.0, gap=0.6, status="feasible")
+    other = replace(found.empty.placement, chosen=np.array([3, 5]), covered=7.0, price=8.0)
+    assert at_least(short, other, 10.0) is short
+    better = at_least(short, other, 12.0)
+    assert (better.chosen.tolist(), better.objective, better.bound) == ([3, 5], 12.0, 16.0)
+    assert (better.gap, better.covered, better.price, better.status) == (pytest.approx(1 / 3), 7.0, 8.0, "feasible")
 
 
 def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
