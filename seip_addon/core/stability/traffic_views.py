@@ -16,7 +16,7 @@ target's answer is looked at again only where one of its own rays was stopped.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
@@ -244,31 +244,28 @@ class _Above:
         self._end = np.minimum(static.distance, static.model.max_range)
         self._witness = static.nearest_to(points)
         self._seen = self._pass(self._witness, np.arange(len(points)))
-        self._look_again(np.flatnonzero(~self._seen), self._seen)
+        for point, ray in self._passing(np.flatnonzero(~self._seen)):
+            self._seen[point], self._witness[point] = True, ray
 
     def seen(self, stopped: _Stopped) -> Boolean:
         usual = self._end[stopped.ray]
         self._end[stopped.ray] = stopped.distance
         seen = self._seen.copy()
-        own = np.isin(self._witness, stopped.ray) & seen
-        doubted = np.flatnonzero(own)
-        doubted = doubted[~self._pass(self._witness[doubted], doubted)]
-        seen[doubted] = False
-        witness = self._witness.copy()
-        self._look_again(doubted, seen)
-        self._witness = witness
+        doubtful = np.flatnonzero(seen & np.isin(self._witness, stopped.ray))
+        doubtful = doubtful[~self._pass(self._witness[doubtful], doubtful)]
+        seen[doubtful] = False
+        for point, _ in self._passing(doubtful):
+            seen[point] = True
         self._end[stopped.ray] = usual
         return seen
 
-    def _look_again(self, which: Integer, seen: Boolean) -> None:
-        """Try all rays past points, and note those that pass one as seen and by whom."""
+    def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
+        """Try all rays past points, and return some points at a time with the rays that pass them."""
         reach = self._static.place.delta * (1 + _OUTSIDE)
-        for part in np.array_split(which, max(1, -(-len(which) // _POINTS_AT_ONCE))):
+        for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
             hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
-            point = part[hull]
-            passing = self._pass(ray, point)
-            seen[point[passing]] = True
-            self._witness[point[passing]] = ray[passing]
+            passing = self._pass(ray, part[hull])
+            yield part[hull[passing]], ray[passing]
 
     def _pass(self, ray: Integer, point: Integer) -> Boolean:
         """Tell which rays come nearer than δ to points within the sensor's range and before they end, (n,)."""
