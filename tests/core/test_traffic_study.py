@@ -213,3 +213,12 @@ def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert (tmp_path / "chart one.png").read_bytes() == (tmp_path / "chart two.png").read_bytes()
     assert imread(tmp_path / "one.png")[..., :3].std() > 0.05
+
+
+def test_a_road_user_lies_the_way_it_heads():
+    site = junction_site(positions=1, spacing=1.0)
+    along_y = make_trajectories([(0.0, 0.0, 0.0, 0, math.pi / 2, 0), (10.0, 0.0, 0.0, 0, math.pi / 2, 0)], users=[BUS])
+    seconds = finish(road_user_seconds(site.targets, [along_y]))
+    x, y = np.abs(site.targets.xyz[:, :2].T)
+    assert seconds[(y > 4.0) & (x < 1.0)].sum() > 1.0
+    assert seconds[x > 2.0].sum() == 0.0
