@@ -23,6 +23,7 @@ from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
 from headless.detection.recordings import Configuration, Studio, TrafficRun
 from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.traffic_runs import runs_beside
 
 import bpy
 import numpy as np
@@ -133,7 +134,7 @@ def learn_from(stage: Stage, network: NetworkSettings) -> case_study.Lessons:
 
 def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study.Traffic:
     """Read the runs: the last two are for tests, the one before for validation, the others to learn from."""
-    paths = options.traffic or _beside(options.scene)
+    paths = options.traffic or runs_beside(options.scene)
     if len(paths) < FEWEST_RUNS:
         raise SeipError(
             f"{len(paths)} runs of traffic are too few: name {FEWEST_RUNS} or more with --traffic, made by "
@@ -148,12 +149,6 @@ def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study
             raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
         runs.append(TrafficRun(path.stem, trajectories, times))
     return case_study.Traffic(tuple(runs[:-3]), tuple(runs[-3:-2]), tuple(runs[-2:]))
-
-
-def _beside(scene: Path | None) -> list[Path]:
-    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``."""
-    path = Path(bpy.data.filepath) if scene is None else scene
-    return sorted((path.parent / f"{path.stem}_traffic").glob("*.npz"))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

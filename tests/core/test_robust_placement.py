@@ -12,9 +12,9 @@ from placement_oracle import all_placements, covered, small_problems
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, solve
 from seip_addon.core.progress import finish
-from seip_addon.core.stability.disturbed_views import DisturbedViews
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_placement import allowed_sensors, solve_robust
+from seip_addon.core.stability.views import Views
 
 RISKS = [
     Risk(),
@@ -31,7 +31,7 @@ RISKS = [
 
 
 def pack(views):
-    return DisturbedViews(np.packbits(views, axis=2), views.shape[2])
+    return Views(np.packbits(views, axis=2), views.shape[2])
 
 
 @st.composite

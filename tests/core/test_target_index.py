@@ -31,3 +31,14 @@ def test_the_distance_is_strictly_less() -> None:
     assert index.within_delta(np.array([[1.0, 0.0, 0.0]])).tolist() == []
     assert index.within_delta(np.array([[np.nextafter(1.0, 0.0), 0.0, 0.0]])).tolist() == [0]
     assert index.within_delta(np.array([[0.0, 0.0, 2.0]])).tolist() == []
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.integers(0, 60))
+def test_pairs_are_all_that_are_near(seed: int, targets: int, points: int) -> None:
+    random = np.random.default_rng(seed)
+    xyz, returns = random.uniform(-5, 5, (targets, 3)), random.uniform(-8, 8, (points, 3))
+    gap = returns[:, None] - xyz[None]
+    squared = gap[:, :, 0] ** 2 + gap[:, :, 1] ** 2 + gap[:, :, 2] ** 2
+    point, target = TargetIndex(xyz, 2.0).pairs_within_delta(returns)
+    assert sorted(map(list, zip(point.tolist(), target.tolist(), strict=True))) == np.argwhere(squared < 4.0).tolist()
+    assert (np.diff(point) >= 0).all()

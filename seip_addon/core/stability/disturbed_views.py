@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Boolean, Integer
 from ..lidar import LidarModel
@@ -19,40 +18,7 @@ from ..visibility.observer import places
 from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
 from ..visibility.turned import Onlooker
 from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
-
-
-@dataclass(frozen=True, eq=False)
-class DisturbedViews:
-    """Which of s poses sees which of t targets in each of n draws.
-
-    Parameters
-    ----------
-    packed : (n, s, ceil(t / 8)) uint8
-        Bits of V, as `numpy.packbits` packs them.
-    targets : int
-        t.
-    """
-
-    packed: NDArray[np.uint8]
-    targets: int
-
-    def __len__(self) -> int:
-        """Return the number of draws."""
-        return len(self.packed)
-
-    def seen(self, draw: int) -> Boolean:
-        """Return V of one draw, (s, t) bool."""
-        return np.unpackbits(self.packed[draw], axis=1, count=self.targets).view(bool)
-
-    def seen_by_pose(self, pose: int) -> Boolean:
-        """Return what one pose sees in each draw, (n, t) bool."""
-        return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
-
-    def spread_to(self, poses: Integer, number: int) -> DisturbedViews:
-        """Return views of that many poses, of which these are ``poses`` and the others see nothing."""
-        packed = np.zeros((len(self), number, self.packed.shape[2]), dtype=np.uint8)
-        packed[:, poses] = self.packed
-        return DisturbedViews(packed, self.targets)
+from .views import Views
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +52,7 @@ def draws_for(
     return out_of_objects(drawn, candidates.xyz[poses], around.objects)
 
 
-def disturbed_views(
-    around: Surroundings, poses: Integer, draws: PoseDraws
-) -> Generator[Progress, None, DisturbedViews]:
+def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> Generator[Progress, None, Views]:
     """Look from poses as draws of errors leave them; sensors of several types at one place share rays.
 
     Parameters
@@ -106,7 +70,7 @@ def disturbed_views(
 
     Returns
     -------
-    DisturbedViews
+    Views
     """
     site, models = around.site, around.models
     candidates = site.candidates
@@ -133,4 +97,4 @@ def disturbed_views(
     finally:
         pool.shutdown(cancel_futures=True)
     yield Progress(len(works), len(works), "looking from poses as they may be")
-    return DisturbedViews(packed, len(site.targets))
+    return Views(packed, len(site.targets))

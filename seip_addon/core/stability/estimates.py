@@ -8,9 +8,12 @@ from statistics import NormalDist
 
 import numpy as np
 
-from ..arrays import Float
+from ..arrays import Float, Integer
 
 CONFIDENCE = 0.95
+
+FEWEST_STRETCHES = 4
+"""Of fewer the spread of a mean is not known well enough for an interval."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,44 @@ def mean_of(values: Float) -> Estimate:
         return Estimate(mean, -math.inf, math.inf)
     reach = NormalDist().inv_cdf((1 + CONFIDENCE) / 2) * float(values.std(ddof=1)) / math.sqrt(len(values))
     return Estimate(mean, mean - reach, mean + reach)
+
+
+def mean_over_time(values: Float, stretch: Integer) -> Estimate:
+    """Estimate a mean of values that depend on each other when they are near in time, by means of stretches.
+
+    Stretches are taken as independent and as equally long (batch means; Law 2015,
+    section 9.5.3), and Student's interval is that of their means.
+
+    Parameters
+    ----------
+    values : (n,) float64
+    stretch : (n,) int64
+        In which stretch of time each was taken.
+    """
+    _, which = np.unique(stretch, return_inverse=True)
+    many = np.bincount(which)
+    means = np.bincount(which, values) / many
+    mean, number = math.fsum(values) / len(values), len(many)
+    if number < FEWEST_STRETCHES:
+        return Estimate(mean, -math.inf, math.inf)
+    reach = _student(number - 1) * float(means.std(ddof=1)) / math.sqrt(number)
+    return Estimate(mean, mean - reach, mean + reach)
+
+
+def _student(freedom: int) -> float:
+    """Return what Student's distribution keeps below with that confidence on both sides.
+
+    The expansion about the normal quantile (Abramowitz and Stegun 1964, 26.7.5)
+    is off by less than 0.3 % from three degrees of freedom on.
+    """
+    z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
+    terms = (
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160,
+    )
+    return z + math.fsum(term / freedom**power for power, term in enumerate(terms, start=1))
 
 
 def quantile_of(values: Float, share: float) -> Estimate:

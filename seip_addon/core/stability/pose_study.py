@@ -17,10 +17,11 @@ from ..arrays import Boolean, Float
 from ..deployment import Deployment
 from ..progress import Progress
 from ..site import Site
-from .disturbed_views import DisturbedViews, Surroundings, disturbed_views, draws_for
+from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_of
 from .pose_errors import KINDS, PoseErrors
 from .rows import Row
+from .views import Views
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -147,7 +148,7 @@ def pose_study(
     site = around.site
     poses = np.array([sensor.pose for sensor in deployment.sensors], dtype=np.int64)
 
-    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[DisturbedViews, Boolean]]:
+    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[Views, Boolean]]:
         drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
         seen = yield from disturbed_views(around, poses, drawn)
         return seen, blocked
@@ -178,7 +179,7 @@ def _coverages(site: Site, views: Sequence[Boolean]) -> Coverages:
     return Coverages(seen.mean(axis=1), seen[:, central].mean(axis=1) if central.any() else None)
 
 
-def _one_errs(site: Site, planned: Boolean, together: DisturbedViews, number: int) -> Coverages:
+def _one_errs(site: Site, planned: Boolean, together: Views, number: int) -> Coverages:
     others = np.delete(planned, number, axis=0).any(axis=0)
     return _coverages(site, [np.stack([others, row]) for row in together.seen_by_pose(number)])
 

@@ -43,9 +43,9 @@ from ..placement.feasibility import starting_choice
 from ..placement.instance import Instance, common_unit, make_instance, merge_targets
 from ..placement.problem import TIE, relative_gap
 from ..progress import Progress, within
-from .disturbed_views import DisturbedViews
 from .risk import Risk
 from .robust_search import CountedCover, RobustSearch, exchanged
+from .views import Views
 
 ROUNDS = 16
 """Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
@@ -79,7 +79,7 @@ class RobustPlacement:
 
 def solve_robust(
     problem: PlacementProblem,
-    scenarios: DisturbedViews,
+    scenarios: Views,
     risk: Risk,
     *,
     solver: str = "highs",
@@ -92,7 +92,7 @@ def solve_robust(
     ----------
     problem : PlacementProblem
         With the visibility of the poses as planned.
-    scenarios : DisturbedViews
+    scenarios : Views
         Of all candidates.
     risk : Risk
         What is to be large.
@@ -137,14 +137,14 @@ def solve_robust(
 
 
 def foresee(
-    problem: PlacementProblem, scenarios: DisturbedViews, *, solver: str = "highs", time_limit: float = 60.0
+    problem: PlacementProblem, scenarios: Views, *, solver: str = "highs", time_limit: float = 60.0
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
     """Solve each scenario as if it were known that it comes: no placement does better there.
 
     Parameters
     ----------
     problem : PlacementProblem
-    scenarios : DisturbedViews
+    scenarios : Views
     solver : str
     time_limit : float, seconds
         For all of them.
@@ -173,7 +173,7 @@ def foresee(
 
 def _with_foresight(
     problem: PlacementProblem,
-    scenarios: DisturbedViews,
+    scenarios: Views,
     risk: Risk,
     placement: Placement,
     foreseen: Sequence[Placement],
@@ -199,7 +199,7 @@ def _with_foresight(
     )
 
 
-def outcomes_of(problem: PlacementProblem, scenarios: DisturbedViews, risk: Risk, chosen: Integer) -> Float:
+def outcomes_of(problem: PlacementProblem, scenarios: Views, risk: Risk, chosen: Integer) -> Float:
     """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
     return risk.outcomes(_seen(scenarios, chosen), problem.weights, allowed_sensors(problem))
 
@@ -215,17 +215,17 @@ def allowed_sensors(problem: PlacementProblem) -> int:
     return affordable if problem.count is None else min(problem.count, affordable)
 
 
-def _without_copies(scenarios: DisturbedViews) -> DisturbedViews:
+def _without_copies(scenarios: Views) -> Views:
     """Return one scenario where all are the same, so that without errors nothing is rounded otherwise."""
     same = (scenarios.packed == scenarios.packed[:1]).all()
-    return DisturbedViews(scenarios.packed[:1], scenarios.targets) if same else scenarios
+    return Views(scenarios.packed[:1], scenarios.targets) if same else scenarios
 
 
-def _seen(scenarios: DisturbedViews, chosen: Integer) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+def _seen(scenarios: Views, chosen: Integer) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     return np.unpackbits(scenarios.packed[:, chosen], axis=2, count=scenarios.targets)
 
 
-def _stacked(problem: PlacementProblem, scenarios: DisturbedViews, share: Float) -> PlacementProblem:
+def _stacked(problem: PlacementProblem, scenarios: Views, share: Float) -> PlacementProblem:
     """Return the problem of all scenarios' targets, those of each weighted by its share; without those of share 0."""
     used = np.flatnonzero(share)
     visible = np.concatenate([scenarios.seen(scenario) for scenario in used], axis=1)
@@ -237,7 +237,7 @@ def _covered(problem: PlacementProblem, chosen: Integer) -> float:
 
 
 def _searched(
-    problem: PlacementProblem, scenarios: DisturbedViews, risk: Risk, solver: str, time_limit: float
+    problem: PlacementProblem, scenarios: Views, risk: Risk, solver: str, time_limit: float
 ) -> Generator[Progress, None, Placement]:
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
     clock = Clock(time_limit)
@@ -277,13 +277,13 @@ class _Game:
     Parameters
     ----------
     problem : PlacementProblem
-    scenarios : DisturbedViews
+    scenarios : Views
     risk : Risk
     whole : Instance
         Of all scenarios: candidates that can matter, with their constraints.
     """
 
-    def __init__(self, problem: PlacementProblem, scenarios: DisturbedViews, risk: Risk, whole: Instance) -> None:
+    def __init__(self, problem: PlacementProblem, scenarios: Views, risk: Risk, whole: Instance) -> None:
         self._scenarios, self._risk, self._whole = scenarios, risk, whole
         self._weight = problem.weights
         self._used = problem.weights > 0

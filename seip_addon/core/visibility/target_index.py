@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..arrays import Float, Integer
@@ -48,21 +50,44 @@ class TargetIndex:
         (k,) int64
             Their indices, ascending.
         """
+        near = np.zeros(len(self._order), dtype=bool)
+        for _, slot in self._near(points):
+            near[slot] = True
+        return np.sort(self._order[near])
+
+    def pairs_within_delta(self, points: Float) -> tuple[Integer, Integer]:
+        """Return each point with each target that is nearer than δ to it.
+
+        Parameters
+        ----------
+        points : (n, 3) float64, metres
+
+        Returns
+        -------
+        point, target : (p,) int64
+            Points ascending.
+        """
+        point, slot = (np.concatenate(part) for part in zip(*self._near(points), strict=True))
+        order = np.argsort(point, kind="stable")
+        return point[order], self._order[slot[order]]
+
+    def _near(self, points: Float) -> Iterator[tuple[Integer, Integer]]:
+        """Pairs of points and of places among the sorted targets, for each row of cells about the points."""
         column, row = self._cells(points)
         inside = (column >= 1) & (column < self._columns - 1) & (row >= 1) & (row < self._rows - 1)
+        which = np.flatnonzero(inside)
         points, column, row = points[inside], column[inside].astype(np.int64), row[inside].astype(np.int64)
-        near = np.zeros(len(self._order), dtype=bool)
         for neighbour in (-1, 0, 1):
             left = (row + neighbour) * self._columns + column - 1
             begin, end = self._start[left], self._start[left + 3]
             some = np.flatnonzero(end > begin)
             begin, count = begin[some], (end - begin)[some]
-            point = points[np.repeat(some, count)]
+            point = np.repeat(some, count)
             slot = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
-            gap = point - self._xyz[slot]
+            gap = points[point] - self._xyz[slot]
             squared = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2
-            near[slot[squared < self._delta**2]] = True
-        return np.sort(self._order[near])
+            near = squared < self._delta**2
+            yield which[point[near]], slot[near]
 
     def _cells(self, points: Float) -> tuple[Float, Float]:
         column, row = np.floor((points[:, :2] - self._low) / self._side).T

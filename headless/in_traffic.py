@@ -1,0 +1,181 @@
+"""Place sensors for the road in traffic, where vehicles stand in the way, and say what the empty road leaves out.
+
+python -m headless.in_traffic scenes/junction.blend --sensor type1 --count 2 -o out/in_traffic
+blender -b --python-exit-code 1 site.blend -P headless/in_traffic.py -- --traffic run-*.npz --sensor type1 -o out/
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import session, survey
+from headless.goal_options import add_goal_options, goal_of
+from headless.traffic_runs import load_runs, runs_beside
+
+import bpy
+
+from seip_addon.core.deployment import deploy
+from seip_addon.core.errors import SeipError
+from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
+from seip_addon.core.pictures.stability_traffic_charts import save_promise_chart, save_time_map
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.stability.disturbed_views import Surroundings
+from seip_addon.core.stability.traffic_instants import check_runs, spread_instants
+from seip_addon.core.stability.traffic_presence import road_user_seconds
+from seip_addon.core.stability.traffic_study import (
+    WHAT,
+    InTraffic,
+    TrafficStudy,
+    look_at_traffic,
+    traffic_study,
+    traffic_warnings,
+)
+from seip_addon.core.survey import Circumstances, record_of
+from seip_addon.core.traffic import Trajectories
+from seip_addon.scene.result_folder import write_result_folder
+
+CHARTS = ("time_seen.png", "traffic.png")
+
+JUDGES = 1 / 3
+"""Share of the runs, the last ones, that placements are judged in and not chosen on."""
+
+
+def main(argv: list[str]) -> None:
+    """Place sensors for the road in traffic and write the result to a folder."""
+    options = _parser().parse_args(argv)
+    goal = goal_of(options)
+    for number in (options.instants, options.judged_at):
+        if number < 1:
+            raise SeipError(f"ask for one instant of traffic or more, not {number}")
+    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
+    study = _studied(surveyed, goal, options)
+    layout = surveyed.layout
+    plan = _plan(surveyed, goal, study, options)
+    record = record_of(
+        layout,
+        surveyed.grid,
+        plan,
+        Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string)),
+        render=not options.no_render,
+    )
+    session.say(_in_words(study, plan))
+    with session.writing(options.output):
+        name = layout.site.name
+        title = f"{name}: for how long the placement sees what, {study.road_users:.0f} road users at a time"
+        save_time_map(options.output / CHARTS[0], layout.geometry, layout.site, plan.deployment, study.traffic, title)
+        sensors = f"{len(plan.deployment.sensors)} sensors"
+        save_promise_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
+        write_result_folder(
+            options.output,
+            bpy.context.scene,
+            layout.geometry,
+            layout.site,
+            plan,
+            record,
+            visible=surveyed.grid.visible,
+            models=layout.models,
+            render=not options.no_render,
+        )
+    session.say(f"written to {options.output}/")
+
+
+def _studied(surveyed: survey.Survey, goal: Goal, options: argparse.Namespace) -> TrafficStudy:
+    layout, watch = surveyed.layout, surveyed.stopwatch
+    settings = layout.settings
+    to_choose_on, to_judge_in = _runs(surveyed, options)
+    problem = placement_problem(layout.site, surveyed.grid.visible, layout.models, goal)
+    if options.weights_from_traffic:
+        seconds = watch.run("road users", road_user_seconds(layout.site.targets, to_choose_on))
+        problem = replace(problem, weights=problem.weights * seconds)
+    around = Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
+    instants = spread_instants(to_choose_on, options.instants, options.seed)
+    scenarios = watch.run("looks at traffic", look_at_traffic(around, problem, instants, options.see))
+    judged = spread_instants(to_judge_in, options.judged_at, options.seed + 1)
+    steps = traffic_study(around, problem, scenarios, judged, solver=settings.solver, time_limit=settings.time_limit)
+    return watch.run("placement in traffic", steps)
+
+
+def _runs(surveyed: survey.Survey, options: argparse.Namespace) -> tuple[list[Trajectories], list[Trajectories]]:
+    """Read the runs: those to choose on, and those to judge in."""
+    paths = options.traffic or runs_beside(options.scene)
+    if len(paths) < 2:
+        raise SeipError(
+            f"{len(paths)} runs of traffic are too few: name two or more with --traffic, made by headless/traffic.py "
+            "with a seed each; the last third of them judges what is chosen on the others"
+        )
+    runs = load_runs(paths, surveyed.layout.geometry.origin)
+    check_runs(runs, surveyed.layout.site.region)
+    judges = max(1, round(JUDGES * len(runs)))
+    return runs[:-judges], runs[-judges:]
+
+
+def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: argparse.Namespace) -> Plan:
+    """Return the placement as a plan, noted what it was chosen for."""
+    layout, placement = surveyed.layout, study.traffic.placement
+    note = (
+        f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "
+        "bound and gap are of that"
+    )
+    weighed = ("targets weigh as many seconds as road users are there",) if options.weights_from_traffic else ()
+    noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
+    return Plan(goal, noted, None, deploy(layout.site, layout.models, surveyed.grid.visible, placement.chosen))
+
+
+def _in_words(study: TrafficStudy, plan: Plan) -> str:
+    sensors = [
+        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m, {sensor.position_name}"
+        for sensor in plan.deployment.sensors
+    ]
+    seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
+    won = f"placing on traffic sees {study.won(study.layer).in_words()} more of the {WHAT[study.layer]}"
+    doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)
+    return "\n".join([*sensors, *seen, won, plan.certificate, *doubt, *plan.placement.notes])
+
+
+def _share(placed: InTraffic) -> str:
+    return "; ".join(
+        f"{seen.held.in_words()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
+        for layer, seen in placed.seen.items()
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="in_traffic",
+        description="Place roadside LiDARs for the road in traffic.",
+        formatter_class=survey.HelpWithDefaults,
+    )
+    survey.add_options(parser)
+    add_goal_options(parser)
+    traffic = parser.add_argument_group("traffic")
+    traffic.add_argument(
+        "--traffic",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="NPZ",
+        help="runs of traffic: the last third judges what is chosen on the others (those in the folder SCENE_traffic "
+        "beside the scene)",
+    )
+    traffic.add_argument(
+        "--see", choices=tuple(WHAT), default="road", help="what is to be seen: the road, or points at vehicles' height"
+    )
+    traffic.add_argument(
+        "--weights-from-traffic", action="store_true", help="weigh targets by the time that road users are there"
+    )
+    traffic.add_argument("--instants", type=int, default=24, help="of traffic to choose on")
+    traffic.add_argument("--judged-at", type=int, default=120, metavar="INSTANTS", help="of traffic to judge by")
+    traffic.add_argument("--seed", type=int, default=0, help="of the instants; those to judge by have the next")
+    parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
+    return parser
+
+
+if __name__ == "__main__":
+    session.run(main)

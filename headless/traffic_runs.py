@@ -1,0 +1,22 @@
+"""Runs of traffic that commands read: files of trajectories, in the axes of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.traffic import Trajectories
+
+
+def runs_beside(scene: Path | None) -> list[Path]:
+    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``."""
+    path = Path(bpy.data.filepath) if scene is None else scene
+    return sorted((path.parent / f"{path.stem}_traffic").glob("*.npz"))
+
+
+def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
+    """Read runs, in the local axes of an origin."""
+    return [Trajectories.load(path).moved_to(origin) for path in paths]

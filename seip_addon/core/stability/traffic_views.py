@@ -1,0 +1,278 @@
+r"""What poses see while vehicles stand in the way, at instants of traffic.
+
+Two things are asked for, of all rays of a sensor's scan, each of which ends at the
+distance d on the first of the scene's triangles or of the bodies of road users:
+
+- ``road``: a return nearer than δ to the target, as on the empty road. A return from
+  a vehicle that stands on a target, or beside it, sees that place as one from the road does.
+- ``height``: a beam that comes nearer than δ to the point `HEIGHT` metres above the
+  target before it ends. On the empty road nothing is there to return it; whatever
+  were there would. A vehicle adds nothing to this: where more stand less is seen.
+
+The empty road is cast against once for a pose. At an instant only those rays are
+cast that pass through the bounding box of a road user, at the bodies alone, and a
+target's answer is looked at again only where one of its own rays was stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
+from ..lidar import BeamPattern
+from ..progress import Progress
+from ..scans.beam_windows import BeamWindows
+from ..scans.sensor import level_orientation
+from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
+from ..visibility.scanning import Place
+from ..visibility.target_index import TargetIndex
+from .disturbed_views import Surroundings
+from .traffic_instants import Standing
+from .views import Views
+
+Layer = Literal["road", "height"]
+
+HEIGHT = 1.5
+"""Metres above its target at which a car has its roof, and a van or a truck its side."""
+
+_RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
+_POINTS_AT_ONCE = 128  # bounds that of the rays past points
+_OUTSIDE = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out
+_CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).reshape(3, 8).T
+
+
+def traffic_views(
+    around: Surroundings, poses: Integer, instants: Sequence[Standing], layer: Layer = "road"
+) -> Generator[Progress, None, Views]:
+    """Look from poses at instants of traffic.
+
+    Parameters
+    ----------
+    around : Surroundings
+    poses : (s,) int64
+        Among the site's candidates.
+    instants : sequence of Standing
+        Who stands in the way at each of n instants.
+    layer : {"road", "height"}
+        What is to be seen.
+
+    Yields
+    ------
+    Progress
+        After each pose.
+
+    Returns
+    -------
+    Views
+        Of layer ``road``, the same as a full scan's with all triangles in one ray caster.
+    """
+    site, candidates = around.site, around.site.candidates
+    engine = engine_name(around.engine)
+    caster = make_ray_caster(site.triangles, engine)
+    crowds = [_crowd(around, one, caster) for one in instants]
+    delta, least = around.sight.delta, around.sight.min_intensity
+    wanted = site.targets.xyz + np.array([0.0, 0.0, HEIGHT if layer == "height" else 0.0])
+    index = TargetIndex(wanted, delta)
+    packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
+
+    def look(number: int) -> None:
+        pose = int(poses[number])
+        model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
+        place = Place(caster, xyz, float(yaw), [model], delta, least)
+        static = _StaticScan(place, wanted)
+        looker: _Looker = _Above(static, wanted) if layer == "height" else _Road(static, index, len(wanted))
+        for instant, crowd in enumerate(crowds):
+            packed[instant, number] = np.packbits(looker.seen(static.stopped_by(crowd)))
+
+    pool = ThreadPoolExecutor(caster.threads)
+    try:
+        for done, _ in enumerate(pool.map(look, range(len(poses)))):
+            yield Progress(done, len(poses), "looking between vehicles")
+    finally:
+        pool.shutdown(cancel_futures=True)
+    yield Progress(len(poses), len(poses), "looking between vehicles")
+    return Views(packed, len(wanted))
+
+
+@dataclass(frozen=True, eq=False)
+class _Crowd:
+    """The road users of an instant, ready to be cast against."""
+
+    caster: RayCaster
+    hulls: Float
+
+
+def _crowd(around: Surroundings, standing: Standing, static: RayCaster) -> _Crowd:
+    """Make a caster of bodies that rounds as one of the scene and the bodies together would."""
+    everything = np.concatenate([static.triangles, standing.triangles])
+    bodies = np.arange(len(everything)) >= len(static.triangles)
+    return _Crowd(make_ray_caster(everything, engine_name(around.engine), bodies), standing.hulls)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stopped:
+    """Rays that end on a road user, ascending; k of them.
+
+    Parameters
+    ----------
+    ray : (k,) int64
+    distance : (k,) float64, metres
+    points : (m, 3) float64, metres
+        Where those end that return.
+    """
+
+    ray: Integer
+    distance: Float
+    points: Float
+
+
+class _StaticScan:
+    """Where the rays of one pose end on the empty road, as far as they pass the box about all that is to be seen.
+
+    Parameters
+    ----------
+    place : Place
+        Of one sensor.
+    wanted : (t, 3) float64, metres
+    """
+
+    def __init__(self, place: Place, wanted: Float) -> None:
+        self.place, (self.model,) = place, place.models
+        self._windows = BeamWindows(self.model)
+        self._pattern = BeamPattern(self.model, place.yaw)
+        self._orientation = level_orientation(place.yaw)
+        low, high = wanted.min(axis=0) - place.delta, wanted.max(axis=0) + place.delta
+        self._matters = np.zeros(self.rays, dtype=bool)
+        self._matters[self.through(np.where(_CORNERS > 0, high, low)[None])[1]] = True
+        self.distance = np.full(self.rays, np.inf)
+        self.counts = np.zeros(self.rays, dtype=bool)
+        for ray in self._in_parts(np.flatnonzero(self._matters)):
+            directions = self.directions(ray)
+            self.distance[ray], triangle = place.caster.cast(place.origin, directions, self.model.max_range)
+            self.counts[ray] = place.counting(self.model, directions, self.distance[ray], triangle)
+
+    @property
+    def rays(self) -> int:
+        """Number of all rays."""
+        return self.model.channels * self.model.azimuth_count
+
+    def through(self, hulls: Float) -> tuple[Integer, Integer]:
+        """Pair hulls with rays that may pass through them; see `BeamWindows.rays_towards`."""
+        return self._windows.rays_towards((hulls - self.place.origin) @ self._orientation)
+
+    def nearest_to(self, points: Float) -> Integer:
+        """Return a ray next to the direction of each point, (n,) int64."""
+        x, y, z = ((points - self.place.origin) @ self._orientation).T
+        order = np.argsort(self.model.elevations, kind="stable")
+        between = (self.model.elevations[order][1:] + self.model.elevations[order][:-1]) / 2
+        channel = order[np.searchsorted(between, np.arctan2(z, np.hypot(x, y)))]
+        steps = self.model.azimuth_count
+        step = np.rint((np.arctan2(y, x) - self.model.azimuth_offsets[channel]) / (2 * np.pi) * steps).astype(np.int64)
+        nearest: Integer = channel * steps + step % steps
+        return nearest
+
+    def directions(self, ray: Integer) -> Float:
+        """Return the directions of rays, (n, 3)."""
+        return self._pattern.directions(ray)
+
+    def returns(self) -> tuple[Integer, Float]:
+        """Return the rays that return on the empty road, ascending, and from where."""
+        ray = np.flatnonzero(self.counts)
+        return ray, self._ends(ray, self.distance[ray])
+
+    def stopped_by(self, crowd: _Crowd) -> _Stopped:
+        """Cast at road users with the rays that pass their boxes, and keep what they stop before its end."""
+        towards = np.zeros(self.rays, dtype=bool)
+        towards[self.through(crowd.hulls)[1]] = True
+        ray = np.flatnonzero(towards & self._matters)
+        directions = self.directions(ray)
+        distance, triangle = crowd.caster.cast(self.place.origin, directions, self.model.max_range)
+        sooner = distance < self.distance[ray]
+        ray, distance = ray[sooner], distance[sooner]
+        bodies = replace(self.place, caster=crowd.caster)
+        returning = bodies.counting(self.model, directions[sooner], distance, triangle[sooner])
+        return _Stopped(ray, distance, self._ends(ray[returning], distance[returning]))
+
+    def _ends(self, ray: Integer, distance: Float) -> Float:
+        ends: Float = self.place.origin + distance[:, None] * self.directions(ray)
+        return ends
+
+    @staticmethod
+    def _in_parts(ray: Integer) -> list[Integer]:
+        return np.array_split(ray, max(1, -(-len(ray) // _RAYS_AT_ONCE)))
+
+
+class _Looker(Protocol):
+    def seen(self, stopped: _Stopped) -> Boolean:
+        """Return what is seen while road users stop some rays, (t,) bool."""
+
+
+class _Road:
+    """Returns near targets; each is counted, so that those of stopped rays can be taken off."""
+
+    def __init__(self, static: _StaticScan, index: TargetIndex, targets: int) -> None:
+        self._index, self._targets = index, targets
+        returning, points = static.returns()
+        near = [index.pairs_within_delta(part) for part in np.array_split(points, max(1, len(points) // _RAYS_AT_ONCE))]
+        self._target = np.concatenate([target for _, target in near]).astype(np.int32)
+        begins = np.cumsum([0, *(len(part) for part in np.array_split(points, len(near)))])
+        of = np.concatenate([first + point for first, (point, _) in zip(begins[:-1], near, strict=True)])
+        many = np.zeros(static.rays, dtype=np.int64)
+        many[returning] = np.bincount(of, minlength=len(returning))
+        self._first = np.concatenate([[0], np.cumsum(many)])
+        self._times = np.bincount(self._target, minlength=targets)
+
+    def seen(self, stopped: _Stopped) -> Boolean:
+        begin = self._first[stopped.ray]
+        count = self._first[stopped.ray + 1] - begin
+        lost = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+        seen: Boolean = self._times > np.bincount(self._target[lost], minlength=self._targets)
+        seen[self._index.within_delta(stopped.points)] = True
+        return seen
+
+
+class _Above:
+    """Beams past points; for each point one that passes it on the empty road is known."""
+
+    def __init__(self, static: _StaticScan, points: Float) -> None:
+        self._static, self._points = static, points
+        self._end = np.minimum(static.distance, static.model.max_range)
+        self._witness = static.nearest_to(points)
+        self._seen = self._pass(self._witness, np.arange(len(points)))
+        for point, ray in self._passing(np.flatnonzero(~self._seen)):
+            self._seen[point], self._witness[point] = True, ray
+
+    def seen(self, stopped: _Stopped) -> Boolean:
+        usual = self._end[stopped.ray]
+        self._end[stopped.ray] = stopped.distance
+        seen = self._seen.copy()
+        doubtful = np.flatnonzero(seen & np.isin(self._witness, stopped.ray))
+        doubtful = doubtful[~self._pass(self._witness[doubtful], doubtful)]
+        seen[doubtful] = False
+        for point, _ in self._passing(doubtful):
+            seen[point] = True
+        self._end[stopped.ray] = usual
+        return seen
+
+    def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
+        """Try all rays past points, and return some points at a time with the rays that pass them."""
+        reach = self._static.place.delta * (1 + _OUTSIDE)
+        for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
+            hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
+            passing = self._pass(ray, part[hull])
+            yield part[hull[passing]], ray[passing]
+
+    def _pass(self, ray: Integer, point: Integer) -> Boolean:
+        """Tell which rays come nearer than δ to points within the sensor's range and before they end, (n,)."""
+        static, end = self._static, self._end[ray]
+        towards = self._points[point] - static.place.origin
+        ahead = (towards * static.directions(ray)).sum(axis=1)
+        along = np.clip(ahead, static.model.min_range, end)
+        squared = (towards**2).sum(axis=1) - 2 * along * ahead + along**2
+        passes: Boolean = (squared < static.place.delta**2) & (end >= static.model.min_range)
+        return passes

@@ -1,0 +1,209 @@
+"""What is seen between vehicles: against casting every ray at every triangle, and where the answer is plain."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from engines import ANY, each_engine, needs_any
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from synthetic_junction import junction_site, make_candidates
+from traffic_by_hand import make_model, make_trajectories, parked
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import BeamPattern
+from seip_addon.core.progress import finish
+from seip_addon.core.stability.disturbed_views import Surroundings
+from seip_addon.core.stability.traffic_instants import (
+    NOBODY,
+    STRETCH,
+    WARM_UP,
+    check_runs,
+    spread_instants,
+    standing,
+)
+from seip_addon.core.stability.traffic_views import HEIGHT, traffic_views
+from seip_addon.core.traffic import RoadUser
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.visibility.scanning import Place, seen_by_all_rays
+
+pytestmark = needs_any
+
+DELTA = 1.5
+SIZES = {
+    "car": (4.5, 1.8, 1.5),
+    "truck": (9.0, 2.5, 3.6),
+    "bus": (12.0, 2.5, 3.1),
+    "bicycle": (1.8, 0.6, 1.7),
+    "pedestrian": (0.5, 0.6, 1.75),
+}
+MODELS = {
+    "coarse": make_model(key="coarse"),
+    "near-blind": make_model(
+        key="near-blind", min_range=6.0, max_range=45.0, azimuth_offsets=np.linspace(-0.1, 0.1, 7)
+    ),
+}
+XYZ = np.array([[9.0, 9.0, 5.0], [-9.0, 12.0, 3.5], [0.0, -30.0, 6.0]])
+SITE = replace(
+    junction_site(spacing=2.0),
+    candidates=make_candidates(
+        np.repeat(XYZ, 2, axis=0),
+        ["coarse", "near-blind"] * 3,
+        np.repeat(XYZ[:, 2], 2),
+        np.array([0.0, 0.7, 2.0, -2.0, 3.0, -0.4]),
+    ),
+)
+POSES = np.arange(6)
+AROUND = Surroundings(SITE, MODELS, VisibilitySettings(delta=DELTA), engine=ANY)
+
+
+def crowd(poses, categories):
+    """The bodies of road users at (x, y, yaw)."""
+    users = [RoadUser(f"{n}", category, *SIZES[category]) for n, category in enumerate(categories)]
+    ways = [[(0.0, x, y, 0.0, yaw, 0.0), (10.0, x, y, 0.0, yaw, 0.0)] for x, y, yaw in poses]
+    runs = make_trajectories(*ways, users=users)
+    return standing(runs, runs.at(1.0))
+
+
+crowds = st.lists(
+    st.tuples(st.floats(-35, 35), st.floats(-7, 7), st.floats(-4, 4), st.booleans(), st.sampled_from(sorted(SIZES))),
+    max_size=10,
+).map(
+    lambda drawn: crowd(
+        [(y, x, yaw) if turned else (x, y, yaw) for x, y, yaw, turned, _ in drawn], [category for *_, category in drawn]
+    )
+)
+
+
+def views(instants, layer="road", around=AROUND):
+    seen = finish(traffic_views(around, POSES, instants, layer))
+    return np.array([seen.seen(instant) for instant in range(len(instants))])
+
+
+def place_of(pose, caster, settings=AROUND.sight):
+    poses = SITE.candidates
+    model = MODELS[str(poses.sensor[pose])]
+    return Place(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], settings.delta, settings.min_intensity)
+
+
+def by_full_scan(bodies, engine=ANY, settings=AROUND.sight):
+    """Every ray at everything in one ray caster."""
+    caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), engine)
+    return np.concatenate([seen_by_all_rays(place_of(pose, caster, settings), SITE.targets.xyz)[0] for pose in POSES])
+
+
+def beams_past(bodies, pose):
+    """Every beam, from the least range to its end, against every point above a target: its distance to each."""
+    caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), ANY)
+    place = place_of(pose, caster)
+    (model,) = place.models
+    directions = BeamPattern(model, place.yaw).directions(np.arange(model.channels * model.azimuth_count))
+    end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
+    points = SITE.targets.xyz + np.array([0.0, 0.0, HEIGHT])
+    passed = np.zeros(len(points), dtype=bool)
+    for number, point in enumerate(points):
+        ahead = directions @ (point - place.origin)
+        squared = ((point - place.origin) ** 2).sum() - ahead**2  # of the whole line
+        reach = np.sqrt(np.maximum(DELTA**2 - squared, 0.0))
+        passed[number] = ((squared < DELTA**2) & (ahead - reach < end) & (ahead + reach > model.min_range)).any()
+    return passed
+
+
+@each_engine
+@hypothesis_settings(max_examples=15)
+@given(bodies=crowds)
+def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
+    around = replace(AROUND, engine=engine)
+    assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine)).all()
+
+
+@hypothesis_settings(max_examples=5)
+@given(bodies=crowds)
+def test_only_returns_that_are_strong_enough_count(bodies):
+    sight = VisibilitySettings(delta=DELTA, min_intensity=0.3)
+    assert (views([bodies], around=replace(AROUND, sight=sight))[0] == by_full_scan(bodies, settings=sight)).all()
+
+
+@hypothesis_settings(max_examples=5)
+@given(bodies=crowds)
+def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
+    found = views([bodies], "height")[0]
+    for pose in POSES:
+        assert (found[pose] == beams_past(bodies, pose)).all()
+
+
+def test_the_empty_road_is_the_visibility_grid():
+    grid = finish(compute_visibility(SITE, MODELS, AROUND.sight, ANY))
+    assert (views([NOBODY])[0] == grid.visible).all()
+
+
+@hypothesis_settings(max_examples=10)
+@given(bodies=crowds, more=crowds)
+def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
+    both = replace(
+        bodies,
+        triangles=np.concatenate([bodies.triangles, more.triangles]),
+        hulls=np.concatenate([bodies.hulls, more.hulls]),
+    )
+    nobody, some, all_of_them = views([NOBODY, bodies, both], "height")
+    assert (all_of_them <= some).all()
+    assert (some <= nobody).all()
+
+
+@pytest.mark.parametrize("layer", ["road", "height"])
+def test_neither_order_nor_company_of_instants_matters(layer):
+    instants = [
+        crowd([(12.0, 2.0, 0.0)], ["bus"]),
+        NOBODY,
+        crowd([(2.0, 14.0, 1.5), (-20.0, 0.0, 0.2)], ["truck", "car"]),
+        crowd([(0.0, 0.0, 0.8)], ["truck"]),
+    ]
+    expected = views(instants, layer)
+    assert (views(instants, layer) == expected).all()
+    for order in itertools.islice(itertools.permutations(range(4)), 5, 24, 9):
+        assert (views([instants[number] for number in order], layer) == expected[list(order)]).all()
+    assert (views([instants[2]], layer)[0] == expected[2]).all()
+
+
+def test_a_truck_hides_the_lane_behind_it_and_shows_where_it_stands():
+    pose = 0  # at (9, 9, 5)
+    truck = crowd([(-4.0, 4.0, 0.0)], ["truck"])
+    nobody, before = views([NOBODY, truck], "height")[:, pose]
+    x, y = SITE.targets.xyz[:, 0], SITE.targets.xyz[:, 1]
+    behind = (np.abs(x + 9.0) <= 2.0) & (np.abs(y - 2.0) <= 2.0)
+    assert (nobody & ~before)[behind].any()
+    away = x > 12.0
+    assert (nobody == before)[away].all()
+    road = views([NOBODY, truck])[:, pose]
+    under = (np.abs(x + 4.0) < 4.5) & (np.abs(y - 4.0) < 1.25 + DELTA)
+    assert (road[1] & ~road[0])[under].any()
+    assert not (road[1] & ~road[0])[~(np.hypot(x + 4.0, y - 4.0) < 5.0 + DELTA)].any()
+
+
+def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
+    runs = [parked((0.0, 0.0, 0.0, 0.0, 0.0)), parked((1.0, 0.0, 0.0, 0.0, 0.0), (3.0, 0.0, 0.0, 0.0, 0.0))]
+    one, same, other = (spread_instants(runs, 32, seed) for seed in (3, 3, 4))
+    assert one.time.tobytes() == same.time.tobytes()
+    assert one.time.tobytes() != other.time.tobytes()
+    assert np.bincount(one.run).tolist() == [16, 16]
+    for run in (0, 1):
+        part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
+        assert part.tolist() == list(range(16))
+    assert len(np.unique(one.stretch)) == 2 * max(1, round((10.0 - WARM_UP) / STRETCH))
+    assert [len(crowd.hulls) for crowd in one.standing()] == [1] * 16 + [2] * 16
+
+
+def test_traffic_that_is_of_no_use_is_refused():
+    here = parked((0.0, 0.0, 0.0, 0.0, 0.0))
+    check_runs([here], SITE.region)
+    with pytest.raises(SeipError, match="traffic of another place"):
+        check_runs([here, parked((5000.0, 0.0, 0.0, 0.0, 0.0))], SITE.region)
+    with pytest.raises(SeipError, match="simulate more traffic"):
+        spread_instants([here, make_trajectories([(0.0, 0, 0, 0, 0, 0), (1.5, 1, 0, 0, 0, 0)])], 4, 0)
+    with pytest.raises(SeipError, match="ask for one instant"):
+        spread_instants([here], 0, 0)

@@ -1,0 +1,60 @@
+"""The command that places in traffic, from a scene and its runs to the folder of its result."""
+
+import json
+from pathlib import Path
+
+from headless import in_traffic
+
+import numpy as np
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.traffic import RoadUser, Trajectories
+from seip_addon.scene.result_folder import FILES
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
+COARSE = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
+
+
+def run(folder, *options):
+    in_traffic.main([str(SCENE), "-o", str(folder), *COARSE, "--instants", "4", "--judged-at", "24", *options])
+
+
+def trajectories(path, *, x=0.0, end=30.0):
+    """Write a run of one car that stands somewhere."""
+    Trajectories(
+        users=(RoadUser("car", "car", 4.5, 1.8, 1.5),),
+        origin=np.zeros(3),
+        first=np.array([0, 2]),
+        time=np.array([0.0, end]),
+        position=np.array([[x, 0.0, 0.0]] * 2),
+        yaw=np.zeros(2),
+        pitch=np.zeros(2),
+        speed=np.zeros(2),
+    ).save(path)
+    return str(path)
+
+
+@pytest.mark.parametrize("options", [[], ["--see", "height", "--weights-from-traffic"]])
+def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, options):
+    run(tmp_path, "--count", "2", *options)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {*FILES, *in_traffic.CHARTS, "visibility.npz"} - {"view.png"} <= names
+    notes = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))["notes"]
+    assert "in traffic, on average over 4 instants" in notes[0]
+    assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
+    said = capsys.readouterr().out
+    assert "chosen for the empty road: " in said
+    assert "placing on traffic sees" in said
+
+
+def test_traffic_that_is_of_no_use_is_refused(tmp_path):
+    here = trajectories(tmp_path / "here.npz")
+    with pytest.raises(SeipError, match="1 runs of traffic are too few"):
+        run(tmp_path / "out", "--traffic", here)
+    with pytest.raises(SeipError, match="traffic of another place"):
+        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "there.npz", x=9000.0))
+    with pytest.raises(SeipError, match="simulate more traffic"):
+        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", end=1.0))
+    with pytest.raises(SeipError, match="ask for one instant"):
+        run(tmp_path / "out", "--instants", "0")
