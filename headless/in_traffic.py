@@ -17,7 +17,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.goal_options import add_goal_options, goal_of
-from headless.traffic_runs import load_runs, runs_beside
+from headless.traffic_runs import load_runs, parted, runs_beside
 
 import bpy
 
@@ -26,7 +26,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
 from seip_addon.core.pictures.stability_traffic_charts import save_promise_chart, save_time_map
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.stability.disturbed_views import Surroundings
 from seip_addon.core.stability.traffic_instants import check_runs, spread_instants
 from seip_addon.core.stability.traffic_presence import road_user_seconds
 from seip_addon.core.stability.traffic_study import (
@@ -37,14 +36,11 @@ from seip_addon.core.stability.traffic_study import (
     traffic_study,
     traffic_warnings,
 )
-from seip_addon.core.survey import Circumstances, record_of
+from seip_addon.core.survey import Circumstances, record_of, surroundings
 from seip_addon.core.traffic import Trajectories
 from seip_addon.scene.result_folder import write_result_folder
 
 CHARTS = ("time_seen.png", "traffic.png")
-
-JUDGES = 1 / 3
-"""Share of the runs, the last ones, that placements are judged in and not chosen on."""
 
 
 def main(argv: list[str]) -> None:
@@ -94,7 +90,7 @@ def _studied(surveyed: survey.Survey, goal: Goal, options: argparse.Namespace) -
     if options.weights_from_traffic:
         seconds = watch.run("road users", road_user_seconds(layout.site.targets, to_choose_on))
         problem = replace(problem, weights=problem.weights * seconds)
-    around = Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
+    around = surroundings(layout)
     instants = spread_instants(to_choose_on, options.instants, options.seed)
     scenarios = watch.run("looks at traffic", look_at_traffic(around, problem, instants, options.see))
     judged = spread_instants(to_judge_in, options.judged_at, options.seed + 1)
@@ -112,8 +108,7 @@ def _runs(surveyed: survey.Survey, options: argparse.Namespace) -> tuple[list[Tr
         )
     runs = load_runs(paths, surveyed.layout.geometry.origin)
     check_runs(runs, surveyed.layout.site.region)
-    judges = max(1, round(JUDGES * len(runs)))
-    return runs[:-judges], runs[-judges:]
+    return parted(runs)
 
 
 def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: argparse.Namespace) -> Plan:

@@ -19,11 +19,13 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.traffic_runs import load_runs, parted, runs_beside
 
 from seip_addon.core.deployment import deploy
 from seip_addon.core.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
 from seip_addon.core.pictures import stability_limits_charts as limits_charts
 from seip_addon.core.pictures import stability_robust_charts as robust_charts
+from seip_addon.core.pictures import stability_traffic_charts as traffic_charts
 from seip_addon.core.placement import PlacementProblem, solve
 from seip_addon.core.placement.near_best import FlatTop, near_best
 from seip_addon.core.progress import Progress
@@ -35,8 +37,11 @@ from seip_addon.core.stability.pose_study import StudySettings, pose_rows, pose_
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_study import RobustSettings, robust_rows, robust_study
 from seip_addon.core.stability.solver_limits import solver_rows, solver_study
+from seip_addon.core.stability.traffic_instants import spread_instants
+from seip_addon.core.stability.traffic_study import look_at_traffic, traffic_rows, traffic_study
 from seip_addon.core.storage import digest
 from seip_addon.core.survey import grid_key, surroundings
+from seip_addon.core.traffic import Trajectories
 
 FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
@@ -58,6 +63,8 @@ class Scope:
         Random placement problems of each kind.
     poses : StudySettings
     robust : RobustSettings
+    instants : tuple of int
+        Of traffic, to choose on and to judge by.
     """
 
     grids: int = 40
@@ -65,6 +72,7 @@ class Scope:
     instances: int = 60
     poses: StudySettings = field(default_factory=StudySettings)
     robust: RobustSettings = field(default_factory=RobustSettings)
+    instants: tuple[int, int] = (24, 120)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +82,15 @@ class Stage:
     Parameters
     ----------
     surveyed : Survey
+    runs : list of Trajectories
+        Traffic; none where there is none beside the scene.
     charts : path
         Folder of the charts.
     scope : Scope
     """
 
     surveyed: survey.Survey
+    runs: list[Trajectories]
     charts: Path
     scope: Scope
 
@@ -107,8 +118,15 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         argparse.Namespace(**vars(options) | {"output": options.work}),
         lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
     )
-    stage = Stage(surveyed, charts, scope or Scope())
-    made_from = digest(grid_key(surveyed.layout), repr(surveyed.layout.settings), repr(stage.scope), versions()["seip"])
+    runs = load_runs(runs_beside(options.scene), surveyed.layout.geometry.origin)
+    stage = Stage(surveyed, runs, charts, scope or Scope())
+    made_from = digest(
+        grid_key(surveyed.layout),
+        repr(surveyed.layout.settings),
+        repr(stage.scope),
+        *(run.position for run in runs),
+        versions()["seip"],
+    )
     chapters = []
     for name, work in _chapters(stage):
         kept = load_chapter(options.work / f"{name}.json", made_from)
@@ -129,6 +147,8 @@ def _chapters(stage: Stage) -> Iterator[tuple[str, Work]]:
     for sensor in stage.surveyed.layout.models:
         yield f"poses-{sensor}", partial(poses, sensor=sensor)
         yield f"failures-{sensor}", partial(failures, sensor=sensor)
+        if len(stage.runs) > 1:
+            yield f"traffic-{sensor}", partial(traffic, sensor=sensor)
 
 
 def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
@@ -219,6 +239,38 @@ def failures(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
     robust_charts.save_spread_chart(stage.charts / name, study, f"{stage.name}: {DEFAULT_COUNT} × {sensor}, failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
     return Chapter(f"Failures: {DEFAULT_COUNT} × {sensor}", robust_rows(study), (Chart(name, caption),))
+
+
+def traffic(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
+    """Let vehicles stand in the way of one type's placements."""
+    layout = stage.surveyed.layout
+    around, problem, settings = surroundings(layout), stage.problem(sensor), layout.settings
+    to_choose_on, to_judge_in = parted(stage.runs)
+    choose, judge = stage.scope.instants
+    scenarios = yield from look_at_traffic(around, problem, spread_instants(to_choose_on, choose, seed=0))
+    judged = spread_instants(to_judge_in, judge, seed=1)
+    steps = traffic_study(around, problem, scenarios, judged, solver=settings.solver, time_limit=settings.time_limit)
+    study = yield from steps
+    chosen = study.traffic.placement.chosen
+    deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
+    title, names = f"{stage.name}: {DEFAULT_COUNT} × {sensor}", [f"{what}_{sensor}.png" for what in _TRAFFIC_CHARTS]
+    traffic_charts.save_time_map(
+        stage.charts / names[0], layout.geometry, layout.site, deployment, study.traffic, f"{title}, in traffic"
+    )
+    traffic_charts.save_promise_chart(
+        stage.charts / names[1], [(title, study)], f"{stage.name}: empty road and traffic"
+    )
+    return Chapter(
+        f"Traffic that hides things: {title}",
+        traffic_rows(study),
+        tuple(Chart(name, caption) for name, caption in zip(names, _TRAFFIC_CHARTS.values(), strict=True)),
+    )
+
+
+_TRAFFIC_CHARTS = {
+    "time_seen": "For what share of time the placement chosen on traffic sees each target, and the point above it",
+    "promise": "What placements see on the empty road and, on average over time, in traffic",
+}
 
 
 def _settings(stage: Stage) -> RobustSettings:

@@ -10,6 +10,9 @@ import bpy
 from seip_addon.core.arrays import Float
 from seip_addon.core.traffic import Trajectories
 
+JUDGES = 1 / 3
+"""Share of the runs, the last ones, that placements are judged in and not chosen on."""
+
 
 def runs_beside(scene: Path | None) -> list[Path]:
     """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``."""
@@ -20,3 +23,9 @@ def runs_beside(scene: Path | None) -> list[Path]:
 def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
     """Read runs, in the local axes of an origin."""
     return [Trajectories.load(path).moved_to(origin) for path in paths]
+
+
+def parted(runs: list[Trajectories]) -> tuple[list[Trajectories], list[Trajectories]]:
+    """Return the runs to choose on, and those to judge in."""
+    judges = max(1, round(JUDGES * len(runs)))
+    return runs[:-judges], runs[-judges:]

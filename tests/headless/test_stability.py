@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from unittest.mock import patch
 
 from headless import stability
 
@@ -26,16 +27,23 @@ COARSE = [
     "2",
 ]
 LITTLE = stability.Scope(
-    grids=4,
+    grids=8,
     rays=200,
     instances=2,
     poses=StudySettings(draws=20, draws_of_kind=5),
     robust=RobustSettings(scenarios=3, unseen=20),
+    instants=(2, 12),
 )
 
 
 def run(folder):
-    stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE], LITTLE)
+    criterion = "seip_addon.core.stability.criterion"
+    spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
+    with (
+        patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
+        patch.multiple("seip_addon.core.convergence", COARSE_CANDIDATES=25.0, JUDGED_ON=4.0, **spacings),
+    ):
+        stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE], LITTLE)
     return (folder / "docs" / "stability.md").read_text(encoding="utf-8")
 
 
