@@ -125,17 +125,39 @@ def test_the_order_of_candidates_does_not_matter(case, random):
 
 
 @given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
-def test_the_bounding_function_lies_above_and_is_concave(seen_by, failure, sensors):
-    risk = Risk(seen_by=seen_by, failure=failure)
-    steps, unit = risk.steps(sensors)
-    assert (np.diff(steps) <= 0).all()
-    assert steps[-1] == 0
-    reached = np.concatenate([[0], np.cumsum(steps)]) / unit
-    for times in range(len(reached)):
+def test_no_failure_leaves_a_target_worth_more(seen_by, failure, sensors):
+    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    for times in range(sensors + 1):
         for used in range(max(times, 1), sensors + 1):
             after = 1 - seen_by / used if times == seen_by else float(times > seen_by)
-            worth = float(times >= seen_by) if failure == "none" else after
-            assert reached[times] >= worth - 1e-12
+            left = float(times >= seen_by) if failure == "none" else after
+            assert worth.reached(np.array([times]))[0] / worth.unit >= left - 1e-12
+
+
+@given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
+def test_what_is_to_come_is_bounded_by_the_least_concave_function(seen_by, failure, sensors):
+    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    for times in range(sensors + 1):
+        seen = np.array([times])
+        assert worth.added(seen, 1)[0] == worth.reached(seen + 1)[0] - worth.reached(seen)[0]
+        for left in range(sensors + 2):
+            rises = [worth.added(seen, left, level)[0] for level in range(worth.top)]
+            reached = [worth.reached(seen + more)[0] - worth.reached(seen)[0] for more in range(left + 1)]
+            bounds = np.concatenate([[0], np.cumsum(rises), np.full(left, np.sum(rises))])[: left + 1]
+            assert (np.diff(rises) <= 0).all()
+            assert (bounds >= reached).all()
+            chords = [  # the least one: it touches a chord of the points, or a point, everywhere
+                max(
+                    [reached[m]]
+                    + [
+                        reached[a] + (reached[b] - reached[a]) * (m - a) / (b - a)
+                        for a in range(m)
+                        for b in range(m + 1, left + 1)
+                    ]
+                )
+                for m in range(left + 1)
+            ]
+            assert bounds == pytest.approx(chords)
 
 
 def test_too_few_sensors_are_refused():

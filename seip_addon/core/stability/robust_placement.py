@@ -289,7 +289,7 @@ class _Game:
         self._used = problem.weights > 0
         self._unit, _ = common_unit(problem.weights[self._used])
         self._sensors = allowed_sensors(problem)
-        self._steps, self._parts = risk.steps(self._sensors)
+        self._worth = risk.worth(self._sensors)
 
     def judge(self, chosen: Integer) -> float:
         """Return T of candidates of the whole instance."""
@@ -303,11 +303,11 @@ class _Game:
         columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
         weights = np.concatenate([share[k] * weight for k in scenarios])
         visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
-        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._steps)
+        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._worth)
 
     def unit(self, share: Integer) -> float:
         """Return by what T is to be multiplied to be compared with F."""
-        return float(share.sum()) * self._parts / self._unit
+        return float(share.sum()) * self._worth.unit / self._unit
 
     def play(self, start: Integer, clock: Clock) -> Generator[Progress, None, tuple[Integer, Integer]]:
         """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""

@@ -1,22 +1,34 @@
-r"""Branch and bound for objectives that a submodular function bounds from above.
+r"""Branch and bound for objectives that a sum over targets bounds from above.
 
 The bounding function counts what sees a target: with p in P (`risk`),
 
 .. math::
     F(S) = \sum_k p_k \sum_j w_j\, φ(n_{jk}(S)) \ge T(S),
 
-φ being concave, so that F is monotone and submodular. A set S with
-:math:`T(S) \ge g` has :math:`F(S) \ge g` as well: sets are built in the order in
-which each sensor adds the most to F, as in `placement.branch_and_bound`, branches
-that cannot bring F to the best T so far are cut, and T itself is asked of every
-set that is left. Relaxing what a target's sensors add with multipliers λ bounds F
-by
+φ being what a target is worth by the sensors that see it (`worth`). φ rises, but
+where more than one look is asked for it is not concave: one look of two is worth
+nothing. With S chosen and l sensors still to come, a target seen n times is worth
+φ(n), and what follows adds to it no more than the least concave function
+:math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
 
 .. math::
-    L(λ) = \sum_j \sum_{l \ge 1} \max(0,\, w_j φ_l - λ_j) + \max_{x \in X} \sum_i x_i \sum_j V_{ij} λ_j,
+    F(S \cup R) \le F(S) + \sum_k p_k \sum_j w_j\, φ_{n_{jk}(S),\,l}(n_{jk}(R)),
+    \quad |R| \le l,
 
-:math:`φ_l` being what the l-th sensor adds; for one look this is the relaxation of
-`placement.bounds`.
+which is submodular in R, and tighter in every branch than above it: who has been
+seen once counts in full or not at all, who cannot be seen often enough any more
+counts no longer, and for the last sensor it is exact. A set S with
+:math:`T(S) \ge g` has :math:`F(S) \ge g` as well: sets are built so that a sensor
+is followed by those that add less than it where it was chosen, as in
+`placement.branch_and_bound`, branches that cannot bring F to the best T so far are
+cut, and T itself is asked of every set that is left. Relaxing what a target's
+sensors add with multipliers λ bounds what is added by
+
+.. math::
+    L(λ) = \sum_j \sum_{i \ge 1} \max(0,\, w_j φ_{n,l,i} - λ_j) + \max_{x \in X} \sum_i x_i \sum_j V_{ij} λ_j,
+
+:math:`φ_{n,l,i}` being the i-th rise of :math:`φ_{n,l}`; for one look this is the
+relaxation of `placement.bounds`.
 """
 
 from __future__ import annotations
@@ -34,6 +46,7 @@ from ..placement.clock import Clock
 from ..placement.greedy import addable
 from ..placement.instance import SINGLE, Instance, Numbers
 from ..progress import Progress
+from .worth import Worth
 
 FIRST_STEPS, LATER_STEPS = 300, 60
 PATIENCE, SHRINK, DEFLECTION, SMALLEST_STEP = 15, 0.7, 0.85, 1e-3
@@ -48,28 +61,28 @@ RELAXED, WIDE = 2, 40
 
 @dataclass(frozen=True, eq=False)
 class CountedCover:
-    """F, a concave function of how many chosen candidates see each target.
+    """F, the sum of what targets are worth by how many chosen candidates see them.
 
     Parameters
     ----------
     instance : Instance
         Candidates with their constraints, targets merged; weights are whole numbers.
-    steps : (l + 1,) int64
-        What the first, second, … sensor adds for each unit of weight: falling, whole numbers, the last one 0.
+    worth : Worth
+        For each unit of weight.
     """
 
     instance: Instance
-    steps: Integer
+    worth: Worth
 
     @cached_property
     def matrix(self) -> Numbers:
         """V as numbers, in the smallest precision in which products with what is added are exact."""
-        most = self.instance.total * int(self.steps.sum())
+        most = self.instance.total * self.worth.unit
         return self.instance.visible.astype(np.float32 if most < SINGLE else np.float64)
 
-    def added(self, times: Integer) -> Float:
-        """Return what one more sensor adds at each target that is seen so many times, (t,) float64."""
-        more: Float = self.instance.weight * self.steps[np.minimum(times, len(self.steps) - 1)]
+    def added(self, times: Integer, left: int, level: int = 0) -> Float:
+        """Return what the next sensor adds at most at targets seen so many times, (t,) float64; see `Worth.added`."""
+        more: Float = self.instance.weight * self.worth.added(times, left, level)
         return more
 
     def gains(self, per_target: Float) -> Float:
@@ -84,18 +97,18 @@ class CountedCover:
 
     def value(self, chosen: Integer) -> float:
         """Return F."""
-        reached = np.concatenate([[0], np.cumsum(self.steps)])
-        return float(self.instance.weight @ reached[np.minimum(self.times(chosen), len(self.steps))])
+        return float(self.instance.weight @ self.worth.reached(self.times(chosen)))
 
     def of(self, keep: Integer) -> CountedCover:
         """Return the same with only some candidates."""
-        return CountedCover(self.instance.of(keep), self.steps)
+        return CountedCover(self.instance.of(keep), self.worth)
 
 
 def greedy_cover(cover: CountedCover, chosen: Integer) -> Integer:
-    """Add the candidate that adds most to F until nothing that is allowed adds, ascending."""
+    """Add the candidate that adds most to F, at most and with those to come, until nothing adds, ascending."""
     while True:
-        gain = cover.gains(cover.added(cover.times(chosen)))
+        left = max(cover.instance.count - len(chosen), 0)
+        gain = cover.gains(cover.added(cover.times(chosen), left))
         gain[~addable(cover.instance, chosen)] = 0.0
         best = int(np.argmax(gain))
         if gain[best] <= 0:
@@ -120,7 +133,7 @@ def _best_exchange(cover: CountedCover, chosen: Integer) -> tuple[int, int, floa
         return -1, -1, -math.inf
     times = cover.times(chosen)
     left = [times - cover.instance.visible[candidate] for candidate in chosen]
-    gains = cover.gains(np.stack([cover.added(each) for each in left], axis=1)).T
+    gains = cover.gains(np.stack([cover.added(each, 1) for each in left], axis=1)).T
     values = gains + np.array([[cover.value(chosen[chosen != candidate])] for candidate in chosen])
     for row, candidate in zip(values, chosen, strict=True):
         others = chosen[chosen != candidate]
@@ -154,7 +167,7 @@ class Relaxation:
         return np.flatnonzero(forced >= goal)
 
 
-def relax(
+def relax(  # what is bounded, and how far to go
     cover: CountedCover, times: Integer, goal: float, iterations: int, start: Float | None
 ) -> Generator[Progress, None, tuple[Integer, Relaxation]]:
     """Search for multipliers with a small bound on what can be added to F, by deflected subgradients.
@@ -163,7 +176,7 @@ def relax(
     ----------
     cover : CountedCover
     times : (t,) int64
-        How often each target is seen already.
+        How often each target is seen already; the count of the cover's instance is of those to come.
     goal : float
         What must be added; the search ends when the bound falls below.
     iterations : int
@@ -177,7 +190,7 @@ def relax(
     Relaxation
     """
     keep = np.arange(len(cover.instance))
-    layers = np.stack([cover.added(times + level) for level in range(len(cover.steps) - 1)])
+    layers = np.stack([cover.added(times, cover.instance.count, level) for level in range(cover.worth.top)])
     most = layers[0]
     begin = most / np.maximum(1, cover.instance.visible.sum(axis=0)) ** 0.5 if start is None else start
     current = best = _relaxation(cover, layers, np.minimum(begin, most))
@@ -290,7 +303,7 @@ class RobustSearch:
         cover = self._cover
         nothing = np.zeros(len(cover.instance.weight), dtype=np.int64)
         keep, relaxation = yield from relax(cover, nothing, self._goal(), FIRST_STEPS, None)
-        gains = cover.gains(cover.added(nothing))[keep]
+        gains = cover.gains(cover.added(nothing, cover.instance.count))[keep]
         stack = [_node((), 0.0, relaxation.value, keep, gains, relaxation.targets)]
         nodes = 0
         while stack and clock.left > 0:
@@ -310,12 +323,14 @@ class RobustSearch:
         if left == 0 or children == 0:
             return []
         if left == 1:
-            for candidate in node.followers[:children].tolist():
+            for candidate, gain in zip(node.followers[:children].tolist(), node.gains, strict=False):
+                if node.value + gain < self._goal():
+                    break
                 self._take((*node.chosen, candidate))
             return []
         times = self._cover.times(np.array(node.chosen, dtype=np.int64))
         if len(node.chosen) > 0 and left >= RELAXED and children >= WIDE:
-            rest = CountedCover(self._rest(node, left), self._cover.steps)
+            rest = CountedCover(self._rest(node, left), self._cover.worth)
             goal = self._goal() - node.value
             kept, relaxation = yield from relax(rest, times, goal, LATER_STEPS, node.multipliers)
             bound = min(node.bound, node.value + relaxation.value)
@@ -334,12 +349,12 @@ class RobustSearch:
         cover, followers = self._cover, node.followers
         instance = cover.instance
         rows = cover.matrix[followers]
-        lost = (cover.added(times) - cover.added(times + 1)).astype(rows.dtype)
-        after = node.gains - (rows[:children] * lost) @ rows.T
+        before, behind = (cover.added(seen, left - 1).astype(rows.dtype) for seen in (times, times + 1))
+        after = rows @ before + (rows[:children] * (behind - before)) @ rows.T
         follows = np.arange(len(followers)) > np.arange(children)[:, None]
         follows &= ~instance.conflict[np.ix_(followers[:children], followers)]
         reach = _largest(np.where(follows, after, 0.0), left - 1).sum(axis=1, dtype=np.float64)
-        values = node.value + node.gains[:children]
+        values = node.value + rows[:children] @ cover.added(times, 1)
         kept = []
         for row in range(children):
             if values[row] + reach[row] < self._goal():
