@@ -37,6 +37,7 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from heapq import heappop, heappush
 
 import numpy as np
 
@@ -56,7 +57,19 @@ REVIEW = 25
 """Every so many steps candidates are ruled out."""
 
 RELAXED, WIDE = 2, 40
-"""With so many sensors to come, and so many candidates, or more, a branch is bounded by relaxation as well."""
+"""With so many sensors to come, and so many candidates, or more, a branch is bounded by relaxation as well.
+
+Only where each sensor adds less than the one before it: elsewhere branching itself tightens the bound, and sooner.
+"""
+
+OPEN = 10_000
+"""Branches that wait to be taken by their bounds; with so many, those below one are searched before any other."""
+
+STARTS, FIRST = 8, 100
+"""Pairs to begin from where one look is worth nothing, and candidates that may be the first of a pair."""
+
+RIVALS = 24
+"""Exchanges of a sensor that are judged, those with the largest F."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,15 +144,80 @@ def _best_exchange(cover: CountedCover, chosen: Integer) -> tuple[int, int, floa
     """Return who goes, who comes, and F after it; for F without any gain nobody."""
     if len(chosen) == 0:
         return -1, -1, -math.inf
+    values = _exchange_values(cover, chosen)
+    gone, new = np.unravel_index(int(np.argmax(values)), values.shape)
+    return int(chosen[gone]), int(new), float(values[gone, new])
+
+
+def _exchange_values(cover: CountedCover, chosen: Integer) -> Float:
+    """Return F after each exchange, (s, c) float64; -inf where it is not allowed."""
     times = cover.times(chosen)
     left = [times - cover.instance.visible[candidate] for candidate in chosen]
     gains = cover.gains(np.stack([cover.added(each, 1) for each in left], axis=1)).T
-    values = gains + np.array([[cover.value(chosen[chosen != candidate])] for candidate in chosen])
+    values: Float = gains + np.array([[cover.value(chosen[chosen != candidate])] for candidate in chosen])
     for row, candidate in zip(values, chosen, strict=True):
         others = chosen[chosen != candidate]
         row[~addable(cover.instance, others)] = -np.inf
-    gone, new = np.unravel_index(int(np.argmax(values)), values.shape)
-    return int(chosen[gone]), int(new), float(values[gone, new])
+    return values
+
+
+def exchanged_from_pairs(
+    cover: CountedCover, start: Integer, best: Integer, clock: Clock
+) -> Generator[Progress, None, Integer]:
+    """Exchange from pairs that see most together, for part of the time; what is best already, if none is better.
+
+    One sensor alone adds nothing where a target must be seen twice: who is added first is a guess, and exchanges
+    of single sensors do not lead from every guess to the best.
+    """
+    time, value = clock.left, cover.value(best)
+    for pair in _best_pairs(cover, start):
+        if clock.left < 0.75 * time:
+            break
+        chosen = yield from exchanged(cover, np.append(start, pair))
+        if cover.value(chosen) > value:
+            best, value = chosen, cover.value(chosen)
+    return best
+
+
+def _best_pairs(cover: CountedCover, start: Integer) -> list[list[int]]:
+    """Return pairs that can join the start, no candidate in two of them, those that see most together first."""
+    instance = cover.instance
+    sight = cover.gains(instance.weight)
+    sight[~addable(instance, start)] = 0.0
+    first = np.argsort(-sight, kind="stable")[: min(FIRST, np.count_nonzero(sight))]
+    together = (cover.matrix[first] * instance.weight.astype(cover.matrix.dtype)) @ cover.matrix.T
+    together[instance.conflict[first] | (sight == 0) | (first[:, None] == np.arange(len(instance)))] = 0.0
+    pairs: list[list[int]] = []
+    while len(pairs) < STARTS and together.any():
+        row, other = np.unravel_index(int(np.argmax(together)), together.shape)
+        pair = [int(first[row]), int(other)]
+        together[np.isin(first, pair)] = 0.0
+        together[:, pair] = 0.0
+        if addable(instance, np.append(start, pair[0]))[pair[1]]:
+            pairs.append(pair)
+    return pairs
+
+
+def exchanged_as_judged(
+    cover: CountedCover, judge: Callable[[Integer], float], chosen: Integer
+) -> Generator[Progress, None, Integer]:
+    """Exchange candidates for as long as T grows, of each sensor's exchanges those with the largest F."""
+    value = judge(chosen)
+    while len(chosen) > 0:
+        yield Progress(0, 0, "exchanging sensors")
+        values = _exchange_values(cover, chosen)
+        rivals = [
+            np.sort(np.append(chosen[chosen != gone], new))
+            for gone, row in zip(chosen, values, strict=True)
+            for new in np.argsort(-row, kind="stable")[:RIVALS]
+            if math.isfinite(row[new])
+        ]
+        reached = [judge(rival) for rival in rivals]
+        if not rivals or max(reached) <= value:
+            break
+        value = max(reached)
+        chosen = rivals[reached.index(value)]
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,19 +377,24 @@ class RobustSearch:
         self._best, self._value = chosen, judge(chosen)
 
     def run(self, clock: Clock) -> Generator[Progress, None, Searched]:
-        """Search depth first until all is seen or the time is up."""
+        """Search until all is seen or the time is up, first where the bound is largest: it falls all the while."""
         cover = self._cover
         nothing = np.zeros(len(cover.instance.weight), dtype=np.int64)
         keep, relaxation = yield from relax(cover, nothing, self._goal(), FIRST_STEPS, None)
         gains = cover.gains(cover.added(nothing, cover.instance.count))[keep]
-        stack = [_node((), 0.0, relaxation.value, keep, gains, relaxation.targets)]
-        nodes = 0
-        while stack and clock.left > 0:
+        first = _node((), 0.0, relaxation.value, keep, gains, relaxation.targets)
+        queue, dive, nodes = [(-first.bound, 0, first)], list[_Node](), 0
+        while (queue or dive) and clock.left > 0:
             yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
-            nodes += 1
-            stack += reversed((yield from self._expand(stack.pop())))
-        bound = max([self._value, *(node.bound / self._unit for node in stack)])
-        return Searched(np.sort(self._best), self._value, min(bound, relaxation.value / self._unit), not stack)
+            node = dive.pop() if dive else heappop(queue)[2]
+            for child in reversed((yield from self._expand(node))):
+                nodes += 1
+                if len(queue) < OPEN:
+                    heappush(queue, (-child.bound, nodes, child))
+                else:
+                    dive.append(child)
+        bound = max([self._value, *(node.bound / self._unit for node in dive + [node for _, _, node in queue])])
+        return Searched(np.sort(self._best), self._value, min(bound, relaxation.value / self._unit), not queue + dive)
 
     def _goal(self) -> float:
         """Return the F that a placement as good as the best has at least."""
@@ -329,7 +412,8 @@ class RobustSearch:
                 self._take((*node.chosen, candidate))
             return []
         times = self._cover.times(np.array(node.chosen, dtype=np.int64))
-        if len(node.chosen) > 0 and left >= RELAXED and children >= WIDE:
+        concave = self._cover.worth.concave
+        if concave and len(node.chosen) > 0 and left >= RELAXED and children >= WIDE:
             rest = CountedCover(self._rest(node, left), self._cover.worth)
             goal = self._goal() - node.value
             kept, relaxation = yield from relax(rest, times, goal, LATER_STEPS, node.multipliers)

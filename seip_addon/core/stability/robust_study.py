@@ -137,7 +137,9 @@ def robust_study(
     spread = scenarios.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
     placements = [("the poses as planned", nominal)]
-    foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
+    foreseen = None
+    if any(risk.seen_by == 1 for risk in risks):
+        foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.in_words()}")
         yield here
