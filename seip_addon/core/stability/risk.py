@@ -22,7 +22,7 @@ the expectation for α = 1, the worst scenario for α up to 1/K.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
 
@@ -73,6 +73,21 @@ class Risk:
         twice = "" if self.seen_by == 1 else f", seen by at least {self.seen_by}"
         lost = {"none": "", "worst": ", the most important sensor lost", "mean": ", any one sensor lost"}[self.failure]
         return of + twice + lost
+
+    def outcome_in_words(self) -> str:
+        """Name the outcome of one scenario."""
+        by = "" if self.seen_by == 1 else f" by at least {self.seen_by} sensors"
+        lost = {
+            "none": "",
+            "worst": " after the loss of the most important sensor",
+            "mean": " after the loss of any one sensor, on average",
+        }[self.failure]
+        return f"coverage{by}{lost}"
+
+    @property
+    def alone(self) -> Risk:
+        """The same for one scenario: what any draw is judged by, whichever of them count."""
+        return replace(self, tail=1.0)
 
     def counted(self, scenarios: int) -> int:
         """Return m, the number of worst scenarios that count."""
