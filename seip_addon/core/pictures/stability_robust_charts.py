@@ -20,6 +20,9 @@ from .study_charts import MARKS, SERIES
 
 SIZE = (7.6, 4.4)  # inches
 
+AXIS, UPRIGHT, LEGEND = 80, 34, 44
+"""Letters to a line below the axis, beside it, and in one of two columns of the legend."""
+
 
 def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
     """Draw the distribution of coverage over unseen draws for each placement, as PNG.
@@ -37,7 +40,7 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
         axes.plot(contender.undisturbed, 0.0, marker="|", markersize=14, color=colour, clip_on=False)
     axes.axhline(0.05, color=SOFT_INK, linewidth=0.8, linestyle=(0, (4, 2)), zorder=0)
     axes.set_ylabel("share of draws that cover less", color=INK)
-    axes.set_xlabel(f"{_outcome(study)}, share of the targets' weight (tick: as planned)", color=INK)
+    axes.set_xlabel(fill(f"{_outcome(study)}, share of the targets' weight (tick: as planned)", AXIS), color=INK)
     axes.set_ylim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
@@ -77,7 +80,7 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
             label=_named(study, contender),
         )
     axes.set_xlabel("coverage as planned", color=INK)
-    axes.set_ylabel(fill(f"5 % quantile of {_outcome(study)} over unseen draws", 48), color=INK)
+    axes.set_ylabel(fill(f"5 % quantile of {_outcome(study)} over unseen draws", UPRIGHT), color=INK)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(PercentFormatter(1.0, decimals=1))
     _legend(figure, axes)
@@ -90,10 +93,10 @@ def _outcome(study: RobustStudy) -> str:
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
-    """Name a placement, with what it is judged by where that is not the same for all."""
-    if len(study.nominal) == 1:
-        return contender.name
-    return fill(f"{contender.name}: {contender.judged_by.outcome_in_words()}", 60)
+    """Name a placement, and the nominal optimum, of which there are several then, with what it is judged by."""
+    several = len(study.nominal) > 1 and contender in study.nominal
+    name = f"{contender.name}: {contender.judged_by.outcome_in_words()}" if several else contender.name
+    return fill(name, LEGEND)
 
 
 def _figure(title: str) -> tuple[Figure, Axes]:
