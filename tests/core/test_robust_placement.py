@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from placement_oracle import all_placements, covered, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
 from seip_addon.core.stability.disturbed_views import DisturbedViews
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_placement import allowed_sensors, solve_robust
+from seip_addon.core.stability.robust_search import CountedCover, RobustSearch
 
 RISKS = [
     Risk(),
@@ -27,6 +30,9 @@ RISKS = [
     Risk(tail=0.5, seen_by=2),
     Risk(tail=0.0, failure="mean"),
     Risk(tail=0.3, seen_by=2, failure="worst"),
+    Risk(seen_by=2, failure="mean"),
+    Risk(seen_by=3),
+    Risk(tail=0.5, seen_by=3, failure="worst"),
 ]
 
 
@@ -41,9 +47,9 @@ def under_risk(draw, risks=RISKS):
     flips = rng.random((draw(st.integers(1, 4)), *problem.visible.shape)) < draw(st.sampled_from([0.1, 0.3]))
     views = problem.visible ^ flips
     views[:, 0] |= problem.visible[0]
-    risk = draw(st.sampled_from(risks))
-    assume(allowed_sensors(problem) >= risk.least_sensors and all_placements(problem))
-    return problem, views, risk
+    possible = [risk for risk in risks if risk.least_sensors <= allowed_sensors(problem)]
+    assume(possible and all_placements(problem))
+    return problem, views, draw(st.sampled_from(possible))
 
 
 def by_hand(problem, views, risk, choice):
@@ -77,6 +83,84 @@ def test_no_subset_is_better(case):
     assert answer.status == "optimal"
     assert answer.bound == pytest.approx(best, abs=1e-7)
     assert answer.covered == pytest.approx(covered(problem, choice))
+
+
+SEVERAL_LOOKS = [risk for risk in RISKS if risk.seen_by > 1]
+
+
+def crowd(seed, count):
+    """Return a problem in which few pairs see much together, and views of two scenarios."""
+    rng = np.random.default_rng(seed)
+    at, targets = rng.random((16, 2)), rng.random((60, 2))
+    views = np.linalg.norm(at[:, None] - targets, axis=2) < rng.uniform(0.2, 0.4, (2, 16, 1))
+    problem = PlacementProblem(
+        visible=views[0],
+        weights=rng.integers(1, 4, 60).astype(float),
+        prices=np.ones(16),
+        positions=np.arange(16) // 2 * 2,
+        xyz=np.column_stack([at, np.zeros(16)]),
+        labels=np.array([f"type{i}" for i in range(16)]),
+        count=count,
+    )
+    return problem, views
+
+
+def reached_at_most(problem, views, risk):
+    """T of the best of all placements."""
+    seen = views.astype(np.uint8)
+    choices = (list(c) for k in range(problem.count + 1) for c in combinations(range(16), k))
+    apart = (c for c in choices if len({problem.positions[i] for i in c}) == len(c))
+    return max(risk.of(risk.outcomes(seen[:, c], problem.weights, problem.count)) for c in apart)
+
+
+@pytest.mark.parametrize("risk", SEVERAL_LOOKS)
+@pytest.mark.parametrize("count", [4, 5])
+def test_no_placement_is_better_where_branches_are_many(risk, count):
+    problem, views = crowd(3, count)
+    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    assert answer.objective == pytest.approx(reached_at_most(problem, views, risk))
+    assert answer.status == "optimal"
+    assert answer.gap == 0
+
+
+class Branches:
+    """A clock that runs out after so many branches."""
+
+    def __init__(self, number):
+        self.number = number
+
+    @property
+    def left(self):
+        self.number -= 1
+        return self.number + 1
+
+
+@pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
+@pytest.mark.parametrize("open_branches", [10_000, 3])
+def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, open_branches, monkeypatch):
+    monkeypatch.setattr("seip_addon.core.stability.robust_search.OPEN", open_branches)
+    problem, views = crowd(5, 5)
+    instance, scale = make_instance(problem)
+    worth = risk.worth(5)
+    best = reached_at_most(problem, views[:1], risk)
+
+    def judge(chosen):
+        seen = views[:1, instance.original[chosen]].astype(np.uint8)
+        return risk.of(risk.outcomes(seen, problem.weights, 5))
+
+    def searched(branches):
+        start = np.zeros(0, dtype=np.int64)
+        search = RobustSearch(CountedCover(instance, worth), scale * worth.unit, judge, start, 1e-9)
+        return finish(search.run(Branches(branches)))
+
+    found = [searched(branches) for branches in (0, 1, 2, 4, 8, 16, 32, 64, 128, 100_000)]
+    bounds = [each.bound for each in found]
+    assert bounds == sorted(bounds, reverse=True)
+    assert bounds[0] > bounds[4]
+    assert all(each.value <= best * (1 + 1e-12) and each.bound >= best * (1 - 1e-12) for each in found)
+    assert found[-1].finished
+    assert found[-1].value == pytest.approx(best)
+    assert found[-1].bound == pytest.approx(best)
 
 
 @given(under_risk(risks=[Risk()]))
