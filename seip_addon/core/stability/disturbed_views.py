@@ -44,10 +44,6 @@ class DisturbedViews:
         """Return V of one draw, (s, t) bool."""
         return np.unpackbits(self.packed[draw], axis=1, count=self.targets).view(bool)
 
-    def only(self, draw: int) -> DisturbedViews:
-        """Return one draw."""
-        return DisturbedViews(self.packed[draw : draw + 1], self.targets)
-
     def seen_by_pose(self, pose: int) -> Boolean:
         """Return what one pose sees in each draw, (n, t) bool."""
         return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..arrays import Float
 from ..placement import Placement, PlacementProblem, solve
 from ..progress import Progress, within
-from .disturbed_views import DisturbedViews, Surroundings, disturbed_views, draws_for
+from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_of
 from .pose_errors import PoseErrors
 from .risk import Risk
@@ -181,13 +181,16 @@ def _judged(
     used = np.unique(np.concatenate([entry.placement.chosen for entry in entries]))
     drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
     views = yield from disturbed_views(around, used, drawn)
-    planned = DisturbedViews(np.packbits(problem.visible[used], axis=1)[None], problem.visible.shape[1])
+    planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []
     for entry in entries:
         rows = np.searchsorted(used, entry.placement.chosen)
         (undisturbed,) = outcomes_of(problem, planned, entry.judged_by, rows)
-        outcomes = [outcomes_of(problem, views.only(draw), entry.judged_by, rows) for draw in range(len(views))]
+        outcomes = [
+            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), entry.judged_by, rows)
+            for draw in range(len(views))
+        ]
         contenders.append(
             Contender(
                 entry.name,
