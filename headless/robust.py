@@ -105,7 +105,7 @@ def _plan(
 
 
 def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:
-    nominal = study.nominal
+    nominal, outcome = study.beside(chosen), chosen.judged_by.outcome_in_words()
     lines = [
         f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt_in_words(sensor.tilt)}, {sensor.position_name}"
         for sensor in plan.deployment.sensors
@@ -114,8 +114,8 @@ def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, {study.price(chosen):.2%} less than the nominal optimum's",
-            f"5 % quantile over {study.settings.unseen} unseen draws {chosen.low.in_words()}, the nominal optimum's "
-            + nominal.low.in_words(),
+            f"{outcome}, over {study.settings.unseen} unseen draws:",
+            f"5 % quantile {chosen.low.in_words()}, the nominal optimum's {nominal.low.in_words()}",
             f"mean {chosen.mean.in_words()}, the nominal optimum's {nominal.mean.in_words()}",
             plan.certificate,
             *plan.placement.notes,

@@ -209,7 +209,7 @@ def poses(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
     """Let the poses of one type's placements err."""
     layout, problem = stage.surveyed.layout, stage.problem(sensor)
     study = yield from robust_study(surroundings(stage.surveyed.layout), problem, _settings(stage))
-    chosen = study.nominal.placement.chosen
+    chosen = study.nominal[0].placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
     judged = yield from pose_study(surroundings(stage.surveyed.layout), deployment, stage.scope.poses)
     title, names = f"{stage.name}: {DEFAULT_COUNT} × {sensor}", [f"{what}_{sensor}.png" for what in _POSE_CHARTS]

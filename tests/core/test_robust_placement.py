@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from placement_oracle import all_placements, covered, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
 from seip_addon.core.stability.risk import Risk
 from seip_addon.core.stability.robust_placement import allowed_sensors, solve_robust
+from seip_addon.core.stability.robust_search import CountedCover, RobustSearch
 from seip_addon.core.stability.views import Views
 
 RISKS = [
@@ -27,6 +30,9 @@ RISKS = [
     Risk(tail=0.5, seen_by=2),
     Risk(tail=0.0, failure="mean"),
     Risk(tail=0.3, seen_by=2, failure="worst"),
+    Risk(seen_by=2, failure="mean"),
+    Risk(seen_by=3),
+    Risk(tail=0.5, seen_by=3, failure="worst"),
 ]
 
 
@@ -41,9 +47,9 @@ def under_risk(draw, risks=RISKS):
     flips = rng.random((draw(st.integers(1, 4)), *problem.visible.shape)) < draw(st.sampled_from([0.1, 0.3]))
     views = problem.visible ^ flips
     views[:, 0] |= problem.visible[0]
-    risk = draw(st.sampled_from(risks))
-    assume(allowed_sensors(problem) >= risk.least_sensors and all_placements(problem))
-    return problem, views, risk
+    possible = [risk for risk in risks if risk.least_sensors <= allowed_sensors(problem)]
+    assume(possible and all_placements(problem))
+    return problem, views, draw(st.sampled_from(possible))
 
 
 def by_hand(problem, views, risk, choice):
@@ -77,6 +83,84 @@ def test_no_subset_is_better(case):
     assert answer.status == "optimal"
     assert answer.bound == pytest.approx(best, abs=1e-7)
     assert answer.covered == pytest.approx(covered(problem, choice))
+
+
+SEVERAL_LOOKS = [risk for risk in RISKS if risk.seen_by > 1]
+
+
+def crowd(seed, count):
+    """Return a problem in which few pairs see much together, and views of two scenarios."""
+    rng = np.random.default_rng(seed)
+    at, targets = rng.random((16, 2)), rng.random((60, 2))
+    views = np.linalg.norm(at[:, None] - targets, axis=2) < rng.uniform(0.2, 0.4, (2, 16, 1))
+    problem = PlacementProblem(
+        visible=views[0],
+        weights=rng.integers(1, 4, 60).astype(float),
+        prices=np.ones(16),
+        positions=np.arange(16) // 2 * 2,
+        xyz=np.column_stack([at, np.zeros(16)]),
+        labels=np.array([f"type{i}" for i in range(16)]),
+        count=count,
+    )
+    return problem, views
+
+
+def reached_at_most(problem, views, risk):
+    """T of the best of all placements."""
+    seen = views.astype(np.uint8)
+    choices = (list(c) for k in range(problem.count + 1) for c in combinations(range(16), k))
+    apart = (c for c in choices if len({problem.positions[i] for i in c}) == len(c))
+    return max(risk.of(risk.outcomes(seen[:, c], problem.weights, problem.count)) for c in apart)
+
+
+@pytest.mark.parametrize("risk", SEVERAL_LOOKS)
+@pytest.mark.parametrize("count", [4, 5])
+def test_no_placement_is_better_where_branches_are_many(risk, count):
+    problem, views = crowd(3, count)
+    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    assert answer.objective == pytest.approx(reached_at_most(problem, views, risk))
+    assert answer.status == "optimal"
+    assert answer.gap == 0
+
+
+class Branches:
+    """A clock that runs out after so many branches."""
+
+    def __init__(self, number):
+        self.number = number
+
+    @property
+    def left(self):
+        self.number -= 1
+        return self.number + 1
+
+
+@pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
+@pytest.mark.parametrize("open_branches", [10_000, 3])
+def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, open_branches, monkeypatch):
+    monkeypatch.setattr("seip_addon.core.stability.robust_search.OPEN", open_branches)
+    problem, views = crowd(5, 5)
+    instance, scale = make_instance(problem)
+    worth = risk.worth(5)
+    best = reached_at_most(problem, views[:1], risk)
+
+    def judge(chosen):
+        seen = views[:1, instance.original[chosen]].astype(np.uint8)
+        return risk.of(risk.outcomes(seen, problem.weights, 5))
+
+    def searched(branches):
+        start = np.zeros(0, dtype=np.int64)
+        search = RobustSearch(CountedCover(instance, worth), scale * worth.unit, judge, start, 1e-9)
+        return finish(search.run(Branches(branches)))
+
+    found = [searched(branches) for branches in (0, 1, 2, 4, 8, 16, 32, 64, 128, 100_000)]
+    bounds = [each.bound for each in found]
+    assert bounds == sorted(bounds, reverse=True)
+    assert bounds[0] > bounds[4]
+    assert all(each.value <= best * (1 + 1e-12) and each.bound >= best * (1 - 1e-12) for each in found)
+    assert found[-1].finished
+    assert found[-1].value == pytest.approx(best)
+    assert found[-1].bound == pytest.approx(best)
 
 
 @given(under_risk(risks=[Risk()]))
@@ -125,17 +209,39 @@ def test_the_order_of_candidates_does_not_matter(case, random):
 
 
 @given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
-def test_the_bounding_function_lies_above_and_is_concave(seen_by, failure, sensors):
-    risk = Risk(seen_by=seen_by, failure=failure)
-    steps, unit = risk.steps(sensors)
-    assert (np.diff(steps) <= 0).all()
-    assert steps[-1] == 0
-    reached = np.concatenate([[0], np.cumsum(steps)]) / unit
-    for times in range(len(reached)):
+def test_no_failure_leaves_a_target_worth_more(seen_by, failure, sensors):
+    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    for times in range(sensors + 1):
         for used in range(max(times, 1), sensors + 1):
             after = 1 - seen_by / used if times == seen_by else float(times > seen_by)
-            worth = float(times >= seen_by) if failure == "none" else after
-            assert reached[times] >= worth - 1e-12
+            left = float(times >= seen_by) if failure == "none" else after
+            assert worth.reached(np.array([times]))[0] / worth.unit >= left - 1e-12
+
+
+@given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
+def test_what_is_to_come_is_bounded_by_the_least_concave_function(seen_by, failure, sensors):
+    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    for times in range(sensors + 1):
+        seen = np.array([times])
+        assert worth.added(seen, 1)[0] == worth.reached(seen + 1)[0] - worth.reached(seen)[0]
+        for left in range(sensors + 2):
+            rises = [worth.added(seen, left, level)[0] for level in range(worth.top)]
+            reached = [worth.reached(seen + more)[0] - worth.reached(seen)[0] for more in range(left + 1)]
+            bounds = np.concatenate([[0], np.cumsum(rises), np.full(left, np.sum(rises))])[: left + 1]
+            assert (np.diff(rises) <= 0).all()
+            assert (bounds >= reached).all()
+            chords = [  # the least one: it touches a chord of the points, or a point, everywhere
+                max(
+                    [reached[m]]
+                    + [
+                        reached[a] + (reached[b] - reached[a]) * (m - a) / (b - a)
+                        for a in range(m)
+                        for b in range(m + 1, left + 1)
+                    ]
+                )
+                for m in range(left + 1)
+            ]
+            assert bounds == pytest.approx(chords)
 
 
 def test_too_few_sensors_are_refused():

@@ -42,8 +42,9 @@ def study(laid_out):
 
 def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
     around, problem = laid_out
-    assert study.nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
-    for contender in (study.nominal, *study.robust):
+    (nominal,) = study.nominal
+    assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
+    for contender in (nominal, *study.robust):
         chosen = contender.placement.chosen
         drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
         views = finish(disturbed_views(around, chosen, drawn))
@@ -63,11 +64,52 @@ def test_robustness_costs_what_was_planned(study):
     ]
 
 
+LOSSES = [Risk(failure="worst"), Risk(tail=0.5, seen_by=2), Risk(seen_by=2), Risk(tail=0.0, failure="mean")]
+
+
+@pytest.fixture(scope="module")
+def study_of_losses(laid_out):
+    return finish(robust_study(*laid_out, SETTINGS, LOSSES))
+
+
+def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_optimum(laid_out, study_of_losses):
+    around, problem = laid_out
+
+    def outcome(view, risk):
+        assert len(view) == problem.count
+        whole = (view.sum(axis=0) >= risk.seen_by).mean()
+        left = [(np.delete(view, gone, axis=0).sum(axis=0) >= risk.seen_by).mean() for gone in range(len(view))]
+        return {"none": whole, "worst": min(left), "mean": np.mean(left)}[risk.failure]
+
+    for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
+        for judged in (contender, study_of_losses.beside(contender)):
+            chosen = judged.placement.chosen
+            drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
+            views = finish(disturbed_views(around, chosen, drawn))
+            expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.unseen)]
+            assert judged.unseen == pytest.approx(expected, abs=1e-12)
+            assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
+        assert (contender.unseen < contender.planned).any()
+
+
+def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
+    low = study.robust[0].low.in_words()
+    assert f"5 % quantile of coverage {low} against" in robust_rows(study)[0].begins
+    first, second, third, fourth = (row.begins for row in robust_rows(study_of_losses))
+    assert "5 % quantile of coverage after the loss of the most important sensor" in first
+    assert "5 % quantile of coverage by at least 2 sensors" in second
+    assert "5 % quantile of coverage by at least 2 sensors" in third
+    assert "5 % quantile of coverage after the loss of any one sensor, on average" in fourth
+    assert len(study_of_losses.nominal) == 3  # two are judged alike
+    save_spread_chart(tmp_path / "spread.png", study_of_losses, "spread")
+    save_frontier_chart(tmp_path / "frontier.png", study_of_losses, "frontier")
+
+
 def test_without_errors_robustness_is_free(laid_out):
     settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, unseen=2)
     study = finish(robust_study(*laid_out, settings, [Risk(tail=0.5)]))
     (robust,) = study.robust
-    assert robust.placement.chosen.tolist() == study.nominal.placement.chosen.tolist()
+    assert robust.placement.chosen.tolist() == study.nominal[0].placement.chosen.tolist()
     assert (robust.unseen == robust.planned).all()
 
 
@@ -83,7 +125,7 @@ def test_poses_of_one_place_err_alike(laid_out):
 
 def test_charts_are_drawn(laid_out, study, tmp_path):
     around, problem = laid_out
-    deployment = deploy(around.site, MODELS, problem.visible, study.nominal.placement.chosen)
+    deployment = deploy(around.site, MODELS, problem.visible, study.nominal[0].placement.chosen)
     judged = finish(pose_study(around, deployment, StudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
     save_spread_chart(tmp_path / "spread.png", study, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study, "frontier")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,30 +13,34 @@ from matplotlib.ticker import PercentFormatter
 
 from ..stability.estimates import Estimate
 from ..stability.pose_study import PoseStudy
-from ..stability.robust_study import RobustStudy
+from ..stability.robust_study import Contender, RobustStudy
 from .drawing import save_png
 from .palette import INK, PAPER, SOFT_INK
 from .study_charts import MARKS, SERIES
 
 SIZE = (7.6, 4.4)  # inches
 
+AXIS, UPRIGHT, LEGEND = 80, 34, 44
+"""Letters to a line below the axis, beside it, and in one of two columns of the legend."""
+
 
 def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
     """Draw the distribution of coverage over unseen draws for each placement, as PNG.
 
     Steps are empirical distribution functions; a mark on the 5 % line is the quantile with its interval, a tick
-    on the axis what the placement covers as planned.
+    on the axis what the placement covers as planned. Coverage is what a placement is judged by: after a loss, or by
+    several sensors, where it was chosen for that.
     """
     figure, axes = _figure(title)
-    for row, contender in enumerate((study.nominal, *study.robust)):
+    for row, contender in enumerate((*study.nominal, *study.robust)):
         colour = SERIES[row % len(SERIES)]
         ordered = np.sort(contender.unseen)
         axes.step(ordered, np.arange(1, len(ordered) + 1) / len(ordered), where="post", color=colour, linewidth=1.6)
-        _interval(axes, contender.low, 0.05, colour, MARKS[row % len(MARKS)], contender.name)
-        axes.plot(contender.planned, 0.0, marker="|", markersize=14, color=colour, clip_on=False)
+        _interval(axes, contender.low, 0.05, colour, MARKS[row % len(MARKS)], _named(study, contender))
+        axes.plot(contender.undisturbed, 0.0, marker="|", markersize=14, color=colour, clip_on=False)
     axes.axhline(0.05, color=SOFT_INK, linewidth=0.8, linestyle=(0, (4, 2)), zorder=0)
     axes.set_ylabel("share of draws that cover less", color=INK)
-    axes.set_xlabel("share of the targets' weight seen (tick: as planned)", color=INK)
+    axes.set_xlabel(fill(f"{_outcome(study)}, share of the targets' weight (tick: as planned)", AXIS), color=INK)
     axes.set_ylim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
@@ -63,7 +68,7 @@ def save_blame_chart(path: str | os.PathLike[str], study: PoseStudy, title: str)
 def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
     """Draw the 5 % quantile over unseen draws against the planned coverage of each placement, as PNG."""
     figure, axes = _figure(title)
-    for row, contender in enumerate((study.nominal, *study.robust)):
+    for row, contender in enumerate((*study.nominal, *study.robust)):
         low, colour = contender.low, SERIES[row % len(SERIES)]
         axes.plot([contender.planned] * 2, [low.low, low.high], color=colour, linewidth=1.2)
         axes.plot(
@@ -72,14 +77,26 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
             marker=MARKS[row % len(MARKS)],
             color=colour,
             linestyle="none",
-            label=contender.name,
+            label=_named(study, contender),
         )
     axes.set_xlabel("coverage as planned", color=INK)
-    axes.set_ylabel("5 % quantile of coverage over unseen draws", color=INK)
+    axes.set_ylabel(fill(f"5 % quantile of {_outcome(study)} over unseen draws", UPRIGHT), color=INK)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(PercentFormatter(1.0, decimals=1))
     _legend(figure, axes)
     save_png(path, figure)
+
+
+def _outcome(study: RobustStudy) -> str:
+    """Name what placements are judged by, if it is one thing."""
+    return study.nominal[0].judged_by.outcome_in_words() if len(study.nominal) == 1 else "coverage"
+
+
+def _named(study: RobustStudy, contender: Contender) -> str:
+    """Name a placement, and the nominal optimum, of which there are several then, with what it is judged by."""
+    several = len(study.nominal) > 1 and contender in study.nominal
+    name = f"{contender.name}: {contender.judged_by.outcome_in_words()}" if several else contender.name
+    return fill(name, LEGEND)
 
 
 def _figure(title: str) -> tuple[Figure, Axes]:

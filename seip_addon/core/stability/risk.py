@@ -22,9 +22,8 @@ the expectation for α = 1, the worst scenario for α up to 1/K.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -32,6 +31,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
+from .worth import Worth, worth_of
 
 Failure = Literal["none", "worst", "mean"]
 
@@ -74,6 +74,21 @@ class Risk:
         lost = {"none": "", "worst": ", the most important sensor lost", "mean": ", any one sensor lost"}[self.failure]
         return of + twice + lost
 
+    def outcome_in_words(self) -> str:
+        """Name the outcome of one scenario."""
+        by = "" if self.seen_by == 1 else f" by at least {self.seen_by} sensors"
+        lost = {
+            "none": "",
+            "worst": " after the loss of the most important sensor",
+            "mean": " after the loss of any one sensor, on average",
+        }[self.failure]
+        return f"coverage{by}{lost}"
+
+    @property
+    def alone(self) -> Risk:
+        """The same for one scenario: what any draw is judged by, whichever of them count."""
+        return replace(self, tail=1.0)
+
     def counted(self, scenarios: int) -> int:
         """Return m, the number of worst scenarios that count."""
         return max(1, math.ceil(self.tail * scenarios - 1e-9))
@@ -112,46 +127,19 @@ class Risk:
         """Return the scenarios that count, (m,) int64; of equal ones the first."""
         return np.argsort(outcomes, kind="stable")[: self.counted(len(outcomes))]
 
-    def steps(self, sensors: int) -> tuple[Integer, int]:
-        r"""Return how a target's worth rises with the sensors that see it, made concave from above.
+    def worth(self, sensors: int) -> Worth:
+        r"""Return what a target is worth by the sensors that see it: on average, or more than at worst.
 
         A target seen n times is worth 1 from n = κ on. After a failure among N
         sensors it is worth :math:`1 - κ/N` on average at n = κ and 1 from
-        :math:`κ + 1` on, which no failure of the worst kind exceeds. The least
-        concave function above that makes the sum over targets submodular, and
-        an upper bound of the outcome; it is exact for one look, and for the mean
-        failure of one look.
+        :math:`κ + 1` on, which no failure of the worst kind exceeds.
 
         Parameters
         ----------
         sensors : int
             N, the largest number of sensors.
-
-        Returns
-        -------
-        steps : (l + 1,) int64
-            What the first, second, … sensor adds, in units; falling, the last one is 0.
-        unit : int
-            Units that make 1.
         """
-        worth = [Fraction(0)] * self.seen_by + [Fraction(1)]
+        values = [Fraction(0)] * self.seen_by + [Fraction(1)]
         if self.failure != "none":
-            worth = [*worth[:-1], max(Fraction(sensors - self.seen_by, sensors), Fraction(0)), Fraction(1)]
-        corners = _upper_hull(worth)
-        rises = [(worth[b] - worth[a]) / (b - a) for a, b in pairwise(corners) for _ in range(a, b)]
-        unit = math.lcm(*(rise.denominator for rise in rises))
-        return np.array([int(rise * unit) for rise in rises] + [0], dtype=np.int64), unit
-
-
-def _upper_hull(worth: list[Fraction]) -> list[int]:
-    """Return the corners of the least concave function above the points."""
-    corners: list[int] = []
-    for right in range(len(worth)):
-        while len(corners) > 1:
-            left, middle = corners[-2:]
-            rise, run = worth[right] - worth[left], right - left
-            if (worth[middle] - worth[left]) * run > rise * (middle - left):
-                break
-            corners.pop()
-        corners.append(right)
-    return corners
+            values = [*values[:-1], max(Fraction(sensors - self.seen_by, sensors), Fraction(0)), Fraction(1)]
+        return worth_of(values)

@@ -44,7 +44,7 @@ from ..placement.instance import Instance, common_unit, make_instance, merge_tar
 from ..placement.problem import TIE, relative_gap
 from ..progress import Progress, within
 from .risk import Risk
-from .robust_search import CountedCover, RobustSearch, exchanged
+from .robust_search import CountedCover, RobustSearch, exchanged, exchanged_as_judged, exchanged_from_pairs
 from .views import Views
 
 ROUNDS = 16
@@ -101,7 +101,7 @@ def solve_robust(
     time_limit : float, seconds
         After it the best placement found is returned with its bound and gap.
     foreseen : sequence of Placement, optional
-        See `foresee`; found within the time limit if not given.
+        See `foresee`; found within the time limit if not given, and only of use where one look is enough.
 
     Yields
     ------
@@ -128,10 +128,11 @@ def solve_robust(
         placement = replace(placement, covered=_covered(problem, placement.chosen))
         return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
     clock = Clock(time_limit)
-    if foreseen is None:
+    if foreseen is None and risk.seen_by == 1:
         foreseen = yield from foresee(problem, different, solver=solver, time_limit=FORESEEING * time_limit)
     placement = yield from _searched(problem, different, risk, solver, max(clock.left, LEAST_SECONDS))
-    placement = _with_foresight(problem, different, risk, placement, foreseen)
+    if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
+        placement = _with_foresight(problem, different, risk, placement, foreseen)
     placement = replace(placement, seconds=clock.elapsed)
     return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
 
@@ -289,7 +290,7 @@ class _Game:
         self._used = problem.weights > 0
         self._unit, _ = common_unit(problem.weights[self._used])
         self._sensors = allowed_sensors(problem)
-        self._steps, self._parts = risk.steps(self._sensors)
+        self._worth = risk.worth(self._sensors)
 
     def judge(self, chosen: Integer) -> float:
         """Return T of candidates of the whole instance."""
@@ -303,16 +304,20 @@ class _Game:
         columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
         weights = np.concatenate([share[k] * weight for k in scenarios])
         visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
-        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._steps)
+        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._worth)
 
     def unit(self, share: Integer) -> float:
         """Return by what T is to be multiplied to be compared with F."""
-        return float(share.sum()) * self._parts / self._unit
+        return float(share.sum()) * self._worth.unit / self._unit
 
     def play(self, start: Integer, clock: Clock) -> Generator[Progress, None, tuple[Integer, Integer]]:
         """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
         even = np.ones(len(self._scenarios), dtype=np.int64)
-        chosen = yield from exchanged(self.cover(even), start)
+        cover = self.cover(even)
+        chosen = yield from exchanged(cover, start)
+        if not self._worth.concave:
+            chosen = yield from exchanged_from_pairs(cover, start, chosen, clock)
+            chosen = yield from exchanged_as_judged(cover, self.judge, chosen)
         best, value = chosen, self.judge(chosen)
         if self._risk.counted(len(even)) == len(even):
             return best, even

@@ -1,22 +1,34 @@
-r"""Branch and bound for objectives that a submodular function bounds from above.
+r"""Branch and bound for objectives that a sum over targets bounds from above.
 
 The bounding function counts what sees a target: with p in P (`risk`),
 
 .. math::
     F(S) = \sum_k p_k \sum_j w_j\, φ(n_{jk}(S)) \ge T(S),
 
-φ being concave, so that F is monotone and submodular. A set S with
-:math:`T(S) \ge g` has :math:`F(S) \ge g` as well: sets are built in the order in
-which each sensor adds the most to F, as in `placement.branch_and_bound`, branches
-that cannot bring F to the best T so far are cut, and T itself is asked of every
-set that is left. Relaxing what a target's sensors add with multipliers λ bounds F
-by
+φ being what a target is worth by the sensors that see it (`worth`). φ rises, but
+where more than one look is asked for it is not concave: one look of two is worth
+nothing. With S chosen and l sensors still to come, a target seen n times is worth
+φ(n), and what follows adds to it no more than the least concave function
+:math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
 
 .. math::
-    L(λ) = \sum_j \sum_{l \ge 1} \max(0,\, w_j φ_l - λ_j) + \max_{x \in X} \sum_i x_i \sum_j V_{ij} λ_j,
+    F(S \cup R) \le F(S) + \sum_k p_k \sum_j w_j\, φ_{n_{jk}(S),\,l}(n_{jk}(R)),
+    \quad |R| \le l,
 
-:math:`φ_l` being what the l-th sensor adds; for one look this is the relaxation of
-`placement.bounds`.
+which is submodular in R, and tighter in every branch than above it: who has been
+seen once counts in full or not at all, who cannot be seen often enough any more
+counts no longer, and for the last sensor it is exact. A set S with
+:math:`T(S) \ge g` has :math:`F(S) \ge g` as well: sets are built so that a sensor
+is followed by those that add less than it where it was chosen, as in
+`placement.branch_and_bound`, branches that cannot bring F to the best T so far are
+cut, and T itself is asked of every set that is left. Relaxing what a target's
+sensors add with multipliers λ bounds what is added by
+
+.. math::
+    L(λ) = \sum_j \sum_{i \ge 1} \max(0,\, w_j φ_{n,l,i} - λ_j) + \max_{x \in X} \sum_i x_i \sum_j V_{ij} λ_j,
+
+:math:`φ_{n,l,i}` being the i-th rise of :math:`φ_{n,l}`; for one look this is the
+relaxation of `placement.bounds`.
 """
 
 from __future__ import annotations
@@ -25,6 +37,7 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from heapq import heappop, heappush
 
 import numpy as np
 
@@ -34,6 +47,7 @@ from ..placement.clock import Clock
 from ..placement.greedy import addable
 from ..placement.instance import SINGLE, Instance, Numbers
 from ..progress import Progress
+from .worth import Worth
 
 FIRST_STEPS, LATER_STEPS = 300, 60
 PATIENCE, SHRINK, DEFLECTION, SMALLEST_STEP = 15, 0.7, 0.85, 1e-3
@@ -43,33 +57,45 @@ REVIEW = 25
 """Every so many steps candidates are ruled out."""
 
 RELAXED, WIDE = 2, 40
-"""With so many sensors to come, and so many candidates, or more, a branch is bounded by relaxation as well."""
+"""With so many sensors to come, and so many candidates, or more, a branch is bounded by relaxation as well.
+
+Only where each sensor adds less than the one before it: elsewhere branching itself tightens the bound, and sooner.
+"""
+
+OPEN = 10_000
+"""Branches that wait to be taken by their bounds; with so many, those below one are searched before any other."""
+
+STARTS, FIRST = 8, 100
+"""Pairs to begin from where one look is worth nothing, and candidates that may be the first of a pair."""
+
+RIVALS = 24
+"""Exchanges of a sensor that are judged, those with the largest F."""
 
 
 @dataclass(frozen=True, eq=False)
 class CountedCover:
-    """F, a concave function of how many chosen candidates see each target.
+    """F, the sum of what targets are worth by how many chosen candidates see them.
 
     Parameters
     ----------
     instance : Instance
         Candidates with their constraints, targets merged; weights are whole numbers.
-    steps : (l + 1,) int64
-        What the first, second, … sensor adds for each unit of weight: falling, whole numbers, the last one 0.
+    worth : Worth
+        For each unit of weight.
     """
 
     instance: Instance
-    steps: Integer
+    worth: Worth
 
     @cached_property
     def matrix(self) -> Numbers:
         """V as numbers, in the smallest precision in which products with what is added are exact."""
-        most = self.instance.total * int(self.steps.sum())
+        most = self.instance.total * self.worth.unit
         return self.instance.visible.astype(np.float32 if most < SINGLE else np.float64)
 
-    def added(self, times: Integer) -> Float:
-        """Return what one more sensor adds at each target that is seen so many times, (t,) float64."""
-        more: Float = self.instance.weight * self.steps[np.minimum(times, len(self.steps) - 1)]
+    def added(self, times: Integer, left: int, level: int = 0) -> Float:
+        """Return what the next sensor adds at most at targets seen so many times, (t,) float64; see `Worth.added`."""
+        more: Float = self.instance.weight * self.worth.added(times, left, level)
         return more
 
     def gains(self, per_target: Float) -> Float:
@@ -84,18 +110,18 @@ class CountedCover:
 
     def value(self, chosen: Integer) -> float:
         """Return F."""
-        reached = np.concatenate([[0], np.cumsum(self.steps)])
-        return float(self.instance.weight @ reached[np.minimum(self.times(chosen), len(self.steps))])
+        return float(self.instance.weight @ self.worth.reached(self.times(chosen)))
 
     def of(self, keep: Integer) -> CountedCover:
         """Return the same with only some candidates."""
-        return CountedCover(self.instance.of(keep), self.steps)
+        return CountedCover(self.instance.of(keep), self.worth)
 
 
 def greedy_cover(cover: CountedCover, chosen: Integer) -> Integer:
-    """Add the candidate that adds most to F until nothing that is allowed adds, ascending."""
+    """Add the candidate that adds most to F, at most and with those to come, until nothing adds, ascending."""
     while True:
-        gain = cover.gains(cover.added(cover.times(chosen)))
+        left = max(cover.instance.count - len(chosen), 0)
+        gain = cover.gains(cover.added(cover.times(chosen), left))
         gain[~addable(cover.instance, chosen)] = 0.0
         best = int(np.argmax(gain))
         if gain[best] <= 0:
@@ -118,15 +144,80 @@ def _best_exchange(cover: CountedCover, chosen: Integer) -> tuple[int, int, floa
     """Return who goes, who comes, and F after it; for F without any gain nobody."""
     if len(chosen) == 0:
         return -1, -1, -math.inf
+    values = _exchange_values(cover, chosen)
+    gone, new = np.unravel_index(int(np.argmax(values)), values.shape)
+    return int(chosen[gone]), int(new), float(values[gone, new])
+
+
+def _exchange_values(cover: CountedCover, chosen: Integer) -> Float:
+    """Return F after each exchange, (s, c) float64; -inf where it is not allowed."""
     times = cover.times(chosen)
     left = [times - cover.instance.visible[candidate] for candidate in chosen]
-    gains = cover.gains(np.stack([cover.added(each) for each in left], axis=1)).T
-    values = gains + np.array([[cover.value(chosen[chosen != candidate])] for candidate in chosen])
+    gains = cover.gains(np.stack([cover.added(each, 1) for each in left], axis=1)).T
+    values: Float = gains + np.array([[cover.value(chosen[chosen != candidate])] for candidate in chosen])
     for row, candidate in zip(values, chosen, strict=True):
         others = chosen[chosen != candidate]
         row[~addable(cover.instance, others)] = -np.inf
-    gone, new = np.unravel_index(int(np.argmax(values)), values.shape)
-    return int(chosen[gone]), int(new), float(values[gone, new])
+    return values
+
+
+def exchanged_from_pairs(
+    cover: CountedCover, start: Integer, best: Integer, clock: Clock
+) -> Generator[Progress, None, Integer]:
+    """Exchange from pairs that see most together, for part of the time; what is best already, if none is better.
+
+    One sensor alone adds nothing where a target must be seen twice: who is added first is a guess, and exchanges
+    of single sensors do not lead from every guess to the best.
+    """
+    time, value = clock.left, cover.value(best)
+    for pair in _best_pairs(cover, start):
+        if clock.left < 0.75 * time:
+            break
+        chosen = yield from exchanged(cover, np.append(start, pair))
+        if cover.value(chosen) > value:
+            best, value = chosen, cover.value(chosen)
+    return best
+
+
+def _best_pairs(cover: CountedCover, start: Integer) -> list[list[int]]:
+    """Return pairs that can join the start, no candidate in two of them, those that see most together first."""
+    instance = cover.instance
+    sight = cover.gains(instance.weight)
+    sight[~addable(instance, start)] = 0.0
+    first = np.argsort(-sight, kind="stable")[: min(FIRST, np.count_nonzero(sight))]
+    together = (cover.matrix[first] * instance.weight.astype(cover.matrix.dtype)) @ cover.matrix.T
+    together[instance.conflict[first] | (sight == 0) | (first[:, None] == np.arange(len(instance)))] = 0.0
+    pairs: list[list[int]] = []
+    while len(pairs) < STARTS and together.any():
+        row, other = np.unravel_index(int(np.argmax(together)), together.shape)
+        pair = [int(first[row]), int(other)]
+        together[np.isin(first, pair)] = 0.0
+        together[:, pair] = 0.0
+        if addable(instance, np.append(start, pair[0]))[pair[1]]:
+            pairs.append(pair)
+    return pairs
+
+
+def exchanged_as_judged(
+    cover: CountedCover, judge: Callable[[Integer], float], chosen: Integer
+) -> Generator[Progress, None, Integer]:
+    """Exchange candidates for as long as T grows, of each sensor's exchanges those with the largest F."""
+    value = judge(chosen)
+    while len(chosen) > 0:
+        yield Progress(0, 0, "exchanging sensors")
+        values = _exchange_values(cover, chosen)
+        rivals = [
+            np.sort(np.append(chosen[chosen != gone], new))
+            for gone, row in zip(chosen, values, strict=True)
+            for new in np.argsort(-row, kind="stable")[:RIVALS]
+            if math.isfinite(row[new])
+        ]
+        reached = [judge(rival) for rival in rivals]
+        if not rivals or max(reached) <= value:
+            break
+        value = max(reached)
+        chosen = rivals[reached.index(value)]
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +245,7 @@ class Relaxation:
         return np.flatnonzero(forced >= goal)
 
 
-def relax(
+def relax(  # what is bounded, and how far to go
     cover: CountedCover, times: Integer, goal: float, iterations: int, start: Float | None
 ) -> Generator[Progress, None, tuple[Integer, Relaxation]]:
     """Search for multipliers with a small bound on what can be added to F, by deflected subgradients.
@@ -163,7 +254,7 @@ def relax(
     ----------
     cover : CountedCover
     times : (t,) int64
-        How often each target is seen already.
+        How often each target is seen already; the count of the cover's instance is of those to come.
     goal : float
         What must be added; the search ends when the bound falls below.
     iterations : int
@@ -177,7 +268,7 @@ def relax(
     Relaxation
     """
     keep = np.arange(len(cover.instance))
-    layers = np.stack([cover.added(times + level) for level in range(len(cover.steps) - 1)])
+    layers = np.stack([cover.added(times, cover.instance.count, level) for level in range(cover.worth.top)])
     most = layers[0]
     begin = most / np.maximum(1, cover.instance.visible.sum(axis=0)) ** 0.5 if start is None else start
     current = best = _relaxation(cover, layers, np.minimum(begin, most))
@@ -286,19 +377,24 @@ class RobustSearch:
         self._best, self._value = chosen, judge(chosen)
 
     def run(self, clock: Clock) -> Generator[Progress, None, Searched]:
-        """Search depth first until all is seen or the time is up."""
+        """Search until all is seen or the time is up, first where the bound is largest: it falls all the while."""
         cover = self._cover
         nothing = np.zeros(len(cover.instance.weight), dtype=np.int64)
         keep, relaxation = yield from relax(cover, nothing, self._goal(), FIRST_STEPS, None)
-        gains = cover.gains(cover.added(nothing))[keep]
-        stack = [_node((), 0.0, relaxation.value, keep, gains, relaxation.targets)]
-        nodes = 0
-        while stack and clock.left > 0:
+        gains = cover.gains(cover.added(nothing, cover.instance.count))[keep]
+        first = _node((), 0.0, relaxation.value, keep, gains, relaxation.targets)
+        queue, dive, nodes = [(-first.bound, 0, first)], list[_Node](), 0
+        while (queue or dive) and clock.left > 0:
             yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
-            nodes += 1
-            stack += reversed((yield from self._expand(stack.pop())))
-        bound = max([self._value, *(node.bound / self._unit for node in stack)])
-        return Searched(np.sort(self._best), self._value, min(bound, relaxation.value / self._unit), not stack)
+            node = dive.pop() if dive else heappop(queue)[2]
+            for child in reversed((yield from self._expand(node))):
+                nodes += 1
+                if len(queue) < OPEN:
+                    heappush(queue, (-child.bound, nodes, child))
+                else:
+                    dive.append(child)
+        bound = max([self._value, *(node.bound / self._unit for node in dive + [node for _, _, node in queue])])
+        return Searched(np.sort(self._best), self._value, min(bound, relaxation.value / self._unit), not queue + dive)
 
     def _goal(self) -> float:
         """Return the F that a placement as good as the best has at least."""
@@ -310,12 +406,15 @@ class RobustSearch:
         if left == 0 or children == 0:
             return []
         if left == 1:
-            for candidate in node.followers[:children].tolist():
+            for candidate, gain in zip(node.followers[:children].tolist(), node.gains, strict=False):
+                if node.value + gain < self._goal():
+                    break
                 self._take((*node.chosen, candidate))
             return []
         times = self._cover.times(np.array(node.chosen, dtype=np.int64))
-        if len(node.chosen) > 0 and left >= RELAXED and children >= WIDE:
-            rest = CountedCover(self._rest(node, left), self._cover.steps)
+        concave = self._cover.worth.concave
+        if concave and len(node.chosen) > 0 and left >= RELAXED and children >= WIDE:
+            rest = CountedCover(self._rest(node, left), self._cover.worth)
             goal = self._goal() - node.value
             kept, relaxation = yield from relax(rest, times, goal, LATER_STEPS, node.multipliers)
             bound = min(node.bound, node.value + relaxation.value)
@@ -334,12 +433,12 @@ class RobustSearch:
         cover, followers = self._cover, node.followers
         instance = cover.instance
         rows = cover.matrix[followers]
-        lost = (cover.added(times) - cover.added(times + 1)).astype(rows.dtype)
-        after = node.gains - (rows[:children] * lost) @ rows.T
+        before, behind = (cover.added(seen, left - 1).astype(rows.dtype) for seen in (times, times + 1))
+        after = rows @ before + (rows[:children] * (behind - before)) @ rows.T
         follows = np.arange(len(followers)) > np.arange(children)[:, None]
         follows &= ~instance.conflict[np.ix_(followers[:children], followers)]
         reach = _largest(np.where(follows, after, 0.0), left - 1).sum(axis=1, dtype=np.float64)
-        values = node.value + node.gains[:children]
+        values = node.value + rows[:children] @ cover.added(times, 1)
         kept = []
         for row in range(children):
             if values[row] + reach[row] < self._goal():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_of
 from .pose_errors import PoseErrors
 from .risk import Risk
-from .robust_placement import RobustPlacement, foresee, solve_robust
+from .robust_placement import RobustPlacement, foresee, outcomes_of, solve_robust
 from .rows import Row
 
 LOW = 0.05
@@ -52,7 +52,7 @@ class RobustSettings:
 
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A placement and what it covers in unseen draws.
+    """A placement and what becomes of it in unseen draws.
 
     Parameters
     ----------
@@ -60,14 +60,20 @@ class Contender:
         What it was chosen for.
     placement : Placement
     planned : float
-        Share of the targets' weight that it covers as planned.
+        Share of the targets' weight that it covers as planned, by one look and without any failure.
+    judged_by : Risk
+        Whose outcome the following are: coverage, or what is left of it after a loss, or what several sensors see.
+    undisturbed : float
+        The outcome for the poses as planned, as a share of the targets' weight.
     unseen : (n,) float64
-        The same share in each unseen draw.
+        The same in each unseen draw.
     """
 
     name: str
     placement: Placement
     planned: float
+    judged_by: Risk
+    undisturbed: float
     unseen: Float
 
     @property
@@ -88,8 +94,8 @@ class RobustStudy:
     Parameters
     ----------
     settings : RobustSettings
-    nominal : Contender
-        Chosen for the poses as planned.
+    nominal : tuple of Contender
+        The placement chosen for the poses as planned, once for each way in which the others are judged.
     robust : tuple of Contender
         One for each risk.
     total : float
@@ -97,17 +103,21 @@ class RobustStudy:
     """
 
     settings: RobustSettings
-    nominal: Contender
+    nominal: tuple[Contender, ...]
     robust: tuple[Contender, ...]
     total: float
 
+    def beside(self, contender: Contender) -> Contender:
+        """Return the nominal optimum, judged as a contender is."""
+        return next(nominal for nominal in self.nominal if nominal.judged_by == contender.judged_by)
+
     def price(self, contender: Contender) -> float:
         """Return what a contender gives away of the nominal optimum's planned coverage."""
-        return self.nominal.planned - contender.planned
+        return self.beside(contender).planned - contender.planned
 
     def saving(self, contender: Contender) -> float:
         """Return by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
-        return contender.low.value - self.nominal.low.value
+        return contender.low.value - self.beside(contender).low.value
 
 
 def robust_study(
@@ -136,8 +146,11 @@ def robust_study(
     scenarios = yield from disturbed_views(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
-    placements = [("the poses as planned", nominal)]
-    foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
+    foreseen = None
+    if any(risk.seen_by == 1 for risk in risks):
+        foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
+    ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
+    entries = [_Entry("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.in_words()}")
         yield here
@@ -145,41 +158,63 @@ def robust_study(
             problem, spread, risk, solver=settings.solver, time_limit=settings.time_limit, foreseen=foreseen
         )
         found: RobustPlacement = yield from within(here, steps)
-        placements.append((risk.in_words(), found.placement))
-    first, *others = yield from _judged(around, problem, settings, placements)
-    return RobustStudy(settings, first, tuple(others), float(problem.weights.sum()))
+        entries.append(_Entry(risk.in_words(), found.placement, risk.alone))
+    contenders = yield from _judged(around, problem, settings, entries)
+    return RobustStudy(
+        settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
+    )
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A placement that is to be judged."""
+
+    name: str
+    placement: Placement
+    judged_by: Risk
 
 
 def _judged(
-    around: Surroundings,
-    problem: PlacementProblem,
-    settings: RobustSettings,
-    placements: Sequence[tuple[str, Placement]],
+    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, entries: Sequence[_Entry]
 ) -> Generator[Progress, None, list[Contender]]:
     """Look from all chosen poses at once, in draws of another seed."""
-    used = np.unique(np.concatenate([placement.chosen for _, placement in placements]))
+    used = np.unique(np.concatenate([entry.placement.chosen for entry in entries]))
     drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
     views = yield from disturbed_views(around, used, drawn)
+    planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []
-    for name, placement in placements:
-        rows = np.searchsorted(used, placement.chosen)
-        covered = [float(problem.weights[views.seen(draw)[rows].any(axis=0)].sum()) for draw in range(len(views))]
-        contenders.append(Contender(name, placement, placement.covered / total, np.array(covered) / total))
+    for entry in entries:
+        rows = np.searchsorted(used, entry.placement.chosen)
+        (undisturbed,) = outcomes_of(problem, planned, entry.judged_by, rows)
+        outcomes = [
+            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), entry.judged_by, rows)
+            for draw in range(len(views))
+        ]
+        contenders.append(
+            Contender(
+                entry.name,
+                entry.placement,
+                entry.placement.covered / total,
+                entry.judged_by,
+                float(undisturbed) / total,
+                np.concatenate(outcomes) / total,
+            )
+        )
     return contenders
 
 
 def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
     """Return what the study says as a row of the page of stability for each placement."""
-    settings, nominal = study.settings, study.nominal
-    errors = settings.errors
+    settings, errors = study.settings, study.settings.errors
     regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {settings.scenarios} scenarios"
     return tuple(
         Row(
             f"placement for {contender.name}",
             regime,
-            f"gives {study.price(contender):.2%} of planned coverage; 5 % quantile {contender.low.in_words()} against "
-            f"{nominal.low.in_words()} of the nominal optimum",
+            f"gives {study.price(contender):.2%} of planned coverage; 5 % quantile of "
+            f"{contender.judged_by.outcome_in_words()} {contender.low.in_words()} against "
+            f"{study.beside(contender).low.in_words()} of the nominal optimum",
             f"{settings.unseen} draws that nothing was chosen on",
             f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
         )
