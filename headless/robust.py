@@ -116,6 +116,7 @@ def _in_words(study: RobustStudy, chosen: Contender, plan: Plan) -> str:
             f"planned coverage {chosen.planned:.2%}, {study.price(chosen):.2%} less than the nominal optimum's",
             f"{outcome}, over {study.settings.unseen} unseen draws:",
             f"5 % quantile {chosen.low.in_words()}, the nominal optimum's {nominal.low.in_words()}",
+            f"which is {study.saving(chosen).in_words()} more, draw for draw",
             f"mean {chosen.mean.in_words()}, the nominal optimum's {nominal.mean.in_words()}",
             plan.certificate,
             *plan.placement.notes,

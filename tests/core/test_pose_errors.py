@@ -1,6 +1,7 @@
 """Draws of pose errors, the estimates made of them, and what they do to a placement."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,8 @@ from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.scene_geometry import Mesh
-from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views
-from seip_addon.core.stability.estimates import mean_of, quantile_of
+from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views, draws_for
+from seip_addon.core.stability.estimates import mean_of, quantile_gain, quantile_of
 from seip_addon.core.stability.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
 from seip_addon.core.stability.pose_study import StudySettings, pose_rows, pose_study, pose_warnings
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
@@ -84,6 +85,20 @@ def test_a_sensor_leaves_the_object_that_it_would_be_in():
     assert out_of_objects(draws, where, [post])[0].shift[:, 0, 0].tolist() == [0.0, 0.2]
 
 
+def test_no_drawn_pose_of_a_site_is_inside_an_object(placed):
+    site, _ = placed
+    poses = np.array([0, 5])
+    at = site.candidates.xyz[poses]
+    walls = [Mesh("wall", prism((x + 0.6, y), 0.5, 9.0)) for x, y, _ in at]
+    free, _ = draws_for(around(site), poses, PoseErrors(), 50, 0)
+    kept_out, blocked = draws_for(replace(around(site), objects=walls), poses, PoseErrors(), 50, 0)
+    away = np.hypot(*np.moveaxis((free.shift - [0.6, 0.0, 0.0])[..., :2], 2, 0))
+    assert blocked[away < 0.49].all()
+    assert not blocked[away > 0.5].any()
+    assert blocked.any()
+    assert (kept_out.shift[blocked] != free.shift[blocked]).any(axis=1).all()
+
+
 @pytest.mark.parametrize("wrong", [{"position": -1.0}, {"tilt": 2.0}, {"yaw": math.nan}])
 def test_errors_that_cannot_be_meant_are_refused(wrong):
     with pytest.raises(SeipError, match="error of"):
@@ -104,6 +119,16 @@ def test_few_draws_leave_an_end_open():
     assert quantile_of(np.arange(20.0), 0.05).low == -math.inf
     assert quantile_of(np.arange(20.0), 0.95).high == math.inf
     assert math.isfinite(quantile_of(np.arange(500.0), 0.05).low)
+
+
+def test_a_gain_is_in_its_interval_as_often_as_is_said():
+    rng, hits = np.random.default_rng(0), 0
+    for _ in range(120):
+        others = rng.standard_normal(300)
+        found = quantile_gain(others + 0.1 + 0.02 * rng.standard_normal(300), others, 0.05)
+        hits += found.low <= 0.1 <= found.high
+    assert hits / 120 > 0.88
+    assert quantile_gain(others, others, 0.05).in_words() == "0.00% [0.00%, 0.00%]"
 
 
 @given(st.lists(st.floats(-5, 5), min_size=2, max_size=40))

@@ -123,6 +123,18 @@ def test_no_placement_is_better_where_branches_are_many(risk, count):
     assert answer.gap == 0
 
 
+@pytest.mark.parametrize("risk", [risk for risk in RISKS if risk.seen_by == 1])
+def test_without_time_the_bound_still_holds(risk, monkeypatch):
+    monkeypatch.setattr("seip_addon.core.stability.robust_placement.LEAST_SECONDS", 1e-6)
+    for seed in range(4):
+        problem, views = crowd(seed, 4)
+        answer = finish(solve_robust(problem, pack(views), risk, time_limit=1e-6)).placement
+        best = reached_at_most(problem, views, risk)
+        assert answer.objective <= best + 1e-9
+        assert answer.bound >= best - 1e-9
+        assert answer.status == "optimal" or any("too short" in note for note in answer.notes)
+
+
 class Branches:
     """A clock that runs out after so many branches."""
 
