@@ -23,7 +23,7 @@ import bpy
 
 from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem
+from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem, with_count
 from seip_addon.core.pictures.stability_traffic_charts import save_promise_chart, save_time_map
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.stability.traffic_instants import check_runs, spread_instants
@@ -120,7 +120,12 @@ def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: arg
     )
     weighed = ("targets weigh as many seconds as road users are there",) if options.weights_from_traffic else ()
     noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
-    return Plan(goal, noted, None, deploy(layout.site, layout.models, surveyed.grid.visible, placement.chosen))
+    return Plan(
+        with_count(goal, layout.site),
+        noted,
+        None,
+        deploy(layout.site, layout.models, surveyed.grid.visible, placement.chosen),
+    )
 
 
 def _in_words(study: TrafficStudy, plan: Plan) -> str:

@@ -22,14 +22,20 @@ from .core.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
 from .core.datasets import FORMATS, SPLITS
 from .core.goal import DEFAULT_COUNT, Goal
 from .core.recording import RecordingSettings
+from .core.robust_plan import Precaution
 from .core.scans import ScanSettings
 from .core.scene_geometry import DEFAULT_WEIGHT
+from .core.stability.pose_errors import STEEPEST, WIDEST, PoseErrors
+from .core.stability.risk import Risk
 from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from .core.survey import SurveySettings
 from .core.traffic.source import TrafficFiles
 from .core.visibility.grid import VisibilitySettings
 from .preferences import catalogue_files
 from .scene import contract, roles
+
+TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
+"""Share of the scenarios, the worst ones, that count, by objective."""
 
 _LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
 _TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _LAYOUT.tilts)
@@ -311,6 +317,42 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     min_distance: FloatProperty(
         name="Least Distance", description="Between two sensors", unit="LENGTH", default=0.0, min=0.0
     )
+    objective: EnumProperty(
+        name="Place for",
+        description="Whether the placement trusts the map, or is chosen for what may go wrong",
+        items=(
+            ("PLANNED", "Poses as Planned", "The coverage of sensors that hang just where they should"),
+            ("EXPECTED", "The Average", "Coverage on average over poses that err"),
+            ("CVAR", "The Worst Quarter", "Coverage on average over the worst quarter of poses that err"),
+            ("WORST", "The Worst Case", "Coverage in the worst of the poses that were tried"),
+        ),
+    )
+    position_error: FloatProperty(
+        name="Position Error",
+        description="Standard deviation of x, of y and of the height",
+        unit="LENGTH",
+        default=PoseErrors().position,
+        min=0.0,
+        max=WIDEST,
+    )
+    tilt_error: FloatProperty(
+        name="Tilt Error",
+        description="Standard deviation of yaw, of pitch and of roll",
+        subtype="ANGLE",
+        default=PoseErrors().tilt,
+        min=0.0,
+        max=STEEPEST,
+    )
+    seen_by: IntProperty(name="Seen by", description="Sensors that must see a target", default=1, min=1, max=8)
+    failure: EnumProperty(
+        name="A Sensor Fails",
+        description="Whether coverage is counted after one of the sensors has failed",
+        items=(
+            ("none", "None", "All of them work"),
+            ("worst", "The Most Important", "The one that is missed most has failed"),
+            ("mean", "Any", "On average over all of them"),
+        ),
+    )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
     position: StringProperty(
@@ -336,6 +378,20 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             forbidden=tuple(one.name for one in self.rules if one.rule == "FORBIDDEN"),
             mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
         )
+
+    def precaution(self) -> Precaution | None:
+        """Return what the placement is to stand, None where it trusts the map.
+
+        Raises
+        ------
+        SeipError
+            It makes no sense.
+        """
+        if self.objective == "PLANNED":
+            return None
+        position, tilt = _written(self.position_error), _written(self.tilt_error)
+        risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
+        return Precaution(risk, PoseErrors(position, position, tilt, tilt))
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

@@ -156,7 +156,7 @@ def placement_problem(
         mandatory=groups[:, candidates.position_of],
         mandatory_names=np.concatenate((candidates.mandatory_name, np.array(goal.mandatory, dtype=np.str_))),
         forbidden=forbidden[candidates.position_of],
-        count=_with_count(goal, site).count,
+        count=with_count(goal, site).count,
         budget=goal.budget,
         min_distance=goal.min_distance,
     )
@@ -211,10 +211,10 @@ def make_plan(  # a place, what is asked of it, and how hard to try
     else:
         placement = yield from solve(problem, solver=solver, time_limit=time_limit)
         greedy = solve_greedy(problem)
-    return Plan(_with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
+    return Plan(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
 
 
-def _with_count(goal: Goal, site: Site) -> Goal:
+def with_count(goal: Goal, site: Site) -> Goal:
     """Fill in the number of sensors where nothing is asked for that limits it."""
     free = goal.count is None and goal.budget is None and goal.coverage is None
     return replace(goal, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else goal

@@ -16,6 +16,7 @@ from ..core.errors import SeipError
 from ..core.goal import Goal, check_goal
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
+from ..core.robust_plan import Precaution, check_precaution, place_robustly
 from ..core.storage import digest
 from ..core.survey import Circumstances, place, record_of
 from ..scene.write import write_result
@@ -30,7 +31,8 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
         """Read the scene where it has changed, and state the goal."""
-        return _placed(state.survey(scene), scene.seip.goal.goal())
+        asked = scene.seip.goal
+        return _placed(state.survey(scene), asked.goal(), asked.precaution())
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
@@ -52,12 +54,19 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
         self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
 
-def _placed(surveying: Generator[Progress, None, state.Held], goal: Goal) -> Generator[Progress, None, state.Held]:
+def _placed(
+    surveying: Generator[Progress, None, state.Held], goal: Goal, precaution: Precaution | None
+) -> Generator[Progress, None, state.Held]:
+    if precaution is not None:
+        check_precaution(goal)
     known = yield from surveying
     check_goal(known.layout.site, known.layout.models, goal)
     grid = yield from state.seen(known)
     began = time.perf_counter()
-    known.plan = yield from place(known.layout, grid, goal)
+    if precaution is None:
+        known.plan = yield from place(known.layout, grid, goal)
+    else:
+        known.plan = (yield from place_robustly(known.layout, grid, goal, precaution)).plan
     known.durations["placement"] = time.perf_counter() - began
     return known
 

@@ -64,6 +64,28 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
             _draw_answer(layout, state.record_of(scene.seip.result.record), state.doubt(scene))
 
 
+class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
+    """What the placement is to stand."""
+
+    bl_idname = "SEIP_PT_placement_precaution"
+    bl_parent_id = "SEIP_PT_placement"
+    bl_label = "What May Go Wrong"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw what the placement is chosen for."""
+        goal = context.scene.seip.goal
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(goal, "objective")
+        if goal.objective == "PLANNED":
+            return
+        for name in ("position_error", "tilt_error", "seen_by", "failure"):
+            layout.prop(goal, name)
+        draw_sentence(layout, "This looks from every candidate in twenty draws and takes minutes.", icon="INFO")
+
+
 class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
     """Positions that must, and must not, carry a sensor."""
 
@@ -151,4 +173,10 @@ def certificate(record: Record) -> str:
     return f"Within {gap} of the {best} placement possible among these candidates."
 
 
-CLASSES = (SEIP_UL_rules, SEIP_PT_placement, SEIP_PT_placement_rules, SEIP_PT_placement_solver)
+CLASSES = (
+    SEIP_UL_rules,
+    SEIP_PT_placement,
+    SEIP_PT_placement_precaution,
+    SEIP_PT_placement_rules,
+    SEIP_PT_placement_solver,
+)

@@ -1,9 +1,10 @@
 """From a click to placed sensors: operators do what the batch command does, and what they find outlives the file."""
 
 import json
+import math
 from pathlib import Path
 
-from headless import place
+from headless import place, robust
 
 import bpy
 import pytest
@@ -190,3 +191,30 @@ def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
     junction.seip.result.folder = str(tmp_path / "file" / "out")
     with pytest.raises(RuntimeError, match="choose a folder that you may write to"):
         bpy.ops.seip.export_result()
+
+
+@pytest.mark.parametrize("objective", ["EXPECTED", "CVAR", "WORST"])
+def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, objective):
+    goal = junction.seip.goal
+    goal.objective, goal.position_error, goal.tilt_error, goal.failure = objective, 0.5, math.radians(3), "mean"
+    types = junction.seip.survey
+    types.grid, types.spacing = 8.0, 25.0
+    bpy.ops.seip.list_sensor_types()
+    for one in types.types:
+        one.use = one.name == "type1"
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    panel = json.loads(junction.seip.result.record)
+    options = ["--heights", "8", "--grid", "8", "--spacing", "25", "--count", "2", "--no-render", "--sensor", "type1"]
+    wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failure", "mean", "--objective", objective.lower()]
+    robust.main([str(SCENE), *options, *wrong, "-o", str(tmp_path)])
+    batch = load_placement_record(tmp_path / "placement.json")
+    for one in (panel, batch):
+        one["settings"].pop("render")
+    assert comparable(panel) == comparable(batch)
+    assert any("in nineteen of twenty" in note for note in panel["notes"])
+
+
+def test_a_coverage_to_reach_allows_no_precaution(junction):
+    junction.seip.goal.limit, junction.seip.goal.objective = "COVERAGE", "WORST"
+    with pytest.raises(RuntimeError, match="needs a number of sensors or a budget"):
+        bpy.ops.seip.solve_placement()
