@@ -120,7 +120,8 @@ def set_stage(options: argparse.Namespace) -> Stage:
         time_limit=options.time_limit,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
-    studio = Studio(static_scene(surveyed.layout.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
+    scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
+    studio = Studio(static_scene(surveyed.layout.geometry), scans, surveyed.layout.site.name)
     return Stage(surveyed, traffic, configurations, studio)
 
 
