@@ -253,9 +253,11 @@ class LimitsStudy:
     ----------
     name : str
         Of the site.
+    frames : int
+        Test frames of each trial at home.
     spreads : tuple of Spread
     curves : tuple of Curve
-    worst : Mapping of str to int
+    worst : mapping of str to int
         For each configuration the sensor, by its number from 0, whose loss costs most: it is the one to be
         misplaced, misturned and late.
     foreign : tuple of Foreign
@@ -267,6 +269,7 @@ class LimitsStudy:
     """
 
     name: str
+    frames: int
     spreads: tuple[Spread, ...]
     curves: tuple[Curve, ...]
     worst: Mapping[str, int]
@@ -325,6 +328,7 @@ def limits_study(
     yield desk.progress("tried")
     return LimitsStudy(
         home.studio.site,
+        sum(len(run.times) for run in home.runs),
         tuple(spreads),
         tuple(curves),
         worst,
