@@ -120,8 +120,9 @@ def test_what_is_kept_is_what_was_found(store, tmp_path):
         assert one.average_precision == other.average_precision
         np.testing.assert_array_equal(one.wanted.distance, other.wanted.distance)
         np.testing.assert_array_equal(one.detections.distance, other.detections.distance)
-    # The road users drive along y = 2 within a square of 60 m: at 1 s the car is at x = -10, the van at -20.
-    assert sorted(made.from_border.wanted.distance.tolist()) == pytest.approx([10.0, 15.0, 20.0, 25.0])
+    # In a square of 60 m: car and van at x = -10 and -20 on y = 2, 5 m farther in the second frame; four stand still.
+    drive, stand = [20, 10, 25, 15], 2 * [6, 18, 20, 18]
+    assert sorted(made.from_border.wanted.distance.tolist()) == pytest.approx(sorted(drive + stand))
 
 
 def test_there_is_a_row_for_each_question(study):
