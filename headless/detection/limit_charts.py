@@ -14,7 +14,7 @@ from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 from seip_addon.core.pictures.study_charts import MARKS, SERIES
 
-from .disturbances import Capped
+from .disturbances import Capped, Lost
 from .limits_study import Curve, Foreign, LimitsStudy
 
 ACROSS = 4
@@ -83,10 +83,12 @@ def _draw(panel: Axes, curves: Sequence[Curve], rows: Sequence[int]) -> None:
         value = np.array([one.value for one in estimates])
         ends = np.array([(one.low, one.high) for one in estimates]).T
         reach = np.nan_to_num(np.abs(ends - value), posinf=0.0)
+        each = isinstance(curve.points[0].disturbance, Lost)  # sensors in turn, none of which is more than another
         style = {"color": SERIES[row % len(SERIES)], "marker": MARKS[row % len(MARKS)], "markersize": 5}
+        style["linestyle"] = "none" if each else "-"
         panel.errorbar(at, value, reach, label=curve.configuration, capsize=2.5, linewidth=1.2, **style)  # type: ignore[arg-type]  # colours and marks are text, sizes are not
         begins = curve.begins
-        if begins is not None:
+        if begins is not None and not each:
             place = 1 + sizes.index(begins.disturbance.size) + 0.06 * (row - 1)
             panel.axvline(place, color=SERIES[row % len(SERIES)], linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
     panel.set_xticks(range(len(sizes) + 1), ["none", *(f"{size:g}" for size in sizes)], fontsize=8)

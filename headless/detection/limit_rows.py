@@ -80,11 +80,11 @@ def _of_curve(curve: Curve, study: LimitsStudy) -> Row:
     wrong = curve.points[0].disturbance
     whose = ""
     if isinstance(wrong, OfOneSensor) and not isinstance(wrong, Lost):
-        whose = f" of S{wrong.sensor + 1}, whose loss costs most,"
+        whose = f" (S{wrong.sensor + 1}, whose loss costs most)"
     detectors = len(study.spreads[0].values)
     return Row(
         METHOD,
-        f"{curve.name}{whose} with {curve.configuration}".replace(", with", " with"),
+        f"{curve.name}{whose} with {curve.configuration}",
         _each_loss(curve) if isinstance(wrong, Lost) else _begins(curve),
         f"{detectors} detectors on the same {study.frames} frames with and without; 95 % interval of the paired "
         "difference, over blocks of traffic (bootstrap) and trainings (Student); half the resamples "

@@ -129,7 +129,7 @@ def test_there_is_a_row_for_each_question(study):
     rows = limit_rows(study)
     regimes = [row.regime for row in rows]
     assert len(set(regimes)) == len(regimes)
-    for words in ("seeds", "rain or fog", "yaw wrong of S", "sensor lost with", "learnt from type2", "away", "denser"):
+    for words in ("seeds", "rain or fog", "yaw wrong (S", "sensor lost with", "learnt from type2", "away", "denser"):
         assert any(words in regime for regime in regimes), words
     for words in ("few returns", "border of the region", "over-full", "padded with zeros"):
         assert any(words in regime for regime in regimes), words
