@@ -9,7 +9,7 @@ than the interval of the difference, pair by pair, over traffic and trainings.
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from seip_addon.core.stability.estimates import Estimate
 
 from .average_precision import Evaluation
 from .breakdown import ALONG_DISTANCE, ALONG_POINTS, Bin, false_by, recall_by
+from .case_study import Pupil, padded, pupils
 from .detector import Detector
 from .disturbances import (
     Capped,
@@ -36,6 +37,7 @@ from .disturbances import (
 from .paired_change import DRAWS, Sampled, change, level
 from .pillars import Filling, filling
 from .recordings import Configuration
+from .settings import NetworkSettings, TrainingSettings
 from .trials import Entrant, Ground, Trial, trials
 
 Series = tuple[Disturbance, ...]
@@ -243,6 +245,72 @@ class Candidates:
     by_type: Mapping[str, Entrant]
     padded: tuple[Entrant, ...] = ()
     unpadded: tuple[Entrant, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Who has to be trained before the study.
+
+    Parameters
+    ----------
+    alike : tuple of Pupil
+        As an evaluation trains them: in its folder they need not be trained again.
+    by_type : dict of str to Pupil
+        Those who learn from one sensor type alone.
+    padded : tuple of Pupil
+        Those with padded pillars; none where padding is not to be tried.
+    """
+
+    alike: tuple[Pupil, ...]
+    by_type: dict[str, Pupil]
+    padded: tuple[Pupil, ...]
+
+    @property
+    def pupils(self) -> tuple[Pupil, ...]:
+        """All, as `case_study.train_all` takes them."""
+        return (*self.alike, *self.by_type.values(), *self.padded)
+
+    def candidates(self, detectors: Sequence[Detector]) -> Candidates:
+        """Return what the study tries, from the detectors of all pupils in their order."""
+        trained = {
+            pupil.name: Entrant(pupil.name, detector) for pupil, detector in zip(self.pupils, detectors, strict=True)
+        }
+        return Candidates(
+            entrants=tuple(trained[pupil.name] for pupil in self.alike),
+            by_type={sensor: trained[pupil.name] for sensor, pupil in self.by_type.items()},
+            padded=tuple(trained[pupil.name] for pupil in self.padded),
+            unpadded=tuple(trained[pupil.name] for pupil in self.alike[: len(self.padded)]),
+        )
+
+
+def course(
+    configurations: Sequence[Configuration],
+    network: NetworkSettings,
+    training: TrainingSettings,
+    *,
+    seeds: int,
+    padding: bool,
+) -> Course:
+    """Return who has to be trained; from one type's clouds for as large a part of the steps as they are of all clouds.
+
+    Parameters
+    ----------
+    configurations : sequence of Configuration
+        All that an evaluation looks at.
+    network : NetworkSettings
+    training : TrainingSettings
+        Of those who learn from all types.
+    seeds : int
+    padding : bool
+        Whether the ablation is wanted: each pupil again, with padded pillars.
+    """
+    alike = pupils(configurations, network, training, seeds=seeds, separate=False)
+    by_type = {}
+    for sensor in dict.fromkeys(one.case.sensor for one in configurations):
+        own = tuple(one for one in configurations if one.case.sensor == sensor)
+        steps = max(1, training.steps * len(own) // len(configurations))
+        by_type[sensor] = Pupil(f"detector-{sensor}", own, network, replace(training, steps=steps))
+    return Course(tuple(alike), by_type, tuple(padded(alike)) if padding else ())
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from headless.detection.detector import Detector
 from headless.detection.disturbances import Disturbance, DropOff, Lost, Misturned
 from headless.detection.limit_charts import save_foreign_chart, save_limits_chart
 from headless.detection.limit_rows import limit_rows, points_in_words
-from headless.detection.limits_study import Candidates, Curve, Elsewhere, Point, limits_study
+from headless.detection.limits_study import Candidates, Curve, Elsewhere, Point, course, limits_study
 from headless.detection.pillars import grid_over
 from headless.detection.recordings import Studio, TrafficRun
-from headless.detection.settings import NetworkSettings
+from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.trials import Entrant, Ground, trials
 
 import numpy as np
@@ -142,6 +142,26 @@ def test_charts_are_drawn(study, tmp_path):
     save_foreign_chart(tmp_path / "foreign.png", study)
     assert imread(tmp_path / "limits.png").shape[1] > 1500
     assert imread(tmp_path / "foreign.png").shape[1] > 1000
+
+
+def test_a_course_trains_all_that_the_study_tries():
+    configurations = [
+        SimpleNamespace(name=f"{count} × {sensor}", case=SimpleNamespace(sensor=sensor, count=count))
+        for sensor in ("type1", "type2", "type3")
+        for count in (1, 2)
+    ]
+    whole = course(configurations, NETWORK, TrainingSettings(steps=1800), seeds=3, padding=True)
+    names = [pupil.name for pupil in whole.pupils]
+    by_type = [f"detector-{sensor}" for sensor in ("type1", "type2", "type3")]
+    assert names == [f"detector-{seed}" for seed in (1, 2, 3)] + by_type + [
+        f"detector-{seed}-padded" for seed in (1, 2, 3)
+    ]
+    assert {pupil.training.steps for pupil in whole.by_type.values()} == {600}
+    assert [one.name for one in whole.by_type["type2"].configurations] == ["1 × type2", "2 × type2"]
+    candidates = whole.candidates([entrant(1).detector] * len(names))
+    assert [one.name for one in candidates.entrants] == names[:3] == [one.name for one in candidates.unpadded]
+    assert [one.name for one in candidates.padded] == names[6:]
+    assert not course(configurations, NETWORK, TrainingSettings(), seeds=1, padding=False).padded
 
 
 def curve(*highs, halves=None):
