@@ -33,7 +33,8 @@ _CALIBRATION = "one cloud does not tell: calibrate each sensor to better than th
 ANSWERS: Mapping[str, str] = {
     RangeNoise.name: _CATALOGUE.format("range_noise_std_m"),
     DropOff.name: _CATALOGUE.format("dropoff_general_rate"),
-    Rain.name: "nothing notices: give attenuation_per_m the weather's extinction there and back, and evaluate again",
+    Rain.name: "nothing notices: drops near the sensors harm first, not the light lost, so have the sensors filter them; "
+    "for the light give attenuation_per_m the extinction there and back, and evaluate again",
     Misplaced.name: _CALIBRATION,
     Misturned.name: _CALIBRATION,
     Mistilted.name: _CALIBRATION,

@@ -43,7 +43,7 @@ def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
         return ""
     return (
         f"the detector has learnt from clouds of {' and '.join(learnt)}, not of {' and '.join(foreign)}: "
-        "it will find fewer road users than one that has, so train it on clouds of these types too"
+        "test it on clouds of these types before you trust it with them, or train it on them too"
     )
 
 
@@ -52,8 +52,8 @@ def _of_site(detector: Detector, site: str) -> str:
     if not sites or not site or site in sites:
         return ""
     return (
-        f"the detector has learnt at {' and '.join(sites)}, not at {site}: it will find fewer road users than one "
-        "that has, so train it on traffic of this site too"
+        f"the detector has learnt at {' and '.join(sites)}, not at {site}: where the road rises and falls otherwise "
+        "it may miss most road users, so train it on traffic of this site too"
     )
 
 
