@@ -30,11 +30,14 @@ METHOD = "detector"
 
 _CATALOGUE = "the catalogue's {} is what scans and trainings go by: give your sensor's own, and evaluate again"
 _CALIBRATION = "one cloud does not tell: calibrate each sensor to better than that, and again after work on its pole"
+_RAIN = (
+    "nothing notices: drops near the sensors harm first, not the light lost, so have the sensors filter them; for the "
+    "light give attenuation_per_m the extinction there and back, and evaluate again"
+)
 ANSWERS: Mapping[str, str] = {
     RangeNoise.name: _CATALOGUE.format("range_noise_std_m"),
     DropOff.name: _CATALOGUE.format("dropoff_general_rate"),
-    Rain.name: "nothing notices: drops near the sensors harm first, not the light lost, so have the sensors filter them; "
-    "for the light give attenuation_per_m the extinction there and back, and evaluate again",
+    Rain.name: _RAIN,
     Misplaced.name: _CALIBRATION,
     Misturned.name: _CALIBRATION,
     Mistilted.name: _CALIBRATION,
