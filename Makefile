@@ -57,6 +57,9 @@ traffic: sumo
 	for seed in 1 2 3 4 5 6; do \
 	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 550 --pedestrians 120 \
 	    --duration 75 --seed $$seed -o scenes/junction_traffic/run-$$seed.npz || exit; done
+	for seed in 11 13; do \
+	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 1100 --pedestrians 120 \
+	    --duration 75 --seed $$seed -o scenes/junction_traffic_dense/run-$$seed.npz || exit; done
 	for seed in 1 2; do \
 	  $(PY) -m headless.traffic scenes/corridor.blend --simulate scenes/corridor.xodr --flow 450 --pedestrians 100 \
 	    --duration 75 --seed $$seed -o scenes/corridor_traffic/run-$$seed.npz || exit; done

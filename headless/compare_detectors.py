@@ -95,7 +95,7 @@ def _lesson(
     stage: evaluate.Stage, pupil: case_study.Pupil, device: str
 ) -> Generator[Progress, None, tuple[Detector, float]]:
     """Simulate what a detector learns from, and train it; return it with the processor's seconds of the training."""
-    studio = Studio(stage.studio.static, stage.studio.settings)
+    studio = Studio(stage.studio.static, stage.studio.settings, stage.studio.site)
     grid = grid_of(stage.surveyed.layout.geometry, pupil.network.pillar)
     lessons = yield from case_study.simulate_lessons(
         studio, pupil.configurations, stage.traffic, grid, pupil.network.most_points

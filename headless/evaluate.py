@@ -63,6 +63,9 @@ def main(argv: list[str]) -> None:
         pupils += case_study.padded(pupils)
     trained = watch.run("training", case_study.train_all(pupils, lessons, folder, device=options.device))
     detectors = [one.detector for one in trained]
+    for name, sentences in case_study.foreseen(studio, pupils, detectors, stage.traffic).items():
+        for sentence in sentences:
+            session.say(f"warning: {name}: {sentence}")
     judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, stage.traffic))
     claims = judge([judgement.trial for judgement in judgements])
 
@@ -121,7 +124,8 @@ def set_stage(options: argparse.Namespace) -> Stage:
         time_limit=options.time_limit,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
-    studio = Studio(static_scene(surveyed.layout.geometry), ScanSettings(seed=options.scan_seed, engine=options.engine))
+    scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
+    studio = Studio(static_scene(surveyed.layout.geometry), scans, surveyed.layout.site.name)
     return Stage(surveyed, traffic, configurations, studio)
 
 

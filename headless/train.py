@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import grid_of
 from headless.detection.settings import GROUPS, NetworkSettings, TrainingSettings
+from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
 
 import bpy
@@ -37,6 +39,7 @@ from shapely.geometry.base import BaseGeometry
 from seip_addon.core.pictures.detection_charts import save_training_chart
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.run_folder import load_manifest
+from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.storage import save_json
 from seip_addon.scene.read import read_scene
 
@@ -63,7 +66,10 @@ def main(argv: list[str]) -> None:
 
     path = options.output / "detector.pt"
     learning, aside = (
-        [SampledRecording(recording, grid, network.most_points) for recording in splits[name]]
+        [
+            SampledRecording(replace(recording, site=geometry.name), grid, network.most_points)
+            for recording in splits[name]
+        ]
         for name in ("train", "validation")
     )
     steps = train(learning, aside, network, training, device=options.device, store=path)
@@ -77,16 +83,19 @@ def main(argv: list[str]) -> None:
         options.output / "training.png", trained.curve.loss, trained.curve.validation, f"{geometry.name}: training"
     )
     if options.test:
-        figures = _evaluated(trained.detector, options.test, geometry.region)
+        figures = _evaluated(trained.detector, options.test, geometry)
         save_json(options.output / "evaluation.json", figures)
     session.say(f"written to {options.output}/")
 
 
-def _evaluated(detector: Detector, runs: Sequence[Path], region: BaseGeometry) -> dict[str, dict[str, float]]:
-    """Return the figures of each run, and say them."""
+def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry) -> dict[str, dict[str, float]]:
+    """Return the figures of each run, and say them, with what speaks against trusting them."""
     figures = {}
     for folder in runs:
-        results = _results(detector, folder, region)
+        recording = recording_of(folder, geometry.name)
+        for sentence in suitability_warnings(detector, recording.sensors, recording.site, recording.frames[0].points):
+            session.say(f"warning: {folder}: {sentence}")
+        results = _results(detector, folder, geometry.region)
         figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
         words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
         session.say(f"{folder}: {words}")

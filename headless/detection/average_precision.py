@@ -169,17 +169,26 @@ def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | 
     seed : int
         The same seed draws the same blocks.
     """
-    count = int(evaluation.block.max()) + 1
-    if count < FEWEST_BLOCKS:
+    if int(evaluation.block.max()) + 1 < FEWEST_BLOCKS:
         return None
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
+    return percentiles(resampled_average_precisions(evaluation, seed))
+
+
+def resampled_average_precisions(evaluation: Evaluation, seed: int, resamples: int = RESAMPLES) -> Float:
+    """Return the average precision in resamples of the blocks of traffic, (resamples,).
+
+    Two evaluations of the same frames draw the same blocks with the same seed:
+    the differences of what is returned are those of pairs.
+    """
+    count = int(evaluation.block.max()) + 1
+    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=resamples)
     of_detection = evaluation.block[evaluation.detections.frame]
     of_wanted = np.bincount(evaluation.block[evaluation.wanted.frame], minlength=count)
     areas = [
         _areas(evaluation, times[:, of_detection], times @ of_wanted)
-        for times in np.split(drawn, range(AT_ONCE, RESAMPLES, AT_ONCE))
+        for times in np.split(drawn, range(AT_ONCE, resamples, AT_ONCE))
     ]
-    return percentiles(np.concatenate(areas))
+    return np.concatenate(areas)
 
 
 def balanced_score(evaluation: Evaluation) -> float:

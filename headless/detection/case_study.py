@@ -38,6 +38,7 @@ from .matching import Rule
 from .pillars import PillarGrid
 from .recordings import Configuration, Studio, TrafficRun
 from .settings import GROUPS, NetworkSettings, TrainingSettings
+from .suitability import suitability_warnings
 from .training import Trained, deterministic, train
 
 RULES = {
@@ -294,6 +295,19 @@ def judge_all(
                         results.setdefault((pupil.name, configuration.name), []).append(result)
     yield Progress(total, total, "judged")
     return [judgement for pupil in pupils for judgement in _judgements(pupil, tried, judged)]
+
+
+def foreseen(
+    studio: Studio, pupils: Sequence[Pupil], detectors: Sequence[Detector], traffic: Traffic
+) -> dict[str, tuple[str, ...]]:
+    """Return what speaks against trusting the detectors with each configuration, by its name, in sentences."""
+    found: dict[str, dict[str, None]] = {}
+    frames = {one.name: studio.frame(one, traffic.test[0], 0) for pupil in pupils for one in pupil.configurations}
+    for pupil, detector in zip(pupils, detectors, strict=True):
+        for one in pupil.configurations:
+            sentences = suitability_warnings(detector, [one.case.sensor], studio.site, frames[one.name].points)
+            found.setdefault(one.name, {}).update(dict.fromkeys(sentences))
+    return {name: tuple(sentences) for name, sentences in found.items()}
 
 
 def _judgements(

@@ -10,7 +10,7 @@ import threading
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,6 +31,22 @@ SCHEMA, VERSION = "seip.detector", 1
 _SEEDED = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
 
 
+@dataclass(frozen=True)
+class Experience:
+    """What a detector has learnt from, as far as it is known.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Catalogue keys of the types whose clouds it has seen, in alphabetical order; none where it is not known.
+    sites : tuple of str
+        Names of the scenes.
+    """
+
+    sensors: tuple[str, ...] = ()
+    sites: tuple[str, ...] = ()
+
+
 class Detector(nn.Module):
     """PointPillars on a grid.
 
@@ -41,11 +57,15 @@ class Detector(nn.Module):
         That of the whole extent.
     seed : int
         Of the weights it begins with.
+    experience : Experience
+        What it has learnt from, or is to learn from.
     """
 
-    def __init__(self, settings: NetworkSettings, grid: PillarGrid, seed: int = 0) -> None:
+    def __init__(
+        self, settings: NetworkSettings, grid: PillarGrid, seed: int = 0, experience: Experience = Experience()
+    ) -> None:
         super().__init__()
-        self.settings, self.grid = settings, grid
+        self.settings, self.grid, self.experience = settings, grid, experience
         with _SEEDED, torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.feature_map = FeatureMap(settings)
@@ -75,8 +95,12 @@ class Detector(nn.Module):
         save_state(path, {**self.description(), "weights": self.state_dict()})
 
     def description(self) -> dict[str, Any]:
-        """Return settings and grid as plain values."""
-        return {"settings": _plain(asdict(self.settings)), "grid": asdict(self.grid)}
+        """Return settings, grid and what it has learnt from as plain values."""
+        return {
+            "settings": _plain(asdict(self.settings)),
+            "grid": asdict(self.grid),
+            "experience": _plain(asdict(self.experience)),
+        }
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], device: str = "cpu") -> Detector:
@@ -91,9 +115,38 @@ class Detector(nn.Module):
         with _fault_of(path):
             settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
             grid = PillarGrid(**state["grid"])
-            detector = cls(settings, grid)
+            known = state.get("experience", {})
+            experience = Experience(**{name: tuple(values) for name, values in known.items()})
+            detector = cls(settings, grid, experience=experience)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
+
+
+def keeping_at_most(detector: Detector, points: int) -> Detector:
+    """Return the detector with pillars that keep so many points at most, whatever it has learnt with."""
+    return _with_the_same_weights(detector, replace(detector.settings, most_points=points), detector.grid)
+
+
+def on_grid(detector: Detector, grid: PillarGrid) -> Detector:
+    """Return the detector on the grid of another site, of pillars as large as those that it has learnt with.
+
+    Raises
+    ------
+    SeipError
+        They are not.
+    """
+    if grid.pillar != detector.grid.pillar:
+        raise SeipError(
+            f"a detector that has learnt with pillars of {detector.grid.pillar:g} m sees nothing in those of "
+            f"{grid.pillar:g} m: lay the grid with its own"
+        )
+    return _with_the_same_weights(detector, detector.settings, grid)
+
+
+def _with_the_same_weights(detector: Detector, settings: NetworkSettings, grid: PillarGrid) -> Detector:
+    other = Detector(settings, grid, experience=detector.experience)
+    other.load_state_dict(detector.state_dict())
+    return other.to(detector.device).eval()
 
 
 def check_device(device: str) -> None:

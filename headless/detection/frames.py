@@ -16,6 +16,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.scans.frame import Frame
 from seip_addon.core.scans.run_folder import frame_path, load_manifest
 
+from .detector import Experience
 from .pillars import PillarGrid, fill_pillars
 from .settings import CLASS_OF
 
@@ -32,15 +33,21 @@ class Recording:
         What tells the run of traffic from all others: the source of its trajectories, with its seed.
     frames : sequence of Frame
         In memory, or read when they are asked for.
+    sensors : tuple of str
+        Catalogue keys of the sensors' types, where they are known.
+    site : str
+        The scene's name, where it is known.
     """
 
     name: str
     traffic: str
     frames: Sequence[Frame]
+    sensors: tuple[str, ...] = ()
+    site: str = ""
 
 
-def recording_of(folder: Path) -> Recording:
-    """Return what a folder of scans holds; its frames are read when they are asked for.
+def recording_of(folder: Path, site: str = "") -> Recording:
+    """Return what a folder of scans of a site holds; its frames are read when they are asked for.
 
     Raises
     ------
@@ -51,7 +58,8 @@ def recording_of(folder: Path) -> Recording:
     if not record["complete"]:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
     frames = FrameFiles([frame_path(folder, number) for number in range(len(record["frames"]))])
-    return Recording(name=str(folder), traffic=str(record["trajectories"]["source"]), frames=frames)
+    sensors = tuple(str(sensor["sensor"]) for sensor in record["sensors"])
+    return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors, site)
 
 
 class FrameFiles(Sequence[Frame]):
@@ -156,6 +164,14 @@ def spread(recordings: Sequence[SampledRecording], most: int) -> list[Sample]:
         count = min(each, len(recording))
         chosen += [recording.get((2 * part + 1) * len(recording) // (2 * count)) for part in range(count)]
     return chosen
+
+
+def experience_of(recordings: Sequence[Recording]) -> Experience:
+    """Return of which sensor types and sites recordings are."""
+    return Experience(
+        sensors=tuple(sorted({sensor for recording in recordings for sensor in recording.sensors})),
+        sites=tuple(sorted({recording.site for recording in recordings} - {""})),
+    )
 
 
 def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:

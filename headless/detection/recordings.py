@@ -89,15 +89,19 @@ class Studio:
     ----------
     static : StaticScene
     settings : ScanSettings
+    site : str
+        The scene's name.
     """
 
-    def __init__(self, static: StaticScene, settings: ScanSettings) -> None:
-        self.static, self.settings = static, settings
+    def __init__(self, static: StaticScene, settings: ScanSettings, site: str = "") -> None:
+        self.static, self.settings, self.site = static, settings, site
         self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
 
     def record(self, configuration: Configuration, run: TrafficRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
-        return Recording(f"{configuration.name} in {run.name}", run.key, _Frames(self, configuration, run))
+        frames = _Frames(self, configuration, run)
+        name = f"{configuration.name} in {run.name}"
+        return Recording(name, run.key, frames, (configuration.case.sensor,), self.site)
 
     def frame(self, configuration: Configuration, run: TrafficRun, number: int) -> Frame:
         """Simulate a frame of a run."""

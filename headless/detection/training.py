@@ -25,7 +25,7 @@ from seip_addon.core.progress import Progress
 from .average_precision import evaluate
 from .detector import Detector, load_state, save_state
 from .frame_results import Detected, FrameResult, Truth
-from .frames import Sample, SampledRecording, drawn, require_separate, spread
+from .frames import Sample, SampledRecording, drawn, experience_of, require_separate, spread
 from .heads import Targets
 from .inference import detect
 from .matching import Rule
@@ -151,7 +151,8 @@ class _Run:
     ) -> None:
         self.settings = settings
         self.lessons, self.aside = _with_frames(recordings), _with_frames(validation)
-        self.detector = Detector(network, self.lessons[0].grid, settings.seed).to(device)
+        experience = experience_of([sampled.recording for sampled in self.lessons])
+        self.detector = Detector(network, self.lessons[0].grid, settings.seed, experience).to(device)
         self.optimiser = torch.optim.AdamW(
             self.detector.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
@@ -229,7 +230,7 @@ class _Run:
         state = load_state(path)
         earlier = state.get("training", {})
         same = (
-            {"settings": state["settings"], "grid": state["grid"]} == self.detector.description()
+            all(state[name] == self.detector.description()[name] for name in ("settings", "grid"))
             and earlier.get("settings") == asdict(self.settings)
             and earlier.get("recordings") == self._sources()
         )

@@ -9,6 +9,8 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import evaluate
+from headless.detection import suitability
+from headless.detection.detector import Detector
 
 from matplotlib.image import imread
 
@@ -53,6 +55,12 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     assert {row["frames"] for row in rows} == {"2"}
 
 
+def test_detectors_know_what_they_have_learnt_from(folder):
+    experience = Detector.load(folder / "detector-1.pt").experience
+    assert experience.sensors == ("type1",)
+    assert experience.sites == ("Four-arm signalised junction",)
+
+
 def test_the_record_says_what_was_for_what(folder):
     record = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
     names = {what: [run["name"] for run in runs] for what, runs in record["traffic"].items()}
@@ -61,10 +69,14 @@ def test_the_record_says_what_was_for_what(folder):
     assert [one["name"] for one in record["configurations"]] == ["1 × type1", "2 × type1", "4 × type1"]
 
 
-def test_an_evaluation_goes_on_and_ends_the_same(folder, tmp_path):
+def test_an_evaluation_goes_on_and_ends_the_same(folder, tmp_path, capsys, monkeypatch):
     for name in ("visibility.npz", "detector-1.pt"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
+    monkeypatch.setattr(suitability, "MOST_OVER_FULL", -1.0)  # so that every cloud is worth a warning
     run(tmp_path, "--ablation")
+    said = capsys.readouterr().out
+    assert all(f"warning: {count} × type1: " in said for count in (1, 2, 4))
+    assert "of the pillars with points have more than the 16 that are kept" in said
     for path in folder.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 import sys
 from pathlib import Path
 
@@ -71,6 +72,21 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
     assert list(figures) == [str(folder / "third")]
     assert all(0 <= value <= 1 and math.isfinite(value) for value in figures[str(folder / "third")].values())
     assert "pillars of 0.4 m" in capsys.readouterr().out
+
+
+def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
+    train.main(arguments(folder, "at-home"))
+    learnt = Detector.load(folder / "at-home" / "detector.pt").experience
+    assert "warning" not in capsys.readouterr().out
+    shutil.copytree(folder / "third", folder / "foreign")
+    manifest = folder / "foreign" / "manifest.json"
+    record = json.loads(manifest.read_text(encoding="utf-8"))
+    for sensor in record["sensors"]:
+        sensor["sensor"] = "another"
+    manifest.write_text(json.dumps(record), encoding="utf-8")
+    train.main(arguments(folder, "away", test="foreign"))
+    said = capsys.readouterr().out
+    assert f"foreign: the detector has learnt from clouds of {' and '.join(learnt.sensors)}, not of another:" in said
 
 
 def test_a_finished_training_is_not_done_again(folder):

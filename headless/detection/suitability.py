@@ -1,0 +1,68 @@
+"""What a user should know before trusting a detector with a cloud: where it is used beyond what it has learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .detector import Detector
+from .pillars import filling
+
+MOST_OVER_FULL = 0.6
+"""Share of the pillars with points that may have more than are kept: up to it no loss was told from chance.
+
+Measured on the shipped junction with four sensors of 32 channels, where pillars
+kept fewer points than they were learnt with: `disturbances.Capped`.
+"""
+
+
+def suitability_warnings(
+    detector: Detector, sensors: Sequence[str], site: str, points: NDArray[np.float32]
+) -> tuple[str, ...]:
+    """Return what speaks against using a detector, in sentences.
+
+    Parameters
+    ----------
+    detector : Detector
+    sensors : sequence of str
+        Catalogue keys of the types whose clouds it is to look at.
+    site : str
+        The scene's name; empty where it is not known.
+    points : (n, 3 or more) float32, metres
+        A cloud as it is to look at.
+    """
+    found = (_of_types(detector, sensors), _of_site(detector, site), _of_pillars(detector, points))
+    return tuple(sentence for sentence in found if sentence)
+
+
+def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
+    learnt, foreign = detector.experience.sensors, sorted(set(sensors) - set(detector.experience.sensors))
+    if not learnt or not foreign:
+        return ""
+    return (
+        f"the detector has learnt from clouds of {' and '.join(learnt)}, not of {' and '.join(foreign)}: "
+        "test it on clouds of these types before you trust it with them, or train it on them too"
+    )
+
+
+def _of_site(detector: Detector, site: str) -> str:
+    sites = detector.experience.sites
+    if not sites or not site or site in sites:
+        return ""
+    return (
+        f"the detector has learnt at {' and '.join(sites)}, not at {site}: where the road rises and falls otherwise "
+        "it may miss most road users, so train it on traffic of this site too"
+    )
+
+
+def _of_pillars(detector: Detector, points: NDArray[np.float32]) -> str:
+    most, grid = detector.settings.most_points, detector.grid
+    full = filling(points, grid, most)
+    if full.over_full <= MOST_OVER_FULL:
+        return ""
+    return (
+        f"{full.over_full:.0%} of the pillars with points have more than the {most} that are kept, "
+        f"and {full.left_out:.0%} of all points are left out: choose smaller pillars, or let them keep more"
+    )

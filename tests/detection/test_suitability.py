@@ -1,0 +1,95 @@
+"""A detector says what it has learnt from, and what speaks against using it beyond."""
+
+from headless.detection.detector import Detector, Experience, on_grid
+from headless.detection.frames import Recording, experience_of
+from headless.detection.pillars import filling, grid_over
+from headless.detection.settings import NetworkSettings
+from headless.detection.suitability import MOST_OVER_FULL, suitability_warnings
+
+import numpy as np
+import pytest
+import torch
+
+from seip_addon.core.errors import SeipError
+
+NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
+GRID = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), NETWORK.pillar)
+KNOWN = Experience(("type1", "type2"), ("Junction",))
+NOTHING = np.zeros((0, 4), dtype=np.float32)
+
+
+def detector(experience=KNOWN):
+    return Detector(NETWORK, GRID, seed=1, experience=experience)
+
+
+def heaps(*sizes):
+    """Points in pillars of their own, so many in each."""
+    return np.array(
+        [[0.2 + 0.4 * column, 0.2, 1.0 + 0.01 * n, 0.5] for column, size in enumerate(sizes) for n in range(size)],
+        dtype=np.float32,
+    )
+
+
+def test_it_is_quiet_at_home():
+    assert suitability_warnings(detector(), ["type1", "type1"], "Junction", heaps(1, 2, 2)) == ()
+
+
+def test_other_sensor_types_are_named():
+    (sentence,) = suitability_warnings(detector(), ["type3", "type1"], "Junction", NOTHING)
+    assert "learnt from clouds of type1 and type2, not of type3:" in sentence
+
+
+def test_another_site_is_named():
+    (sentence,) = suitability_warnings(detector(), ["type1"], "Corridor", NOTHING)
+    assert "learnt at Junction, not at Corridor:" in sentence
+
+
+def test_over_full_pillars_are_counted():
+    full = filling(heaps(1, 2, 5), GRID, 2)
+    assert full.empty == pytest.approx(1 - 3 / len(GRID))
+    assert full.over_full == pytest.approx(1 / 3)
+    assert full.left_out == pytest.approx(3 / 8)
+    assert filling(NOTHING, GRID, 2).empty == 1.0
+    crowded = heaps(5, 5, 5, 1)
+    assert filling(crowded, GRID, 2).over_full > MOST_OVER_FULL
+    (sentence,) = suitability_warnings(detector(), ["type1"], "Junction", crowded)
+    assert sentence.startswith("75% of the pillars with points have more than the 2 that are kept, and 56% of all")
+
+
+def test_what_is_not_known_is_not_held_against_it():
+    assert suitability_warnings(detector(Experience()), ["type9"], "Nowhere", NOTHING) == ()
+    assert suitability_warnings(detector(), ["type1"], "", NOTHING) == ()
+
+
+def test_the_file_keeps_what_was_learnt_from(tmp_path):
+    detector().save(tmp_path / "detector.pt")
+    assert Detector.load(tmp_path / "detector.pt").experience == KNOWN
+    assert on_grid(detector(), GRID).experience == KNOWN
+
+
+def test_files_from_before_can_be_read(tmp_path):
+    one = detector()
+    one.save(tmp_path / "detector.pt")
+    state = torch.load(tmp_path / "detector.pt", weights_only=True)
+    del state["experience"]
+    torch.save(state, tmp_path / "old.pt")
+    assert Detector.load(tmp_path / "old.pt").experience == Experience()
+
+
+def test_experience_is_that_of_all_recordings():
+    recordings = [
+        Recording("a", "run 1", [], ("type2", "type1"), "Junction"),
+        Recording("b", "run 1", [], ("type2",), "Junction"),
+        Recording("c", "run 2", [], (), ""),
+    ]
+    assert experience_of(recordings) == KNOWN
+    assert experience_of(recordings[2:]) == Experience()
+
+
+def test_a_detector_moves_to_another_grid_of_the_same_pillars():
+    there = grid_over((100.0, 0.0, 132.0, 16.0), (2.0, 6.0), NETWORK.pillar)
+    moved = on_grid(detector(), there)
+    assert moved.grid == there
+    assert all((value == detector().state_dict()[name]).all() for name, value in moved.state_dict().items())
+    with pytest.raises(SeipError, match=r"pillars of 0.4 m sees nothing in those of 0.5 m"):
+        on_grid(detector(), grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), 0.5))
