@@ -5,6 +5,7 @@
 # make detection   install PyTorch, for the detector; make test-detection tests it
 # make study       redo the study on the shipped junction: coverage, then detection (half an hour)
 # make settings    chart what other settings of the detector cost and gain (an hour)
+# make stability   drive every method to where it fails, and write docs/stability.md (two hours)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
@@ -19,7 +20,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings benchmark extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings stability benchmark extension clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -52,7 +53,7 @@ sumo: environment
 test-traffic: sumo
 	$(PY) -m pytest tests/core/test_shipped_maps.py tests/core/test_traffic_simulation.py tests/headless/test_traffic.py
 
-# Runs of one scene differ by their seed alone.
+# Runs of one scene differ by their seed alone; dense ones have twice the vehicles.
 traffic: sumo
 	for seed in 1 2 3 4 5 6; do \
 	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 550 --pedestrians 120 \
@@ -70,7 +71,7 @@ detection: environment
 
 test-detection: detection
 	$(PY) -m pip install --quiet --no-deps --only-binary :all: --group second-opinion
-	$(PY) -m pytest tests/detection tests/headless/test_train.py tests/headless/test_evaluate.py tests/headless/test_compare_detectors.py
+	$(PY) -m pytest tests/detection tests/headless/test_train.py tests/headless/test_evaluate.py tests/headless/test_compare_detectors.py tests/headless/test_detector_limits.py
 
 study: detection
 	$(PY) -m headless.study scenes/junction.blend -o out/study
@@ -78,6 +79,9 @@ study: detection
 
 settings: detection
 	$(PY) -m headless.compare_detectors scenes/junction.blend -o out/detectors
+
+stability: detection
+	$(PY) -m headless.stability scenes/junction.blend --other scenes/corridor.blend -o docs
 
 benchmark: environment
 	$(PY) -m pip install --quiet --group benchmark

@@ -21,12 +21,11 @@ from headless.detection import case_study, study_results
 from headless.detection.claims import judge
 from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
-from headless.detection.recordings import Configuration, Studio, TrafficRun
+from headless.detection.recordings import Configuration, Studio
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.traffic_runs import runs_beside
 
 import bpy
-import numpy as np
 
 from seip_addon.core.coverage_study import NUMBERS
 from seip_addon.core.errors import SeipError
@@ -34,13 +33,6 @@ from seip_addon.core.goal import Goal, check_goal
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.results.study_tables import save_claims
 from seip_addon.core.scans import ScanSettings, static_scene
-from seip_addon.core.traffic import Trajectories
-
-FEWEST_RUNS = 4
-"""One to learn from, one for validation, two for tests."""
-
-WARM_UP = 2.0
-"""Seconds from the first sample of a run to its first frame."""
 
 
 def main(argv: list[str]) -> None:
@@ -115,7 +107,8 @@ def set_stage(options: argparse.Namespace) -> Stage:
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
-    traffic = _traffic(options, surveyed)
+    paths = options.traffic or runs_beside(options.scene)
+    traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
     steps = case_study.place_all(
         surveyed.layout.site,
         surveyed.layout.models,
@@ -134,25 +127,6 @@ def learn_from(stage: Stage, network: NetworkSettings) -> case_study.Lessons:
     grid = grid_of(stage.surveyed.layout.geometry, network.pillar)
     steps = case_study.simulate_lessons(stage.studio, stage.configurations, stage.traffic, grid, network.most_points)
     return stage.surveyed.stopwatch.run("simulation", steps)
-
-
-def _traffic(options: argparse.Namespace, surveyed: survey.Survey) -> case_study.Traffic:
-    """Read the runs: the last two are for tests, the one before for validation, the others to learn from."""
-    paths = options.traffic or runs_beside(options.scene)
-    if len(paths) < FEWEST_RUNS:
-        raise SeipError(
-            f"{len(paths)} runs of traffic are too few: name {FEWEST_RUNS} or more with --traffic, made by "
-            "headless/traffic.py with a seed each; the last two are for tests, the one before for validation"
-        )
-    runs = []
-    for path in paths:
-        trajectories = Trajectories.load(path).moved_to(surveyed.layout.geometry.origin)
-        begin, end = trajectories.span
-        times = np.arange(begin + WARM_UP, end, options.every)
-        if not len(times):
-            raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
-        runs.append(TrafficRun(path.stem, trajectories, times))
-    return case_study.Traffic(tuple(runs[:-3]), tuple(runs[-3:-2]), tuple(runs[-2:]))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -9,8 +9,9 @@ Chapters that are done are kept in the folder of work: a run that was stopped go
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import sys
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -46,6 +47,9 @@ from seip_addon.core.traffic import Trajectories
 FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
 
+DETECTOR_RUNS = 3
+"""With more runs of traffic than these a detector can learn and be tried."""
+
 PAGE, CHARTS = "stability.md", "stability"
 
 
@@ -65,6 +69,8 @@ class Scope:
     robust : RobustSettings
     instants : tuple of int
         Of traffic, to choose on and to judge by.
+    detector : mapping of str to int
+        See `detector_limits`: seeds and steps of trainings.
     """
 
     grids: int = 40
@@ -73,6 +79,7 @@ class Scope:
     poses: StudySettings = field(default_factory=StudySettings)
     robust: RobustSettings = field(default_factory=RobustSettings)
     instants: tuple[int, int] = (24, 120)
+    detector: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +91,20 @@ class Stage:
     surveyed : Survey
     runs : list of Trajectories
         Traffic; none where there is none beside the scene.
-    charts : path
-        Folder of the charts.
+    scene : path or None
+        Its file; None for the one that is open.
+    others : sequence of path
+        Other scenes, to try on what was learnt on this one.
+    work, charts : path
+        Folders of what a rerun goes on from, and of the charts.
     scope : Scope
     """
 
     surveyed: survey.Survey
     runs: list[Trajectories]
+    scene: Path | None
+    others: Sequence[Path]
+    work: Path
     charts: Path
     scope: Scope
 
@@ -119,7 +133,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
     )
     runs = load_runs(runs_beside(options.scene), surveyed.layout.geometry.origin)
-    stage = Stage(surveyed, runs, charts, scope or Scope())
+    stage = Stage(surveyed, runs, options.scene, options.other, options.work, charts, scope or Scope())
     made_from = digest(
         grid_key(surveyed.layout),
         repr(surveyed.layout.settings),
@@ -149,6 +163,8 @@ def _chapters(stage: Stage) -> Iterator[tuple[str, Work]]:
         yield f"failures-{sensor}", partial(failures, sensor=sensor)
         if len(stage.runs) > 1:
             yield f"traffic-{sensor}", partial(traffic, sensor=sensor)
+    if importlib.util.find_spec("torch") and len(stage.runs) > DETECTOR_RUNS:
+        yield "detector", detector
 
 
 def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
@@ -273,6 +289,20 @@ _TRAFFIC_CHARTS = {
 }
 
 
+def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
+    """Train detectors, and try them until they fail."""
+    from headless.detection import limit_charts, limit_rows  # noqa: PLC0415 -- torch need not be installed
+    from headless.detector_limits import detector_limits  # noqa: PLC0415 -- as above
+
+    study = yield from detector_limits(stage.surveyed, stage.scene, stage.others, stage.work, **stage.scope.detector)
+    limit_charts.save_limits_chart(stage.charts / "detector.png", study)
+    charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
+    if study.foreign:
+        limit_charts.save_foreign_chart(stage.charts / "detector_away.png", study)
+        charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
+    return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
+
+
 def _settings(stage: Stage) -> RobustSettings:
     settings = stage.surveyed.layout.settings
     return replace(stage.scope.robust, solver=settings.solver, time_limit=settings.time_limit)
@@ -294,6 +324,9 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=survey.HelpWithDefaults,
     )
     survey.add_options(parser)
+    parser.add_argument(
+        "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="scenes to try detectors on that learnt here"
+    )
     parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for what a rerun goes on from")
     return parser
 

@@ -14,10 +14,18 @@ JUDGES = 1 / 3
 """Share of the runs, the last ones, that placements are judged in and not chosen on."""
 
 
-def runs_beside(scene: Path | None) -> list[Path]:
-    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``."""
+def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
+    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``.
+
+    Parameters
+    ----------
+    scene : path or None
+        None for the scene that is open.
+    kind : str
+        What else the folder's name ends with: ``_dense`` for ``junction_traffic_dense``.
+    """
     path = Path(bpy.data.filepath) if scene is None else scene
-    return sorted((path.parent / f"{path.stem}_traffic").glob("*.npz"))
+    return sorted((path.parent / f"{path.stem}_traffic{kind}").glob("*.npz"))
 
 
 def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:

@@ -15,12 +15,16 @@ from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
+import numpy as np
+
+from seip_addon.core.arrays import Float
 from seip_addon.core.coverage_study import NUMBERS, Case, Cell, solve_cell
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
 from seip_addon.core.site import Site
+from seip_addon.core.traffic import Trajectories
 from seip_addon.core.visibility.grid import VisibilityGrid
 
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
@@ -51,6 +55,12 @@ RULES = {
 
 MAIN = next(iter(RULES.values()))
 
+FEWEST_RUNS = 4
+"""One to learn from, one for validation, two for tests."""
+
+WARM_UP = 2.0
+"""Seconds from the first sample of a run to its first frame."""
+
 SIDE_BY_SIDE = (os.cpu_count() or 1) + 1
 """Trainings at once on the CPU: one more than there are cores, as each also waits."""
 
@@ -80,6 +90,44 @@ class Traffic:
                 raise SeipError(
                     f"{one.name} and {other.name} are the same traffic: name runs that were simulated with other seeds"
                 )
+
+
+def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
+    """Read runs: the last two are for tests, the one before for validation, the others to learn from.
+
+    Parameters
+    ----------
+    paths : sequence of path
+    origin : (3,) float64, metres
+        Of the scene's local axes.
+    every : float, seconds
+        From frame to frame.
+
+    Raises
+    ------
+    SeipError
+        There are too few, or one is too short.
+    """
+    if len(paths) < FEWEST_RUNS:
+        raise SeipError(
+            f"{len(paths)} runs of traffic are too few: name {FEWEST_RUNS} or more with --traffic, made by "
+            "headless/traffic.py with a seed each; the last two are for tests, the one before for validation"
+        )
+    runs = read_runs(paths, origin, every)
+    return Traffic(runs[:-3], runs[-3:-2], runs[-2:])
+
+
+def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[TrafficRun, ...]:
+    """Read runs, each looked at from `WARM_UP` on; see `read_traffic`."""
+    runs = []
+    for path in paths:
+        trajectories = Trajectories.load(path).moved_to(origin)
+        begin, end = trajectories.span
+        times = np.arange(begin + WARM_UP, end, every)
+        if not len(times):
+            raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
+        runs.append(TrafficRun(path.stem, trajectories, times))
+    return tuple(runs)
 
 
 @dataclass(frozen=True, eq=False)

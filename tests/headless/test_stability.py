@@ -40,6 +40,7 @@ def run(folder):
     criterion = "seip_addon.core.stability.criterion"
     spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
     with (
+        patch.object(stability, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
         patch.multiple("seip_addon.core.convergence", COARSE_CANDIDATES=25.0, JUDGED_ON=4.0, **spacings),
     ):

@@ -1,0 +1,30 @@
+"""The chapter of the detector, from a scene and its traffic to rows and charts, with little of everything."""
+
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless import detector_limits, stability
+from headless.detection import limits_study
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25"]
+TRIED = (limits_study.DropOff(0.5),), (limits_study.Misturned(1.0, 0),)
+
+
+def test_the_chapter_holds_rows_and_charts_of_home_and_away(tmp_path):
+    (tmp_path / "work").mkdir()
+    little = stability.Scope(detector={"seeds": 2, "steps": 2})
+    argv = [str(SCENES / "junction.blend"), "-o", str(tmp_path), "--work", str(tmp_path / "work"), *COARSE]
+    only = patch.object(stability, "_chapters", lambda _stage: [("detector", stability.detector)])
+    few = patch.multiple(detector_limits, EVERY=60.0, TRIED=1)
+    with only, few, patch.object(limits_study, "full_series", lambda _sensor: TRIED):
+        stability.main([*argv, "--other", str(SCENES / "corridor.blend")], little)
+    page = (tmp_path / "stability.md").read_text(encoding="utf-8")
+    assert "## The detector" in page
+    for told in ("returns lost", "Arterial corridor", "denser traffic", "padded with zeros", "over-full"):
+        assert told in page
+    assert {path.name for path in (tmp_path / "stability").iterdir()} == {"detector.png", "detector_away.png"}
