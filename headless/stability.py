@@ -139,6 +139,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         repr(surveyed.layout.settings),
         repr(stage.scope),
         *(run.position for run in runs),
+        *(other.name for other in options.other),
         versions()["seip"],
     )
     chapters = []
