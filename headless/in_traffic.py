@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -19,13 +18,10 @@ from headless import session, survey
 from headless.goal_options import add_goal_options, goal_of
 from headless.traffic_runs import load_runs, parted, runs_beside
 
-import bpy
-
 from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem, with_count
 from seip_addon.core.pictures.stability_traffic_charts import save_promise_chart, save_time_map
-from seip_addon.core.results.placement_record import versions
 from seip_addon.core.stability.traffic_instants import check_runs, spread_instants
 from seip_addon.core.stability.traffic_presence import road_user_seconds
 from seip_addon.core.stability.traffic_study import (
@@ -36,9 +32,8 @@ from seip_addon.core.stability.traffic_study import (
     traffic_study,
     traffic_warnings,
 )
-from seip_addon.core.survey import Circumstances, record_of, surroundings
+from seip_addon.core.survey import surroundings
 from seip_addon.core.traffic import Trajectories
-from seip_addon.scene.result_folder import write_result_folder
 
 CHARTS = ("time_seen.png", "traffic.png")
 
@@ -54,13 +49,6 @@ def main(argv: list[str]) -> None:
     study = _studied(surveyed, goal, options)
     layout = surveyed.layout
     plan = _plan(surveyed, goal, study, options)
-    record = record_of(
-        layout,
-        surveyed.grid,
-        plan,
-        Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string)),
-        render=not options.no_render,
-    )
     session.say(_in_words(study, plan))
     with session.writing(options.output):
         name = layout.site.name
@@ -68,17 +56,7 @@ def main(argv: list[str]) -> None:
         save_time_map(options.output / CHARTS[0], layout.geometry, layout.site, plan.deployment, study.traffic, title)
         sensors = f"{len(plan.deployment.sensors)} sensors"
         save_promise_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
-        write_result_folder(
-            options.output,
-            bpy.context.scene,
-            layout.geometry,
-            layout.site,
-            plan,
-            record,
-            visible=surveyed.grid.visible,
-            models=layout.models,
-            render=not options.no_render,
-        )
+        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
     session.say(f"written to {options.output}/")
 
 
@@ -129,10 +107,7 @@ def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: arg
 
 
 def _in_words(study: TrafficStudy, plan: Plan) -> str:
-    sensors = [
-        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m, {sensor.position_name}"
-        for sensor in plan.deployment.sensors
-    ]
+    sensors = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
     won = f"placing on traffic sees {study.won(study.layer).in_words()} more of the {WHAT[study.layer]}"
     doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)

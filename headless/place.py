@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
@@ -23,14 +22,9 @@ if not __package__:  # run as a file by `blender -P`
 from headless import session, survey
 from headless.goal_options import add_goal_options, goal_of
 
-import bpy
-
 from seip_addon.core.convergence import coarsest_settings
 from seip_addon.core.goal import Plan, check_goal
-from seip_addon.core.orientation import tilt_in_words
-from seip_addon.core.results.placement_record import versions
-from seip_addon.core.survey import Circumstances, place, record_of
-from seip_addon.scene.result_folder import write_result_folder
+from seip_addon.core.survey import place
 
 
 def main(argv: list[str]) -> None:
@@ -39,31 +33,17 @@ def main(argv: list[str]) -> None:
     goal = goal_of(options, options.coverage)
     refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal), refine)
-    layout, watch = surveyed.layout, surveyed.stopwatch
-    plan = watch.run("placement", place(layout, surveyed.grid, goal))
-    circumstances = Circumstances(datetime.now(UTC), watch.seconds, versions(blender=bpy.app.version_string))
-    record = record_of(layout, surveyed.grid, plan, circumstances, render=not options.no_render)
+    plan = surveyed.stopwatch.run("placement", place(surveyed.layout, surveyed.grid, goal))
     session.say(_in_words(plan))
     with session.writing(options.output):
-        write_result_folder(
-            options.output,
-            bpy.context.scene,
-            layout.geometry,
-            layout.site,
-            plan,
-            record,
-            visible=surveyed.grid.visible,
-            models=layout.models,
-            render=not options.no_render,
-        )
+        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
     session.say(f"written to {options.output}/")
 
 
 def _in_words(plan: Plan) -> str:
     placement, deployment = plan.placement, plan.deployment
     lines = [
-        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt_in_words(sensor.tilt)}, "
-        f"{sensor.position_name}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
+        f"{survey.sensor_in_words(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"

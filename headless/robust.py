@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from datetime import UTC, datetime
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -18,17 +17,11 @@ if not __package__:  # run as a file by `blender -P`
 from headless import session, survey
 from headless.goal_options import add_goal_options, goal_of
 
-import bpy
-
 from seip_addon.core.goal import check_goal
-from seip_addon.core.orientation import tilt_in_words
 from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
-from seip_addon.core.results.placement_record import versions
 from seip_addon.core.robust_plan import Precaution, RobustPlan, place_robustly
 from seip_addon.core.stability.pose_errors import PoseErrors
 from seip_addon.core.stability.risk import Risk
-from seip_addon.core.survey import Circumstances, record_of
-from seip_addon.scene.result_folder import write_result_folder
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
@@ -41,40 +34,20 @@ def main(argv: list[str]) -> None:
     steps = place_robustly(surveyed.layout, surveyed.grid, goal, precaution)
     robust = surveyed.stopwatch.run("robust placement", steps)
     plan, study = robust.plan, robust.study
-    record = record_of(
-        surveyed.layout,
-        surveyed.grid,
-        plan,
-        Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string)),
-        render=not options.no_render,
-    )
     session.say(_in_words(robust))
     with session.writing(options.output):
         layout = surveyed.layout
         save_spread_chart(options.output / CHARTS[0], study, f"{layout.site.name}: coverage under pose errors")
         save_blame_chart(options.output / CHARTS[1], robust.judged, f"{layout.site.name}: what costs coverage")
         save_frontier_chart(options.output / CHARTS[2], study, f"{layout.site.name}: what robustness costs and saves")
-        write_result_folder(
-            options.output,
-            bpy.context.scene,
-            layout.geometry,
-            layout.site,
-            plan,
-            record,
-            visible=surveyed.grid.visible,
-            models=layout.models,
-            render=not options.no_render,
-        )
+        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
     session.say(f"written to {options.output}/")
 
 
 def _in_words(robust: RobustPlan) -> str:
     (chosen,), plan, study = robust.study.robust, robust.plan, robust.study
     nominal = study.beside(chosen)
-    lines = [
-        f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt_in_words(sensor.tilt)}, {sensor.position_name}"
-        for sensor in plan.deployment.sensors
-    ]
+    lines = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
     return "\n".join(
         [
             *lines,

@@ -6,6 +6,7 @@ import argparse
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,15 +17,20 @@ import numpy as np
 
 from seip_addon.core.candidates import CandidateSettings, heights_of, tilts_of
 from seip_addon.core.convergence import Convergence
+from seip_addon.core.deployment import Sensor
 from seip_addon.core.errors import SeipError
+from seip_addon.core.goal import Plan
 from seip_addon.core.lidar import LidarModel
+from seip_addon.core.orientation import tilt_in_words
 from seip_addon.core.progress import Progress, finish
+from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scene_geometry import SceneGeometry
 from seip_addon.core.site import Site
-from seip_addon.core.survey import Layout, SurveySettings, lay_out, see
+from seip_addon.core.survey import Circumstances, Layout, SurveySettings, lay_out, record_of, see
 from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
 from seip_addon.scene.read import read_scene
+from seip_addon.scene.result_folder import write_result_folder
 
 Result = TypeVar("Result")
 
@@ -146,6 +152,29 @@ def survey(
     grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
     session.say(triangles_sentence(grid.parameters["triangles"]))
     return Survey(layout, grid, watch)
+
+
+def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool) -> None:
+    """Write a plan of a survey, with its record, to the folder of results."""
+    layout, grid = surveyed.layout, surveyed.grid
+    now = Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
+    write_result_folder(
+        folder,
+        bpy.context.scene,
+        layout.geometry,
+        layout.site,
+        plan,
+        record_of(layout, grid, plan, now, render=render),
+        visible=grid.visible,
+        models=layout.models,
+        render=render,
+    )
+
+
+def sensor_in_words(sensor: Sensor) -> str:
+    """Say which sensor hangs where."""
+    tilt = tilt_in_words(sensor.tilt)
+    return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
 
 
 def _settings(options: argparse.Namespace) -> SurveySettings:
