@@ -2,9 +2,6 @@
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
-
-from headless.detection.recordings import Configuration
 
 import numpy as np
 import pytest
@@ -280,15 +277,6 @@ def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
     as_it_hangs = looks.see(sensor.model, sensor.xyz, sensor.orientation).mean()
     assert judge.judge(plan) == pytest.approx(as_it_hangs, abs=1e-12)
     assert as_it_hangs != looks.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw)).mean()
-
-
-def test_recordings_are_made_as_the_sensors_hang():
-    site = street_site(lay_candidates(street(), replace(CHOICE, tilts=(0.0, math.radians(20)))))
-    deployment = deploy(site, MODELS, grid_of(site).visible, [0, 1, 6])
-    mounted = Configuration(SimpleNamespace(deployment=deployment)).sensors
-    for sensor, chosen in zip(mounted, deployment.sensors, strict=True):
-        assert (sensor.orientation == site.candidates.orientation(chosen.pose)).all()
-    assert {round(math.degrees(chosen.tilt)) for chosen in deployment.sensors} == {0, 20}
 
 
 def test_what_is_in_view_turns_with_the_sensor():

@@ -353,7 +353,15 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, FlatTop]] = ()) ->
         )
     )
     rows += [
-        Row("placement", f"flat top, {name}", top.sentence, "all placements, by branch and bound", "reports it")
+        Row(
+            "placement",
+            f"flat top, {name}",
+            top.sentence,
+            "all placements, by branch and bound"
+            if top.complete
+            else "the first branches, and exchanges of one sensor",
+            "says so with every proven placement",
+        )
         for name, top in tops
     ]
     return rows

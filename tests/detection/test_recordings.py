@@ -1,0 +1,18 @@
+"""Recordings are made by sensors that hang as the placement has them."""
+
+import math
+from types import SimpleNamespace
+
+from headless.detection.recordings import Configuration
+
+import numpy as np
+
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.orientation import orientation
+
+
+def test_a_tilted_sensor_records_tilted():
+    turn = orientation(0.3, math.radians(20))
+    sensor = SimpleNamespace(label="S1", model=load_catalogue()["type1"], xyz=np.zeros(3), orientation=turn)
+    (mounted,) = Configuration(SimpleNamespace(deployment=SimpleNamespace(sensors=(sensor,)))).sensors
+    assert (mounted.orientation == turn).all()
