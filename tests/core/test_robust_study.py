@@ -14,11 +14,12 @@ from seip_addon.core.goal import Goal, placement_problem
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
 from seip_addon.core.placement import solve
-from seip_addon.core.progress import finish
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views, draws_for
 from seip_addon.core.stability.pose_errors import PoseErrors
 from seip_addon.core.stability.pose_study import StudySettings, pose_study
 from seip_addon.core.stability.risk import Risk
+from seip_addon.core.stability.robust_placement import RobustPlacement
 from seip_addon.core.stability.robust_study import RobustSettings, robust_rows, robust_study
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
@@ -51,6 +52,23 @@ def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
         expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.unseen)]
         assert contender.unseen == pytest.approx(expected, abs=1e-12)
         assert not problem.forbidden[chosen].any()
+
+
+def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid_out, monkeypatch):
+    around, problem = laid_out
+    worst = int(np.flatnonzero(problem.allowed)[problem.visible[problem.allowed].sum(axis=1).argmin()])
+
+    def poor(problem, scenarios, risk, **_):
+        yield Progress(0, 0, "searching badly")
+        short = replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
+        return RobustPlacement(risk, short, np.zeros(len(scenarios)))
+
+    monkeypatch.setattr("seip_addon.core.stability.robust_study.solve_robust", poor)
+    found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)]))
+    (contender,), (nominal,) = found.robust, found.nominal
+    assert contender.placement.chosen.tolist() == nominal.placement.chosen.tolist()
+    assert contender.placement.objective > 0
+    assert found.saving(contender).value == 0
 
 
 def test_robustness_costs_what_was_planned(study):

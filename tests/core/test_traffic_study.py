@@ -20,10 +20,10 @@ from seip_addon.core.placement import solve
 from seip_addon.core.progress import finish
 from seip_addon.core.stability.disturbed_views import Surroundings
 from seip_addon.core.stability.estimates import Estimate, mean_of, mean_over_time
+from seip_addon.core.stability.robust_placement import at_least
 from seip_addon.core.stability.traffic_instants import NOBODY, WARM_UP, spread_instants
 from seip_addon.core.stability.traffic_presence import road_user_seconds
 from seip_addon.core.stability.traffic_study import (
-    at_least,
     look_at_traffic,
     traffic_rows,
     traffic_study,

@@ -200,6 +200,25 @@ def _with_foresight(
     )
 
 
+def at_least(found: Placement, other: Placement, reached: float) -> Placement:
+    """Return the placement found, or another where that reaches more of the same objective.
+
+    A search that ran out of time may have missed the placement that knows of no scenarios.
+    """
+    if reached <= found.objective * (1 + TIE):
+        return found
+    bound = max(found.bound, reached)
+    return replace(
+        found,
+        chosen=other.chosen,
+        objective=reached,
+        bound=bound,
+        gap=relative_gap(reached, bound),
+        covered=other.covered,
+        price=other.price,
+    )
+
+
 def outcomes_of(problem: PlacementProblem, scenarios: Views, risk: Risk, chosen: Integer) -> Float:
     """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
     return risk.outcomes(_seen(scenarios, chosen), problem.weights, allowed_sensors(problem))

@@ -14,7 +14,7 @@ from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_gain, quantile_of
 from .pose_errors import PoseErrors
 from .risk import Risk
-from .robust_placement import RobustPlacement, foresee, outcomes_of, solve_robust
+from .robust_placement import RobustPlacement, at_least, foresee, outcomes_of, solve_robust
 from .rows import Row
 
 LOW = 0.05
@@ -164,7 +164,8 @@ def robust_study(
             problem, spread, risk, solver=settings.solver, time_limit=settings.time_limit, foreseen=foreseen
         )
         found: RobustPlacement = yield from within(here, steps)
-        entries.append(_Entry(risk.in_words(), found.placement, risk.alone))
+        placed = at_least(found.placement, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
+        entries.append(_Entry(risk.in_words(), placed, risk.alone))
     contenders = yield from _judged(around, problem, settings, entries)
     return RobustStudy(
         settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())

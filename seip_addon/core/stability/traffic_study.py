@@ -14,12 +14,11 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..placement import Placement, PlacementProblem, solve
-from ..placement.problem import TIE, relative_gap
 from ..progress import Progress
 from .disturbed_views import Surroundings
 from .estimates import Estimate, mean_over_time
 from .risk import Risk
-from .robust_placement import outcomes_of, solve_robust
+from .robust_placement import at_least, outcomes_of, solve_robust
 from .rows import Row
 from .traffic_instants import NOBODY, Instants
 from .traffic_views import HEIGHT, Layer, traffic_views
@@ -224,25 +223,6 @@ def traffic_study(
         road_users=float(np.mean([len(crowd.hulls) for crowd in crowds])),
         empty=judge("the empty road", empty),
         traffic=judge("traffic", placed),
-    )
-
-
-def at_least(found: Placement, other: Placement, reached: float) -> Placement:
-    """Return the placement found, or another where that reaches more of the same objective.
-
-    A search that ran out of time may have missed the placement for the empty road.
-    """
-    if reached <= found.objective * (1 + TIE):
-        return found
-    bound = max(found.bound, reached)
-    return replace(
-        found,
-        chosen=other.chosen,
-        objective=reached,
-        bound=bound,
-        gap=relative_gap(reached, bound),
-        covered=other.covered,
-        price=other.price,
     )
 
 
