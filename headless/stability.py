@@ -13,7 +13,6 @@ import importlib.util
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -113,6 +112,17 @@ class Stage:
         """The scene's name, for titles."""
         return self.surveyed.layout.site.name
 
+    @property
+    def sensor(self) -> str:
+        """The type in the middle of those that were named: it has something to lose, and something to win."""
+        sensors = list(self.surveyed.layout.models)
+        return sensors[len(sensors) // 2]
+
+    @property
+    def placed(self) -> str:
+        """What is placed, for titles."""
+        return f"{DEFAULT_COUNT} × {self.sensor}"
+
     def problem(self, sensor: str) -> PlacementProblem:
         """Return the placement of the usual number of sensors of one type."""
         layout = self.surveyed.layout
@@ -159,13 +169,10 @@ def _chapters(stage: Stage) -> Iterator[tuple[str, Work]]:
     yield "criterion", criterion
     yield "arithmetic", arithmetic
     yield "solvers", solvers
-    sensors = list(stage.surveyed.layout.models)
-    middle = sensors[len(sensors) // 2]  # it has something to lose, and something to win
-    for sensor in sensors:
-        yield f"poses-{sensor}", partial(poses, sensor=sensor)
-    yield f"failures-{middle}", partial(failures, sensor=middle)
+    yield "poses", poses
+    yield "failures", failures
     if len(stage.runs) > 1:
-        yield f"traffic-{middle}", partial(traffic, sensor=middle)
+        yield "traffic", traffic
     if importlib.util.find_spec("torch") and len(stage.runs) > DETECTOR_RUNS:
         yield "detector", detector
 
@@ -224,46 +231,44 @@ def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
     )
 
 
-def poses(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
-    """Let the poses of one type's placements err."""
-    layout, problem = stage.surveyed.layout, stage.problem(sensor)
-    study = yield from robust_study(surroundings(stage.surveyed.layout), problem, _settings(stage))
+def poses(stage: Stage) -> Generator[Progress, None, Chapter]:
+    """Let the poses of a placement err."""
+    layout, around = stage.surveyed.layout, surroundings(stage.surveyed.layout)
+    study = yield from robust_study(around, stage.problem(stage.sensor), _settings(stage))
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
-    judged = yield from pose_study(surroundings(stage.surveyed.layout), deployment, stage.scope.poses)
-    title, names = f"{stage.name}: {DEFAULT_COUNT} × {sensor}", [f"{what}_{sensor}.png" for what in _POSE_CHARTS]
-    robust_charts.save_spread_chart(stage.charts / names[0], study, f"{title} under pose errors")
-    robust_charts.save_blame_chart(stage.charts / names[1], judged, f"{title}, what costs coverage")
-    robust_charts.save_frontier_chart(stage.charts / names[2], study, f"{title}, what robustness costs and saves")
+    judged = yield from pose_study(around, deployment, stage.scope.poses)
+    robust_charts.save_spread_chart(stage.charts / "spread.png", study, f"{stage.placed} under pose errors")
+    robust_charts.save_blame_chart(stage.charts / "blame.png", judged, f"{stage.placed}: what costs coverage")
+    robust_charts.save_frontier_chart(
+        stage.charts / "frontier.png", study, f"{stage.placed}: what robustness costs and saves"
+    )
     return Chapter(
-        f"Poses that err: {DEFAULT_COUNT} × {sensor}",
+        f"Poses that err: {stage.placed}",
         (*pose_rows(judged), *robust_rows(study)),
-        tuple(Chart(name, caption) for name, caption in zip(names, _POSE_CHARTS.values(), strict=True)),
+        (
+            Chart(
+                "spread.png", "Distribution of coverage over unseen draws: the nominal optimum and robust placements"
+            ),
+            Chart("blame.png", "Mean loss when one sensor alone errs, and when one kind of error alone occurs"),
+            Chart("frontier.png", "What robustness costs in planned coverage, and what it saves in the 5 % quantile"),
+        ),
     )
 
 
-_POSE_CHARTS = {
-    "spread": "Distribution of coverage over unseen draws: the nominal optimum and robust placements",
-    "blame": "Mean loss when one sensor alone errs, and when one kind of error alone occurs",
-    "frontier": "What robustness costs in planned coverage, and what it saves in the 5 % quantile",
-}
-
-
-def failures(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
+def failures(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Let a sensor fail, and ask for more than one look."""
-    study = yield from robust_study(
-        surroundings(stage.surveyed.layout), stage.problem(sensor), _settings(stage), FAILURES
-    )
-    name = f"failures_{sensor}.png"
-    robust_charts.save_spread_chart(stage.charts / name, study, f"{stage.name}: {DEFAULT_COUNT} × {sensor}, failures")
+    around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
+    study = yield from robust_study(around, problem, _settings(stage), FAILURES)
+    robust_charts.save_spread_chart(stage.charts / "failures.png", study, f"{stage.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
-    return Chapter(f"Failures: {DEFAULT_COUNT} × {sensor}", robust_rows(study), (Chart(name, caption),))
+    return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
-def traffic(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
-    """Let vehicles stand in the way of one type's placements."""
+def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
+    """Let vehicles stand in the way of a placement."""
     layout = stage.surveyed.layout
-    around, problem, settings = surroundings(layout), stage.problem(sensor), layout.settings
+    around, problem, settings = surroundings(layout), stage.problem(stage.sensor), layout.settings
     to_choose_on, to_judge_in = parted(stage.runs)
     choose, judge = stage.scope.instants
     scenarios = yield from look_at_traffic(around, problem, spread_instants(to_choose_on, choose, seed=0))
@@ -272,24 +277,19 @@ def traffic(stage: Stage, sensor: str) -> Generator[Progress, None, Chapter]:
     study = yield from steps
     chosen = study.traffic.placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
-    title, names = f"{stage.name}: {DEFAULT_COUNT} × {sensor}", [f"{what}_{sensor}.png" for what in _TRAFFIC_CHARTS]
+    title = f"{stage.placed} in traffic"
     traffic_charts.save_time_map(
-        stage.charts / names[0], layout.geometry, layout.site, deployment, study.traffic, f"{title}, in traffic"
+        stage.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
     )
-    traffic_charts.save_promise_chart(
-        stage.charts / names[1], [(title, study)], f"{stage.name}: empty road and traffic"
-    )
+    traffic_charts.save_promise_chart(stage.charts / "promise.png", [(stage.placed, study)], title)
     return Chapter(
-        f"Traffic that hides things: {title}",
+        f"Traffic that hides things: {stage.placed}",
         traffic_rows(study),
-        tuple(Chart(name, caption) for name, caption in zip(names, _TRAFFIC_CHARTS.values(), strict=True)),
+        (
+            Chart("time_seen.png", "Share of time for which each target, and the point above it, is seen in traffic"),
+            Chart("promise.png", "What placements see on the empty road and, on average over time, in traffic"),
+        ),
     )
-
-
-_TRAFFIC_CHARTS = {
-    "time_seen": "For what share of time the placement chosen on traffic sees each target, and the point above it",
-    "promise": "What placements see on the empty road and, on average over time, in traffic",
-}
 
 
 def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
