@@ -22,6 +22,7 @@ from headless import session, survey
 from headless.traffic_runs import load_runs, parted, runs_beside
 
 from seip_addon.core.deployment import deploy
+from seip_addon.core.errors import SeipError
 from seip_addon.core.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
 from seip_addon.core.pictures import stability_limits_charts as limits_charts
 from seip_addon.core.pictures import stability_robust_charts as robust_charts
@@ -137,6 +138,8 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
     """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
+    for other in options.other:
+        _check_other(other)
     session.check_folder(charts)
     surveyed = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
@@ -163,6 +166,17 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
     with session.writing(options.output):
         save_page(options.output / PAGE, _lead(stage), chapters, CHARTS)
     session.say(f"written to {options.output / PAGE}")
+
+
+def _check_other(scene: Path) -> None:
+    """Raise SeipError, before hours of work, where detectors cannot be tried on a scene."""
+    if not scene.is_file():
+        raise SeipError(f"there is no file {scene}: --other names scenes with traffic beside them")
+    if not runs_beside(scene):
+        raise SeipError(
+            f"there is no traffic beside {scene}: put runs made by headless/traffic.py into the folder "
+            f"{scene.stem}_traffic beside it"
+        )
 
 
 def _chapters(stage: Stage) -> Iterator[tuple[str, Work]]:

@@ -8,6 +8,7 @@ from headless import stability
 
 import pytest
 
+from seip_addon.core.errors import SeipError
 from seip_addon.core.stability.pose_study import StudySettings
 from seip_addon.core.stability.robust_study import RobustSettings
 
@@ -69,3 +70,11 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
     assert "Solvers:" in said
     assert "Arithmetic:" in said
     assert "Poses" not in said
+
+
+@pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic beside")])
+def test_another_scene_that_is_of_no_use_is_named_before_any_work(tmp_path, name, sentence):
+    (tmp_path / "alone.blend").write_bytes(SCENE.read_bytes())
+    with pytest.raises(SeipError, match=sentence):
+        stability.main([str(SCENE), "-o", str(tmp_path / "docs"), "--other", str(tmp_path / name)])
+    assert not (tmp_path / "docs").exists()
