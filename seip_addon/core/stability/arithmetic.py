@@ -325,7 +325,7 @@ def arithmetic_rows(study: ArithmeticStudy) -> list[Row]:
             Row(
                 method="ray casters",
                 regime=name,
-                begins=f"hits off by over 1 mm from {_metres(first)}, by over 1 cm from {_metres(second)}",
+                begins=f"hits off by over 1 mm {_from(first)}, by over 1 cm {_from(second)}",
                 how=how.format(trials) + ", at powers of ten",
                 answer=answer,
             )
@@ -333,5 +333,5 @@ def arithmetic_rows(study: ArithmeticStudy) -> list[Row]:
     return rows
 
 
-def _metres(distance: float) -> str:
-    return f"{distance:,.0f} m" if math.isfinite(distance) else f"nowhere up to {DISTANCES[-1]:,.0f} m"
+def _from(distance: float) -> str:
+    return f"from {distance:,.0f} m on" if math.isfinite(distance) else f"nowhere up to {DISTANCES[-1]:,.0f} m"

@@ -219,7 +219,7 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
         Row(
             f"placement for {contender.name}",
             regime,
-            f"gives {study.price(contender):.2%} of planned coverage; 5 % quantile of "
+            f"gives away {study.price(contender):.2%} of planned coverage; 5 % quantile of "
             f"{contender.judged_by.outcome_in_words()} {contender.low.in_words()} against "
             f"{study.beside(contender).low.in_words()} of the nominal optimum: "
             f"{study.saving(contender).in_words()} more",
