@@ -317,8 +317,8 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, FlatTop]] = ()) ->
                 if worst is None
                 else f"at 1e{worst.decades}: {worst.worse.value:.0%} of answers lose, at most {worst.lost:.1g}",
                 how=f"{trials} random instances a span, against all placements",
-                answer=f"what differs by less than {TIE:g} of the {'whole' if what == 'weights' else 'dearest'} counts as "
-                "equal; a note where that leaves something without a say",
+                answer=f"what differs by less than {TIE:g} of the {'whole' if what == 'weights' else 'dearest'} counts "
+                "as equal; a note where that leaves something without a say",
             )
         )
     free = max((check.by for check in study.ties if check.changed.count == 0), default=0.0)
