@@ -330,7 +330,8 @@ def _lead(stage: Stage) -> str:
     return (
         "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
         f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "
-        "Brackets hold 95 % intervals. The warnings stand in the panel, in the batch output and in `placement.json`."
+        "Brackets hold 95 % intervals. Warnings about a scene and a placement stand in the panel, in the batch output "
+        "and in `placement.json`; those about traffic and detectors come from the commands that look at them."
     )
 
 
