@@ -331,7 +331,8 @@ def _lead(stage: Stage) -> str:
         "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
         f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "
         "Brackets hold 95 % intervals. Warnings about a scene and a placement stand in the panel, in the batch output "
-        "and in `placement.json`; those about traffic and detectors come from the commands that look at them."
+        "and in `placement.json`, what traffic leaves of one as soon as it is tried there; those about detectors come "
+        "from the commands that use them."
     )
 
 

@@ -2,29 +2,40 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Generator
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
 from .. import preferences, scans, state
 from ..core.errors import SeipError
+from ..core.goal import target_weights
 from ..core.progress import Progress, finish
 from ..core.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.results.placement_record import versions
 from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
 from ..core.scene_geometry import SceneGeometry
+from ..core.stability.traffic_instants import check_runs, spread_instants
+from ..core.stability.traffic_study import IN_TRAFFIC, tried_in_traffic
+from ..core.survey import surroundings
 from ..core.traffic import CATEGORIES, Trajectories
 from ..core.traffic.source import LoadedTraffic, TrafficFiles, load_traffic
 from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
+from .results import no_placement
 from .work import LongWork, Outcome, Result
 
+INSTANTS = 60
+"""Of traffic at which a placement is tried."""
+
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
+NO_LOADED = "There is no loaded traffic: load a traffic file first."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 NO_SENSORS = "There is no sensor to scan with: place sensors first."
 
@@ -43,6 +54,11 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
         return NO_SENSORS
     there = scene.seip.traffic.file or contract.find(scene, contract.TRAFFIC) is not None
     return "" if there else NO_TRAFFIC
+
+
+def why_no_trial(scene: bpy.types.Scene) -> str:
+    """Return why the placement cannot be tried in traffic; nothing where it can."""
+    return no_placement(scene) or ("" if scene.session_uid in scans.traffic else NO_LOADED)
 
 
 class _Scanning(LongWork[Result]):
@@ -110,6 +126,52 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
         scans.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
         return {"FINISHED"}
+
+
+class SEIP_OT_try_in_traffic(LongWork[tuple[state.Held, str]], bpy.types.Operator):
+    """Find what the placement sees of the road with the loaded traffic in the way, on average over time"""
+
+    bl_idname = "seip.try_in_traffic"
+    bl_label = "Try Placement in Traffic"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether there are a placement and traffic."""
+        reason = why_no_trial(context.scene)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, str]]:
+        """Find the placement again, and the traffic."""
+        return _tried(state.answered(scene), scans.traffic[scene.session_uid].trajectories)
+
+    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, str]) -> None:
+        """Note it with the placement."""
+        known, sentence = result
+        kept = scene.seip.result
+        record = json.loads(kept.record)
+        record["notes"] = [*(note for note in record["notes"] if not note.startswith(IN_TRAFFIC)), sentence]
+        if known.plan is not None:
+            placement = replace(known.plan.placement, notes=tuple(record["notes"]))
+            known.plan = replace(known.plan, placement=placement)
+        kept.record = known.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+        state.held[scene.session_uid] = known
+        self.report({"INFO"}, sentence)
+
+
+def _tried(
+    finding: Generator[Progress, None, state.Held], traffic: Trajectories
+) -> Generator[Progress, None, tuple[state.Held, str]]:
+    known = yield from finding
+    if known.plan is None:
+        raise RuntimeError("the work ended without a placement")
+    layout, chosen = known.layout, known.plan.placement.chosen
+    check_runs([traffic], layout.site.region)
+    instants = spread_instants([traffic], INSTANTS, seed=0)
+    weight = target_weights(layout.site, known.plan.goal)
+    sentence = yield from tried_in_traffic(surroundings(layout), chosen, weight, instants)
+    return known, sentence
 
 
 class SEIP_OT_scan_frame(_Scanning[scans.HeldScan], bpy.types.Operator):
@@ -234,6 +296,7 @@ def _facts(trajectories: Trajectories) -> list[str]:
 CLASSES = (
     SEIP_OT_load_traffic,
     SEIP_OT_clear_traffic,
+    SEIP_OT_try_in_traffic,
     SEIP_OT_scan_frame,
     SEIP_OT_hide_scan,
     SEIP_OT_write_dataset,

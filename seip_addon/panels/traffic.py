@@ -9,9 +9,11 @@ from ..operators.traffic import (
     SEIP_OT_clear_traffic,
     SEIP_OT_load_traffic,
     SEIP_OT_scan_frame,
+    SEIP_OT_try_in_traffic,
     SEIP_OT_write_dataset,
     why_no_load,
     why_no_scan,
+    why_no_trial,
 )
 from .run_button import draw_run
 from .sentence import draw_sentence
@@ -42,6 +44,8 @@ class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
         row.operator("screen.animation_play", text="", icon="PLAY")
         for line in traffic.loaded.splitlines():
             draw_sentence(layout, line)
+        if not why_no_trial(context.scene):
+            draw_run(layout, SEIP_OT_try_in_traffic.bl_idname)
 
 
 class SEIP_PT_scan(Sidebar, bpy.types.Panel):

@@ -1,5 +1,7 @@
 """Traffic and scans: the operators do what the batch command does, byte for byte."""
 
+import json
+import re
 from pathlib import Path
 
 from headless import simulate
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from seip_addon import scans
+from seip_addon.core.results.placement_record import load_placement_record
 from seip_addon.core.scans import Frame
 from seip_addon.scene.write import write_result
 from seip_addon.viewport import layers
@@ -44,6 +47,26 @@ def test_traffic_is_loaded_animated_and_cleared(placed):
     assert bpy.ops.seip.clear_traffic() == {"FINISHED"}
     assert "SEIP Traffic" not in bpy.data.collections
     assert not placed.seip.traffic.loaded
+
+
+def test_what_traffic_leaves_of_a_placement_stands_with_it(placed, tmp_path):
+    assert not bpy.ops.seip.try_in_traffic.poll()
+    bpy.ops.seip.load_traffic()
+    before = json.loads(placed.seip.result.record)["notes"]
+    for _ in range(2):
+        assert bpy.ops.seip.try_in_traffic() == {"FINISHED"}
+        notes = json.loads(placed.seip.result.record)["notes"]
+        assert notes[:-1] == before
+        assert re.fullmatch(
+            r"in traffic \(\d+ road users at a time\) this placement sees [\d.]+% \[[\d.]+%, [\d.]+%\] of the road on "
+            r"average over time, [\d.]+% when it is empty",
+            notes[-1],
+        )
+    coverage = json.loads(placed.seip.result.record)["coverage"]["whole"]
+    assert notes[-1].endswith(f"{coverage:.2%} when it is empty")
+    placed.seip.result.folder = str(tmp_path)
+    bpy.ops.seip.export_result()
+    assert load_placement_record(tmp_path / "placement.json")["notes"] == notes
 
 
 def test_a_dataset_is_that_of_the_batch_command(placed, tmp_path):

@@ -7,7 +7,7 @@ stretches of time (`mean_over_time`).
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +20,15 @@ from .estimates import Estimate, mean_over_time
 from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .rows import Row
-from .traffic_instants import NOBODY, Instants
+from .traffic_instants import NOBODY, Instants, Standing
 from .traffic_views import HEIGHT, Layer, traffic_views
 from .views import Views
 
 NOTABLE = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
+
+IN_TRAFFIC = "in traffic"
+"""How sentences about traffic begin."""
 
 MOSTLY = 0.9
 """Share of time from which on a target counts as mostly seen."""
@@ -220,7 +223,7 @@ def traffic_study(
     return TrafficStudy(
         layer=scenarios.layer,
         chosen_at=len(scenarios.views),
-        road_users=float(np.mean([len(crowd.hulls) for crowd in crowds])),
+        road_users=_users(crowds),
         empty=judge("the empty road", empty),
         traffic=judge("traffic", placed),
     )
@@ -233,10 +236,37 @@ def _seen(views: Views, rows: Integer, weight: Float, stretch: Integer) -> Seen:
     return Seen(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
 
 
+def tried_in_traffic(
+    around: Surroundings, poses: Integer, weight: Float, instants: Instants
+) -> Generator[Progress, None, str]:
+    """Say, in a sentence, what poses see of the road in traffic on average over time, and when it is empty.
+
+    Parameters
+    ----------
+    around : Surroundings
+    poses : (s,) int64
+        Among the site's candidates.
+    weight : (t,) float64
+        Of the targets.
+    instants : Instants
+    """
+    crowds = instants.standing()
+    views = yield from traffic_views(around, poses, [NOBODY, *crowds], "road")
+    seen = _seen(views, np.arange(len(poses)), weight, instants.stretch)
+    return (
+        f"{IN_TRAFFIC} ({_users(crowds):.0f} road users at a time) this placement sees {seen.held.in_words()} of the "
+        f"road on average over time, {seen.empty:.2%} when it is empty"
+    )
+
+
+def _users(crowds: Sequence[Standing]) -> float:
+    return float(np.mean([len(crowd.hulls) for crowd in crowds]))
+
+
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
     losses = tuple(
-        f"in traffic ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
+        f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
         f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
         f"{seen.lost.value:.1%} less"
         for layer, seen in study.empty.seen.items()
