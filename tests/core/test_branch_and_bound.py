@@ -14,7 +14,7 @@ from placement_oracle import small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import branch_and_bound
-from seip_addon.core.placement.branch_and_bound import best_placements, first_in_order, merit
+from seip_addon.core.placement.branch_and_bound import BestPlacements, FirstInOrder, merit
 from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
@@ -38,8 +38,10 @@ def forever():
     return Clock(math.inf)
 
 
-def search(instance, goal, most=10_000, seconds=math.inf):
-    return finish(best_placements(instance, goal, most, instance.total, forever(), seconds))
+def searched(instance, goal, most=10_000):
+    search = BestPlacements(instance, goal, most, instance.total)
+    assert finish(search.run(forever(), math.inf))
+    return search
 
 
 @pytest.fixture(scope="module", params=[1, 10**9], ids=["relaxed", "not relaxed"], autouse=True)
@@ -59,22 +61,20 @@ def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     goal = share * instance.total
     choices = [choice for choice in feasible(instance) if len(choice)]
     best = max(map(instance.covered, choices), default=-1.0)
-    found = search(instance, goal)
-    assert found.finished
-    assert found.complete
+    search = searched(instance, goal)
+    assert not search.overflowed
     if best < goal - instance.slack:
-        assert found.placements == ()
+        assert search.found == []
         return
     equal = [choice for choice in choices if instance.covered(choice) == best]
-    listed = {tuple(choice) for choice in found.placements}
+    listed = {tuple(choice) for choice in search.found}
     assert listed <= {tuple(choice) for choice in equal}
     fewest = min(map(len, equal))
     assert listed >= {tuple(choice) for choice in equal if len(choice) == fewest}
-    few = search(instance, goal, most=1)
-    assert few.finished
-    assert len(few.placements) == 1
-    np.testing.assert_array_equal(few.placements[0], found.placements[0])
-    assert few.complete == (len(found.placements) == 1)
+    few = searched(instance, goal, most=1)
+    assert len(few.found) == 1
+    np.testing.assert_array_equal(few.found[0], search.found[0])
+    assert few.overflowed == (len(search.found) > 1)
 
 
 @settings(max_examples=300, deadline=None)
@@ -87,14 +87,14 @@ def test_the_first_in_order_is_found(problem):
     goal = max(map(instance.covered, choices))
     equal = [choice for choice in choices if instance.covered(choice) >= goal - instance.slack]
     first = min(equal, key=lambda choice: merit(instance, choice))
-    found, finished = finish(first_in_order(replace(instance, count=len(first)), goal, forever(), math.inf))
-    assert finished
-    np.testing.assert_array_equal(found, first)
+    search = FirstInOrder(replace(instance, count=len(first)), goal)
+    assert finish(search.run(forever(), math.inf))
+    np.testing.assert_array_equal(search.best, first)
 
 
 def test_a_search_stops_at_its_limit():
     instance = make_instance(street_problem(60, 400, seed=3, count=5))[0]
-    assert not search(instance, 0.0, seconds=0.0).finished
+    assert not finish(BestPlacements(instance, 0.0, 1, instance.total).run(forever(), 0.0))
 
 
 def test_an_uneven_street_is_solved_as_well_as_an_even_one():
@@ -102,5 +102,51 @@ def test_an_uneven_street_is_solved_as_well_as_an_even_one():
     weights = np.random.default_rng(1).uniform(0.5, 2.0, 300)
     instance = make_instance(replace(problem, weights=weights))[0]
     best = max(instance.covered(choice) for choice in feasible(instance))
-    (chosen,) = search(instance, 0.0).placements
+    (chosen,) = searched(instance, 0.0).found
     assert instance.covered(chosen) == best
+
+
+@settings(max_examples=100, deadline=None)
+@given(small_problems(), st.integers(1, 6))
+def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem, branches):
+    instance = reduced(problem)
+    assume(instance is not None)
+    best = max(map(instance.covered, (choice for choice in feasible(instance) if len(choice))), default=-1.0)
+    assume(best > 0)
+    search = BestPlacements(instance, 0.0, 10_000, instance.total)
+    bounds = []
+    while not finish(search.run(forever(), math.inf, branches)):
+        found = max(map(instance.covered, search.found), default=0.0)
+        assert max(found, search.bound) >= best
+        bounds.append(search.bound)
+    assert bounds == sorted(bounds, reverse=True)
+    assert instance.covered(search.found[0]) == best
+
+
+def test_the_bound_falls_while_the_search_goes_on():
+    visible = np.random.default_rng(2).random((40, 300)) < 0.15
+    problem = replace(street_problem(40, 300, heights=1, count=6), visible=visible)
+    instance = make_instance(problem)[0]
+    search = BestPlacements(instance, 0.0, 1, instance.total)
+    bounds = []
+    while not finish(search.run(forever(), math.inf, 20)):
+        bounds.append(search.bound)
+    assert bounds == sorted(bounds, reverse=True)
+    assert len(set(bounds)) > 5
+
+
+def test_a_full_queue_changes_nothing(monkeypatch):
+    instance = make_instance(street_problem(30, 200, seed=4, count=4))[0]
+    plain = searched(instance, 0.0)
+    monkeypatch.setattr(branch_and_bound, "WAITING", 100)
+    deep = searched(instance, 0.0)
+    assert {tuple(choice) for choice in deep.found} == {tuple(choice) for choice in plain.found}
+
+
+def test_a_placement_found_elsewhere_is_taken_once():
+    instance = make_instance(street_problem(25, 200, seed=6, count=3))[0]
+    plain = searched(instance, 0.0)
+    search = BestPlacements(instance, 0.0, 10_000, instance.total)
+    search.offer(plain.found[0][::-1])
+    assert finish(search.run(forever(), math.inf))
+    assert sorted(map(tuple, search.found)) == sorted(map(tuple, plain.found))

@@ -242,7 +242,7 @@ def test_weights_have_a_common_unit(weights: list[float], unit: float) -> None:
     assert common_unit(np.array(weights)) == (pytest.approx(unit), True)
 
 
-@pytest.mark.parametrize("weights", [[1.0, np.pi], [3.0, 3.0 + 1e-7], [1.0, 1e10]])
+@pytest.mark.parametrize("weights", [[1.0, np.pi], [3.0, 3.0 + 1e-7], [1.0, 1e17]])
 def test_weights_without_a_common_unit_get_a_fine_grain(weights: list[float]) -> None:
     unit, whole = common_unit(np.array(weights))
     assert not whole

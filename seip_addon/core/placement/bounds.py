@@ -173,7 +173,7 @@ def lagrangian_bound(
     step, stale = 1.0, 0
     current = best
     for iteration in range(iterations):
-        if best.value < goal - instance.slack or step < SMALLEST_STEP or clock.left <= 0:
+        if best.value < goal - instance.margin or step < SMALLEST_STEP or clock.left <= 0:
             break
         if iteration % REVIEW == REVIEW - 1 and len(can_reach(instance, best, goal)) <= WORTHWHILE * len(keep):
             within = can_reach(instance, bound_from(instance, best.targets, best.groups, exact=True), goal)
@@ -184,6 +184,7 @@ def lagrangian_bound(
             current = best = bound_from(instance, targets, groups, exact=False)
             direction[:], group_direction[:] = 0.0, 0.0
         yield Progress(iteration, iterations, "bounding what any placement can cover")
+        clock.spend(2 * instance.visible.size)
         picked = current.selection.picked
         seen = instance.visible[picked].sum(axis=0)
         slope = np.where(targets < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
@@ -243,7 +244,7 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     in_clique[:] = net[picked].min() if len(picked) == instance.count else 0.0
     in_clique[instance.clique[picked]] = net[picked]
     forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
-    return np.flatnonzero(forced >= goal - instance.slack)
+    return np.flatnonzero(forced >= goal - instance.margin)
 
 
 def _few(instance: Instance, candidates: Integer) -> bool:

@@ -1,4 +1,4 @@
-"""Branch and bound on what each sensor adds: proves small numbers of sensors that linear programs leave open.
+"""Branch and bound on what each sensor adds, first where the bound is largest.
 
 A placement is built in greedy order: each sensor adds no more than the one
 before it, because coverage is submodular. At a node with k sensors still to
@@ -10,6 +10,10 @@ matrix product, and cut most of them before they become nodes. Where rings of
 beams overlap a little everywhere the relaxed integer program is weak and this
 bound is strong.
 
+The largest bound among the open nodes holds for every placement that the
+search has not seen: it falls as the search goes on, and a search that is
+stopped can be continued.
+
 Weights are whole numbers, so a search meets the same placements in the same
 order on every machine.
 """
@@ -19,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from heapq import heappop, heappush
 
 import numpy as np
 
@@ -26,7 +31,7 @@ from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import lagrangian_bound, select
 from .clock import Clock
-from .instance import Instance, Numbers
+from .instance import EXACT, Instance, Numbers
 from .problem import TIE
 
 RELAXED = 3
@@ -39,29 +44,13 @@ FIRST_STEPS, LATER_STEPS = 300, 100
 """Steps that the multipliers of the first node may take, and of each later one from its parent's."""
 
 LARGEST = 30_000_000
-"""Entries of V up to which the search keeps V as numbers: 120 MB, or twice that where weights are uneven."""
+"""Entries of V up to which the search keeps V as numbers: 240 MB, or twice that where weights are uneven."""
 
-MOST_SENSORS = 8
-"""Beyond so many sensors to choose the branches are too many to hope for an end."""
+COPY = 8
+"""Multiplications that take as long as fetching an entry of V."""
 
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """What a search found.
-
-    Parameters
-    ----------
-    placements : tuple of (k,) int64
-        Sorted candidates of placements of the largest coverage found.
-    finished : bool
-        Whether no placement covers more; where there is none, that none reaches the goal.
-    complete : bool
-        Whether all that cover as much are among them, but for those with idle sensors.
-    """
-
-    placements: tuple[Integer, ...]
-    finished: bool
-    complete: bool
+WAITING = 16_000_000
+"""Followers of nodes that wait to be taken by their bounds: 200 MB. With so many, new nodes are searched first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +59,8 @@ class _Node:
 
     Parameters
     ----------
+    bound : float
+        No placement below this node covers more.
     chosen : tuple of int
         In the order in which they were chosen.
     value : float
@@ -81,79 +72,23 @@ class _Node:
         What each follower would add.
     multipliers : (t,) float64, optional
         Lagrangian multipliers of the targets to begin from.
+    multiplier : float
+        Multiplier of the budget to begin from.
     """
 
+    bound: float
     chosen: tuple[int, ...]
     value: float
     goal: float
     followers: Integer
     gains: Numbers
-    multipliers: Float | None
+    multipliers: Float | None = None
+    multiplier: float = 0.0
 
 
 def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
-    """Return whether a search among some candidates of an instance may end in useful time and memory."""
-    return instance.count <= MOST_SENSORS and len(candidates) * len(instance.weight) <= LARGEST
-
-
-def best_placements(
-    instance: Instance, goal: float, most: int, bound: float, clock: Clock, seconds: float
-) -> Generator[Progress, None, Found]:
-    """List the placements of largest coverage among those that cover at least ``goal``.
-
-    Parameters
-    ----------
-    instance : Instance
-    goal : float
-        Weight to be covered at least.
-    most : int
-        Longest list; of more placements these are the first that the search meets.
-    bound : float
-        No placement covers more: the search ends when the list is full of such.
-    clock : Clock
-    seconds : float
-        Longest time to search.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Found
-    """
-    search = _BestPlacements(instance, goal, most, bound)
-    finished = yield from search.run(clock, seconds)
-    return Found(tuple(search.found), finished, complete=finished and not search.overflowed)
-
-
-def first_in_order(
-    instance: Instance, goal: float, clock: Clock, seconds: float
-) -> Generator[Progress, None, tuple[Integer | None, bool]]:
-    """Find the first by `merit` of the placements that cover a goal with as many sensors as are allowed.
-
-    Parameters
-    ----------
-    instance : Instance
-        No placement with fewer sensors than its ``count`` reaches the goal.
-    goal : float
-    clock : Clock
-    seconds : float
-        Longest time to search.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    (k,) int64 or None
-    bool
-        Whether the search came to its end.
-    """
-    search = _FirstInOrder(instance, goal)
-    finished = yield from search.run(clock, seconds)
-    return search.best, finished
+    """Return whether a search among some candidates of an instance fits into useful memory."""
+    return len(candidates) * max(len(instance.weight), len(candidates)) <= LARGEST
 
 
 def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[int]]:
@@ -173,43 +108,102 @@ def relative_price(instance: Instance, price: float) -> float:
 
 
 class Search:
-    """The walk over all placements in greedy order; what is wanted of them is up to `_take` and `_is_hopeless`."""
+    """A walk over all placements in greedy order; what is wanted of them is up to `_take` and `_is_hopeless`.
 
-    def __init__(self, instance: Instance, goal: float) -> None:
+    Parameters
+    ----------
+    instance : Instance
+    goal : float
+        Weight to be covered at least.
+    depth_first : bool
+        Whether to follow each branch to its end before the next one, instead of taking the largest bound first.
+
+    Attributes
+    ----------
+    goal : float
+        A placement of less is not wanted. It rises as placements are found.
+    satisfied : bool
+        Whether enough was found.
+    """
+
+    def __init__(self, instance: Instance, goal: float, *, depth_first: bool = False) -> None:
         self.instance = instance
-        self.matrix = instance.matrix
-        self.weight = instance.weight.astype(self.matrix.dtype)
         self.goal = instance.attainable(goal) - instance.slack
         self.satisfied = False
+        self._depth_first = depth_first
         self._clock = Clock(math.inf)
+        self._matrix = instance.matrix
+        self._by_target = np.ascontiguousarray(self._matrix.T)
+        self._weight = instance.weight.astype(self._matrix.dtype)
+        self._overlap = (self._matrix * self._weight) @ self._by_target
+        self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
+        # sums of gains, each at most the total, are exact below EXACT and may be rounded down beyond
+        most = instance.total * (instance.count + 1)
+        self._rounding = 0.0 if most < EXACT else most * 2.0**-50
+        self._queue: list[tuple[tuple[float, int, int], _Node]] = []
+        self._stack: list[_Node] = []
+        self._serial = self._waiting = self._met = 0
+        gains = self._matrix @ self._weight
+        everyone = np.argsort(-gains, kind="stable")
+        self._push([_Node(math.inf, (), 0.0, -math.inf, everyone, gains[everyone])])
+
+    @property
+    def bound(self) -> float:
+        """No placement that the search has not seen covers more; -inf where all is seen that can be wanted."""
+        bounds = [node.bound for node in self._stack] + [node.bound for _, node in self._queue[:1]]
+        bound = max(bounds, default=-math.inf)
+        return bound if bound >= self.goal - self._rounding else -math.inf
 
     def run(self, clock: Clock, seconds: float, most: float = math.inf) -> Generator[Progress, None, bool]:
-        """Search depth first; return whether all was seen, or enough, before the time was up, in ``most`` branches."""
-        end = clock.elapsed + min(seconds, clock.left)
+        """Search on; return whether all was seen, or enough, before the time was up, in ``most`` branches."""
+        end, last = clock.elapsed + min(seconds, clock.left), self._met + most
         self._clock = clock
-        everyone = np.arange(len(self.instance))
-        stack = [_sorted_node((), 0.0, -math.inf, everyone, self.matrix @ self.weight, None)]
-        nodes = 0
-        while stack and not self.satisfied:
-            if clock.elapsed > end or nodes >= most:
+        while self._is_open() and not self.satisfied:
+            if clock.elapsed > end or clock.left <= 0 or self._met >= last:
                 return False
-            yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
-            nodes += 1
-            stack += reversed((yield from self._expand(stack.pop())))
+            yield Progress(0, 0, f"searching placements, {self._met:,} branches so far")
+            self._met += 1
+            self._push((yield from self._expand(self._pop())))
         return True
 
-    def _take(self, chosen: tuple[int, ...], value: float) -> float:
-        """Take a placement that reaches the goal; return the goal that placements with more sensors must reach."""
+    def _take(self, placement: Integer, value: float) -> float:
+        """Take a placement that may reach the goal; return the goal that placements with more sensors must reach."""
         raise NotImplementedError
 
     def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:
         """Whether nothing below is wanted for another reason than its coverage."""
         raise NotImplementedError
 
+    def offer(self, chosen: Integer) -> float:
+        """Take a placement found elsewhere; return the goal that placements with more sensors must reach."""
+        placement = np.sort(np.array(chosen, dtype=np.int64))
+        return self._take(placement, self.instance.covered(placement))
+
+    def _is_open(self) -> bool:
+        if not self._stack and self._queue and self._queue[0][1].bound < self.goal - self._rounding:
+            self._queue.clear()
+        return bool(self._stack or self._queue)
+
+    def _pop(self) -> _Node:
+        if self._stack:
+            return self._stack.pop()
+        node = heappop(self._queue)[1]
+        self._waiting -= len(node.followers)
+        return node
+
+    def _push(self, children: list[_Node]) -> None:
+        for child in reversed(children):
+            if self._depth_first or self._waiting > WAITING:
+                self._stack.append(child)
+            else:
+                self._serial += 1
+                heappush(self._queue, ((-child.bound, -len(child.chosen), self._serial), child))
+                self._waiting += len(child.followers)
+
     def _expand(self, node: _Node) -> Generator[Progress, None, list[_Node]]:
         """Return the children of a node that can still reach the goal; take those that do."""
-        goal = max(node.goal, self.goal)
-        left = self._left(node)
+        goal = self._wanted(node)
+        left = 0 if node.bound < goal else self._left(node)
         if left == 0:
             return []
         node, children = _within_reach(node, left, goal)
@@ -218,29 +212,39 @@ class Search:
         if left == 1:
             self._take_leaves(node, children)
             return []
-        rest = self._rest(node, left)
         if left >= RELAXED and children >= WIDE:
-            node, children = yield from self._relaxed(node, rest, left, goal)
+            node, children = yield from self._relaxed(node, left, goal)
             if children == 0:
                 return []
-            rest = self._rest(node, left)
-        later, gains_after = _after_each(rest, node.gains, children)
-        best = _best_completions(rest, node.gains, np.where(later, gains_after, 0.0), left - 1)
+        kept = self._children(node, children, left, goal)
+        if left > 2:
+            return kept
+        for child in kept:
+            self._met += 1
+            self._take_leaves(child, len(child.followers))
+        return []
+
+    def _children(self, node: _Node, children: int, left: int, goal: float) -> list[_Node]:
+        """Return the children of a node whose bounds reach the goal, after offering those that reach it themselves."""
+        later, gains_after = self._after_each(node, children)
+        multiplier, best = self._best_completions(node, np.where(later, gains_after, 0.0), left - 1)
         values = node.value + node.gains[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
-            chosen, value = (*node.chosen, int(node.followers[row])), float(values[row])
-            wanted = max(node.goal, self.goal)
+            chosen, value, wanted = (*node.chosen, int(node.followers[row])), float(values[row]), self._wanted(node)
             if value >= wanted:
-                wanted = self._take(chosen, value)
-            if value + best[row] >= wanted:
-                after = later[row]
-                kept.append(
-                    _sorted_node(
-                        chosen, value, wanted, node.followers[after], gains_after[row, after], node.multipliers
-                    )
-                )
+                wanted = self.offer(np.array(chosen))
+            if value + best[row] < wanted:
+                continue
+            after, bound = later[row], min(node.bound, value + float(best[row]))
+            order = np.flatnonzero(after)[np.argsort(-gains_after[row, after], kind="stable")]
+            followers, gains = node.followers[order], gains_after[row, order]
+            kept.append(_Node(bound, chosen, value, wanted, followers, gains, node.multipliers, multiplier))
         return kept
+
+    def _wanted(self, node: _Node) -> float:
+        """Return what a placement below a node must cover, but for rounding."""
+        return max(node.goal, self.goal) - self._rounding
 
     def _left(self, node: _Node) -> int:
         """Return how many sensors can follow at most."""
@@ -252,21 +256,24 @@ class Search:
         return int(np.count_nonzero(self.instance.affordable(spent + np.cumsum(prices))))
 
     def _take_leaves(self, node: _Node, children: int) -> None:
+        """Take the placements of one sensor more."""
+        if self._left(node) == 0:
+            return
         for candidate, gain in zip(node.followers[:children].tolist(), node.gains[:children].tolist(), strict=True):
-            if node.value + gain >= max(node.goal, self.goal):
-                self._take((*node.chosen, candidate), node.value + gain)
+            if node.value + gain < self._wanted(node):
+                return
+            self.offer(np.array((*node.chosen, candidate)))
 
-    def _rest(self, node: _Node, left: int) -> Instance:
-        """Return what is left to decide at a node: its followers, the targets that are not seen yet."""
+    def _limits(self, node: _Node, left: int) -> Instance:
+        """Return the followers of a node, without any target, and what the sensors chosen leave of the limits."""
         instance, followers = self.instance, node.followers
-        unseen = self._unseen(node)
         spent = math.fsum(instance.price[list(node.chosen)])
         return replace(
             instance,
-            visible=instance.visible[np.ix_(followers, unseen)],
-            weight=instance.weight[unseen],
+            visible=instance.visible[:0],
+            weight=instance.weight[:0],
             price=instance.price[followers],
-            conflict=instance.conflict[np.ix_(followers, followers)],
+            conflict=instance.conflict[:0],
             clique=instance.clique[followers],
             mandatory=np.zeros((0, len(followers)), bool),
             original=instance.original[followers],
@@ -274,87 +281,123 @@ class Search:
             budget=max(instance.budget * (1 + TIE) - spent, 0.0),
         )
 
-    def _unseen(self, node: _Node) -> Integer:
-        return np.flatnonzero(~self.instance.visible[list(node.chosen)].any(axis=0))
-
-    def _relaxed(
-        self, node: _Node, rest: Instance, left: int, goal: float
-    ) -> Generator[Progress, None, tuple[_Node, int]]:
+    def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
         """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
-        unseen = self._unseen(node)
+        instance, followers = self.instance, node.followers
+        unseen = np.flatnonzero(~instance.visible[list(node.chosen)].any(axis=0))
+        rest = replace(
+            self._limits(node, left),
+            visible=instance.visible[np.ix_(followers, unseen)],
+            weight=instance.weight[unseen],
+            conflict=instance.conflict[np.ix_(followers, followers)],
+        )
         start = None if node.multipliers is None else node.multipliers[unseen]
         steps = FIRST_STEPS if start is None else LATER_STEPS
         keep, bound = yield from lagrangian_bound(rest, goal - node.value, self._clock, start, steps)
-        multipliers = np.zeros(len(self.weight))
+        multipliers = np.zeros(len(instance.weight))
         multipliers[unseen] = bound.targets
-        node = replace(node, followers=node.followers[keep], gains=node.gains[keep], multipliers=multipliers)
+        node = replace(
+            node,
+            bound=min(node.bound, node.value + bound.value),
+            followers=followers[keep],
+            gains=node.gains[keep],
+            multipliers=multipliers,
+        )
         return _within_reach(node, left, goal)
 
+    def _after_each(self, node: _Node, children: int) -> tuple[Boolean, Numbers]:
+        """Return who may follow each child, and the gains of all followers on top of it, (children, n) each."""
+        instance, followers = self.instance, node.followers
+        first = followers[:children]
+        gains_after = node.gains - self._overlaps(node.chosen, followers, children)
+        later: Boolean = np.arange(len(followers)) > np.arange(children)[:, None]
+        later &= ~self._excluded[first[:, None], followers]
+        if math.isfinite(instance.budget):
+            spent = math.fsum(instance.price[list(node.chosen)])
+            later &= instance.affordable(spent + instance.price[first, None] + instance.price[followers])
+        return later, gains_after
 
-def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:
-    """Drop the followers whose gains are too small, and return how many can come next."""
-    sums = np.concatenate(([0.0], np.cumsum(node.gains, dtype=np.float64), np.full(left, np.sum(node.gains))))
-    reach = node.value + sums[left : left + len(node.gains)] - sums[: len(node.gains)]
-    # A follower matters only where it reaches the goal together with the largest gains.
-    useful = int(np.count_nonzero(node.value + sums[left - 1] + node.gains >= goal))
-    node = replace(node, followers=node.followers[:useful], gains=node.gains[:useful])
-    return node, int(np.count_nonzero(reach >= goal))
+    def _overlaps(self, chosen: tuple[int, ...], followers: Integer, children: int) -> Numbers:
+        """Return the weight that each child sees together with each follower and no chosen one, (children, n)."""
+        visible = self.instance.visible
+        seen = visible[list(chosen)].any(axis=0)
+        by_child = visible[followers[:children]].any(axis=0)
+        already, anew = np.flatnonzero(seen & by_child), np.flatnonzero(~seen & by_child)
+        targets = min(already, anew, key=len)
+        self._clock.spend(len(targets) * len(followers) * (children + COPY))
+        rows, by_target = followers[:children], self._by_target[targets]
+        if 2 * len(followers) < len(self.instance):
+            by_target = by_target[:, followers]
+            shared: Numbers = (by_target[:, :children] * self._weight[targets, None]).T @ by_target
+        else:
+            shared = ((by_target[:, rows] * self._weight[targets, None]).T @ by_target)[:, followers]
+        return self._overlap[rows[:, None], followers] - shared if targets is already else shared
+
+    def _best_completions(self, node: _Node, gains_after: Numbers, left: int) -> tuple[float, Float]:
+        """Return what so many sensors more add to each child at most, within what it leaves of the budget.
+
+        Returns
+        -------
+        float
+            Multiplier of the budget.
+        (children,) float64
+        """
+        best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
+        if not math.isfinite(self.instance.budget):
+            return 0.0, best
+        rest = self._limits(node, left + 1)
+        multiplier = select(rest, node.gains.astype(np.float64), node.multiplier).multiplier
+        if multiplier > 0:
+            net = np.maximum(gains_after - multiplier * rest.price, 0.0)
+            spent = multiplier * (rest.budget - rest.price[: len(net)])
+            best = np.minimum(best, _largest(net, left).sum(axis=1, dtype=np.float64) + spent)
+        return multiplier, best
 
 
-def _after_each(rest: Instance, gains: Numbers, children: int) -> tuple[Boolean, Numbers]:
-    """Return who may follow each child, and the gains of all followers on top of it, (children, n) each."""
-    matrix = rest.matrix
-    overlap = (matrix[:children] * rest.weight.astype(matrix.dtype)) @ matrix.T
-    later: Boolean = np.arange(len(gains)) > np.arange(children)[:, None]
-    later &= ~rest.conflict[:children]
-    later &= rest.price[:children, None] + rest.price <= rest.budget
-    return later, np.maximum(gains - overlap, 0.0)
+class BestPlacements(Search):
+    """Lists the placements of largest coverage among those that cover at least a goal: a better one clears the list.
 
+    Parameters
+    ----------
+    instance : Instance
+    goal : float
+        Weight to be covered at least.
+    most : int
+        Longest list; of more placements these are the first that the search meets.
+    bound : float
+        No placement covers more: the search ends when the list is full of such.
 
-def _best_completions(rest: Instance, gains: Numbers, gains_after: Numbers, left: int) -> Float:
-    """Return what so many sensors more add to each child at most, within what it leaves of the budget, (children,)."""
-    best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
-    multiplier = select(rest, gains.astype(np.float64)).multiplier
-    if multiplier > 0:
-        net = np.maximum(gains_after - multiplier * rest.price, 0.0)
-        spent = multiplier * (rest.budget - rest.price[: len(net)])
-        best = np.minimum(best, _largest(net, left).sum(axis=1, dtype=np.float64) + spent)
-    return best
-
-
-def _sorted_node(
-    chosen: tuple[int, ...],
-    value: float,
-    goal: float,
-    followers: Integer,
-    gains: Numbers,
-    multipliers: Float | None,
-) -> _Node:
-    order = np.argsort(-gains, kind="stable")
-    return _Node(chosen, value, goal, followers[order], gains[order], multipliers)
-
-
-class _BestPlacements(Search):
-    """Lists the placements of largest coverage: a better one clears the list."""
+    Attributes
+    ----------
+    overflowed : bool
+        Whether there are more. Otherwise, once the search has come to its end, all that cover as much are listed, but
+        for those with idle sensors.
+    """
 
     def __init__(self, instance: Instance, goal: float, most: int, bound: float) -> None:
         super().__init__(instance, goal)
-        self.found: list[Integer] = []
         self.overflowed = False
+        self._listed: dict[bytes, Integer] = {}
         self._most = most
         self._bound = bound
         self._value = -math.inf
 
-    def _take(self, chosen: tuple[int, ...], value: float) -> float:
+    @property
+    def found(self) -> list[Integer]:
+        """Sorted candidates of the placements that cover most, in the order in which they were met."""
+        return list(self._listed.values())
+
+    def _take(self, placement: Integer, value: float) -> float:
         instance = self.instance
-        placement = np.sort(np.array(chosen, dtype=np.int64))
-        if not instance.feasible(placement):
+        if value < self.goal or not instance.feasible(placement):
             return self.goal
         if value > self._value + instance.slack:
-            self.found, self.overflowed, self._value = [], False, value
+            self._listed, self.overflowed, self._value = {}, False, value
             self.goal = value - instance.slack
-        if len(self.found) < self._most:
-            self.found.append(placement)
+        if placement.tobytes() in self._listed:
+            return value + instance.step - instance.slack
+        if len(self._listed) < self._most:
+            self._listed[placement.tobytes()] = placement
         else:
             # one more than can be listed: from here on only a better one is of interest
             self.overflowed = True
@@ -366,21 +409,31 @@ class _BestPlacements(Search):
         return False
 
 
-class _FirstInOrder(Search):
-    """Keeps the first by merit, and cuts what is dearer or doubly covers less.
+class FirstInOrder(Search):
+    """Keeps the first by `merit` of the placements that cover a goal with as many sensors as are allowed.
 
-    What is covered once and what is covered twice are together a submodular
-    function too: the largest gains bound it in the same way.
+    What is dearer or doubly covers less is cut. What is covered once and what
+    is covered twice are together a submodular function too: the largest gains
+    bound it in the same way.
+
+    Parameters
+    ----------
+    instance : Instance
+        No placement with fewer sensors than its ``count`` reaches the goal.
+    goal : float
+
+    Attributes
+    ----------
+    best : (k,) int64 or None
     """
 
     def __init__(self, instance: Instance, goal: float) -> None:
-        super().__init__(instance, goal)
+        super().__init__(instance, goal, depth_first=True)
         self.best: Integer | None = None
         self._key: tuple[int, float, float, list[int]] | None = None
 
-    def _take(self, chosen: tuple[int, ...], value: float) -> float:  # noqa: ARG002 -- the goal is all that counts
-        placement = np.sort(np.array(chosen, dtype=np.int64))
-        if self.instance.feasible(placement):
+    def _take(self, placement: Integer, value: float) -> float:
+        if value >= self.goal and self.instance.feasible(placement):
             key = merit(self.instance, placement)
             if self._key is None or key < self._key:
                 self.best, self._key = placement, key
@@ -395,12 +448,21 @@ class _FirstInOrder(Search):
         if price != self._key[1]:
             return price > self._key[1]
         twice = np.minimum(instance.visible[list(chosen)].sum(axis=0), 2)
-        reach = float(instance.weight @ twice) + float(_largest(self._below_two(twice)[followers], left).sum())
-        doubly = reach - self.goal
+        below_two = instance.gains(instance.weight * (twice < 2))
+        reach = float(instance.weight @ twice) + float(_largest(below_two[followers], left).sum())
+        doubly = reach - self.goal + self._rounding
         return (doubly if instance.step == 1 else doubly / instance.step + 1) < -self._key[2]
 
-    def _below_two(self, times: Integer) -> Float:
-        return self.instance.gains(self.instance.weight * (times < 2))
+
+def _within_reach(node: _Node, left: int, goal: float) -> tuple[_Node, int]:
+    """Drop the followers whose gains are too small, and return how many can come next."""
+    gains = node.gains.astype(np.float64)
+    sums = np.concatenate(([0.0], np.cumsum(gains), np.full(left, gains.sum())))
+    reach = node.value + sums[left : left + len(gains)] - sums[: len(gains)]
+    # A follower matters only where it reaches the goal together with the largest gains.
+    useful = int(np.count_nonzero(node.value + sums[left - 1] + gains >= goal))
+    node = replace(node, followers=node.followers[:useful], gains=node.gains[:useful])
+    return node, int(np.count_nonzero(reach >= goal))
 
 
 def _largest(values: Numbers, number: int) -> Numbers:

@@ -1,4 +1,4 @@
-"""How much of a time limit is left."""
+"""How much of a limit of time, or of counted work, is left."""
 
 from __future__ import annotations
 
@@ -7,33 +7,89 @@ import time
 
 from ..errors import SeipError
 
+OPERATIONS = 1e10
+"""Multiplications that make a unit of work: about a second of one processor core."""
+
+SHORTEST = 0.01
+"""Seconds, or units of work, of a part of a limit where nothing is left."""
+
 
 class Clock:
-    """A time limit that starts now.
+    """A limit of time that starts now, and a limit of work that is the same on every machine.
+
+    Where work is limited, shares of what is left are shares of work: as long as
+    the time suffices, nothing depends on how fast the machine is.
 
     Parameters
     ----------
     limit : float, seconds
         May be infinite.
+    effort : float, units of work
+        About as many seconds of one processor core. May be infinite.
+    whole : Clock, optional
+        What this is a part of: work that is done here is done there as well.
+
+    Attributes
+    ----------
+    work : float
+        Units of work done.
 
     Raises
     ------
     SeipError
-        The limit is no positive number.
+        A limit is no positive number.
     """
 
-    def __init__(self, limit: float) -> None:
+    def __init__(self, limit: float, effort: float = math.inf, whole: Clock | None = None) -> None:
         if math.isnan(limit) or limit <= 0:
             raise SeipError(f"the time limit is {limit:g} s; give a positive number of seconds")
+        if math.isnan(effort) or effort <= 0:
+            raise SeipError(f"the effort is {effort:g} units of work; give a positive number")
         self._start = time.perf_counter()
         self._limit = limit
+        self._effort = effort
+        self._whole = whole
+        self.work = 0.0
+
+    def spend(self, operations: float) -> None:
+        """Count some multiplications as work."""
+        self.work += operations / OPERATIONS
+        if self._whole is not None:
+            self._whole.spend(operations)
+
+    def part(self, most: float, least: float = SHORTEST) -> Clock:
+        """Return a limit within this one, in the same measure; what is spent there is spent here."""
+        share = max(min(most, self.left), least)
+        if self.counts_work:
+            return Clock(max(self.seconds_left, least), share, self)
+        return Clock(share, whole=self)
+
+    def counted_part(self, most: float) -> Clock:
+        """Return a limit of so many units of work within what is left of this one."""
+        limit = min(most, self.left) if self.counts_work else most
+        return Clock(max(self.seconds_left, SHORTEST), max(limit, SHORTEST), self)
 
     @property
-    def elapsed(self) -> float:
+    def counts_work(self) -> bool:
+        """Whether work is limited."""
+        return math.isfinite(self._effort)
+
+    @property
+    def seconds(self) -> float:
         """Seconds since the start."""
         return time.perf_counter() - self._start
 
     @property
+    def seconds_left(self) -> float:
+        """Seconds until the limit of time, negative after it."""
+        return self._limit - self.seconds
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start, or units of work where these are limited."""
+        return self.work if self.counts_work else self.seconds
+
+    @property
     def left(self) -> float:
-        """Seconds until the limit, negative after it."""
-        return self._limit - self.elapsed
+        """Seconds or units of work until the limit, negative after it."""
+        return min(self.seconds_left, self._effort - self.work)

@@ -99,9 +99,10 @@ def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float
     best, best_at, seen_at_best = value, multipliers, seen
     direction, step, stale = np.zeros(len(multipliers)), 1.0, 0
     for iteration in range(ITERATIONS):
-        if best < goal - instance.slack or step < SMALLEST_STEP or clock.elapsed > end:
+        if best < goal - instance.margin or step < SMALLEST_STEP or clock.elapsed > end:
             break
         yield Progress(iteration, ITERATIONS, "bounding by districts")
+        clock.spend(6 * sum(district.matrix.size for district in districts))
         slope = np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
         direction = slope + DEFLECTION * direction
         size = float(direction @ direction)

@@ -12,6 +12,7 @@ import numpy as np
 from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
+from .clock import Clock
 from .instance import Instance
 from .integer_program import CoverProgram
 from .problem import PlacementProblem
@@ -78,7 +79,7 @@ def _decide(
     solver: str,
 ) -> Generator[Progress, None, Integer | None]:
     """Return the choice of largest objective, or None where there is none."""
-    outcome = yield from program.maximise(objective, solver, SECONDS)
+    outcome = yield from program.maximise(objective, solver, Clock(SECONDS))
     if outcome.chosen is None and not outcome.finished:
         raise SeipError(
             f"{SECONDS:g} s were too short to tell whether the mandatory places ({', '.join(problem.group_names)}) "

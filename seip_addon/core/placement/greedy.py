@@ -119,6 +119,7 @@ def tabu_search(
         if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
             break
         yield Progress(step, steps, "searching exchanges")
+        clock.spend(2 * columns.size)
         before, rests = rests, _rests(instance, chosen)
         if len(rests) == len(before):
             changed = np.flatnonzero((rests != before).any(axis=0))

@@ -14,6 +14,9 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from .problem import TIE, PlacementProblem, canonical_order
 
+EXACT = 2**53
+"""Sums of whole numbers up to here are exact in double precision."""
+
 SINGLE = 2**24
 """Sums of whole numbers up to here are exact in single precision, whatever the order of summation."""
 
@@ -22,6 +25,9 @@ FINEST = 2**50
 
 MICROMETRE = 1e-6
 """Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
+
+WHOLE_SLACK = 0.25
+"""Whole weights differ by one or not at all."""
 
 DENOMINATORS = range(1, 13)
 """A common unit of all weights is sought among these parts of the smallest one."""
@@ -44,7 +50,9 @@ class Instance:
     step : float
         Smallest difference between two covered weights that counts.
     slack : float
-        Covered weights that differ by no more count as equal.
+        Covered weights that differ by no more count as equal: less than one where weights have a common unit.
+    margin : float
+        What rounding may take from the bound of a relaxation.
     price : (c,) float64
     conflict : (c, c) bool
         Pairs that exclude each other: same position, or too close. The diagonal is false.
@@ -64,6 +72,7 @@ class Instance:
     weight: Float
     step: float
     slack: float
+    margin: float
     price: Float
     conflict: Boolean
     clique: Integer
@@ -92,7 +101,7 @@ class Instance:
 
     def attained(self, bound: float) -> float:
         """Return the largest covered weight up to ``bound`` that a placement can have at all."""
-        return math.floor(bound + self.slack) if self.step == 1 else bound
+        return math.floor(bound + self.margin) if self.step == 1 else bound
 
     def uncovered(self, chosen: Integer) -> Float:
         """Return the weights of the targets, zero where the chosen candidates see them, (t,) float64."""
@@ -166,7 +175,8 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         )
     unit, whole = common_unit(problem.weights[seen])
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
-    slack = TIE * float(weight.sum())
+    margin = TIE * float(weight.sum())
+    slack = min(margin, WHOLE_SLACK) if whole else margin
     places = len(np.unique(problem.positions[order]))
     conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
@@ -174,6 +184,7 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         weight=weight,
         step=1.0 if whole else 2 * slack,
         slack=slack,
+        margin=margin,
         price=problem.prices[order],
         conflict=conflict,
         clique=_cliques(conflict),
@@ -197,8 +208,9 @@ def _affordable_number(problem: PlacementProblem, order: Integer) -> int:
 def common_unit(weights: Float) -> tuple[float, bool]:
     """Return a unit in which all weights are whole numbers, and whether it is theirs or only a fine grain.
 
-    It is theirs where rounding all weights to its multiples moves no sum of
-    them by more than `TIE`, and a single unit counts for more than that.
+    It is theirs where all weights are whole numbers whose sum is exact in
+    double precision, or where rounding all weights to its multiples moves no
+    sum of them by more than `TIE` and a single unit counts for more than that.
 
     Parameters
     ----------
@@ -206,6 +218,8 @@ def common_unit(weights: Float) -> tuple[float, bool]:
         Positive.
     """
     total = math.fsum(weights)
+    if total <= EXACT and (weights == np.rint(weights)).all():
+        return float(np.gcd.reduce(weights.astype(np.int64))), True
     for parts in DENOMINATORS:
         unit = float(weights.min()) / parts
         rounding = math.fsum(np.abs(weights - np.rint(weights / unit) * unit))

@@ -9,7 +9,6 @@ import shutil
 import stat
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from pulp.apis.coin_api import pulp_cbc_path
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress, in_thread
+from .clock import OPERATIONS, Clock
 from .instance import Instance
 from .problem import TIE
 
@@ -36,6 +36,12 @@ TOLERANCE = 2e-6
 SOLVERS = ("highs", "cbc", "gurobi")
 """What `solver_name` knows beside ``auto``."""
 
+
+LEAST_SECONDS = 0.01
+"""Seconds that a solver is given where none are left."""
+
+PER_NODE = 1e4
+"""Multiplications for each entry of a program that count as the work of one branch of a solver."""
 
 LONGEST = 1e7
 """Seconds that solvers are given where there is no limit: not all of them take infinity."""
@@ -53,11 +59,14 @@ class Outcome:
         No placement has a larger objective; infinite where the solver does not say.
     finished : bool
         Whether the solver ran to its end: ``chosen`` is optimal, or nothing is feasible.
+    nodes : int
+        Branches that the solver took.
     """
 
     chosen: Integer | None
     bound: float
     finished: bool
+    nodes: int = 0
 
 
 class CoverProgram:
@@ -146,20 +155,25 @@ class CoverProgram:
         self,
         objective: Any,  # noqa: ANN401 -- as above
         solver: str,
-        seconds: float,
+        clock: Clock,
+        share: float = 1.0,
     ) -> Generator[Progress, None, Outcome]:
-        """Solve for the largest objective within a time limit; the last requirement stays.
+        """Solve for the largest objective within a share of what is left of the limits.
 
         The solver works in a thread of its own; when the generator is closed it is told to stop.
         """
         self.model.setObjective(objective)
-        ends = time.perf_counter() + seconds
+        ends = clock.elapsed + share * clock.left
+        size = np.count_nonzero(self.instance.visible) + len(self.x)
         while True:
-            left = max(ends - time.perf_counter(), 0.01)
+            left = max(ends - clock.elapsed, LEAST_SECONDS)
+            seconds = max(clock.seconds_left, LEAST_SECONDS) if clock.counts_work else left
+            nodes = math.ceil(left * OPERATIONS / (size * PER_NODE)) if clock.counts_work else None
             outcome = yield from in_thread(
-                lambda stop, left=left: self._solve(solver, left, stop),  # type: ignore[misc]
+                lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
                 f"solving an integer program of {len(self.x)} candidates",
             )
+            clock.spend((outcome.nodes + 1) * size * PER_NODE)
             chosen = outcome.chosen
             if chosen is None or all(check(chosen) for check in self._checks):
                 return outcome
@@ -167,9 +181,9 @@ class CoverProgram:
             others = np.setdiff1d(np.arange(len(self.x)), chosen)
             self.model += self.number_among(chosen) - self.number_among(others) <= len(chosen) - 1
 
-    def maximise_coverage(self, solver: str, seconds: float) -> Generator[Progress, None, Outcome]:
-        """Solve for the largest covered weight within a time limit; the outcome's bound is not scaled."""
-        outcome = yield from self.maximise(self.covered, solver, seconds)
+    def maximise_coverage(self, solver: str, clock: Clock, share: float = 1.0) -> Generator[Progress, None, Outcome]:
+        """Solve for the largest covered weight within the limits; the outcome's bound is not scaled."""
+        outcome = yield from self.maximise(self.covered, solver, clock, share)
         return replace(outcome, bound=outcome.bound / self.weight_scale)
 
     def _at_least(self, covered: Any, goal: float) -> Any:  # noqa: ANN401 -- as above
@@ -177,8 +191,8 @@ class CoverProgram:
         margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
         return covered >= (goal - margin) * self.weight_scale
 
-    def _solve(self, solver: str, seconds: float, stop: threading.Event) -> Outcome:
-        with _engine(solver, seconds, stop) as engine:
+    def _solve(self, solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Outcome:
+        with _engine(solver, limits, stop) as engine:
             try:
                 self.model.solve(engine)
             except (pulp.PulpSolverError, OSError) as error:
@@ -189,7 +203,7 @@ class CoverProgram:
         solved = status in (pulp.LpSolutionOptimal, pulp.LpSolutionIntegerFeasible)
         chosen = np.flatnonzero([round(x.value() or 0.0) for x in self.x]) if solved else None
         finished = status in (pulp.LpSolutionOptimal, pulp.LpSolutionInfeasible)
-        return Outcome(chosen, _bound(self.model, solver), finished)
+        return Outcome(chosen, _bound(self.model, solver), finished, _nodes(self.model, solver))
 
     @cached_property
     def _y(self) -> list[Any]:
@@ -280,12 +294,12 @@ def _linear(variables: list[Any], factors: Float) -> Any:  # noqa: ANN401 -- PuL
 
 
 @contextmanager
-def _engine(solver: str, seconds: float, stop: threading.Event) -> Iterator[Any]:
-    """Yield PuLP's interface to a solver, set to prove optimality.
+def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Iterator[Any]:
+    """Yield PuLP's interface to a solver, set to prove optimality within seconds and, where given, branches.
 
     HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
     """
-    limit = min(seconds, LONGEST)
+    limit, nodes = min(limits[0], LONGEST), limits[1]
     solver = solver_name(solver)
     if solver == "highs":
         import highspy  # noqa: PLC0415 -- only where it is asked for: another solver may be all there is
@@ -301,12 +315,14 @@ def _engine(solver: str, seconds: float, stop: threading.Event) -> Iterator[Any]
             threads=1,
             callbackTuple=(interrupt, None),
             callbacksToActivate=[kinds.kCallbackMipInterrupt, kinds.kCallbackSimplexInterrupt],
+            **({} if nodes is None else {"mip_max_nodes": nodes}),
         )
     elif solver == "cbc":
         with _executable_cbc() as path:
-            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=limit, gapRel=0.0, threads=1)
+            yield pulp.COIN_CMD(path=path, msg=False, timeLimit=limit, gapRel=0.0, threads=1, maxNodes=nodes)
     else:
-        yield pulp.GUROBI(msg=False, timeLimit=limit, gapRel=0.0, Threads=1)
+        more = {} if nodes is None else {"NodeLimit": nodes}
+        yield pulp.GUROBI(msg=False, timeLimit=limit, gapRel=0.0, Threads=1, **more)
 
 
 def _bound(model: pulp.LpProblem, solver: str) -> float:
@@ -319,6 +335,11 @@ def _bound(model: pulp.LpProblem, solver: str) -> float:
     if solver == "gurobi":
         return float(model.solverModel.ObjBound)
     return math.inf
+
+
+def _nodes(model: pulp.LpProblem, solver: str) -> int:
+    """Return how many branches a solver took; 0 where it does not say."""
+    return max(int(model.solverModel.getInfo().mip_node_count), 0) if solver_name(solver) == "highs" else 0
 
 
 @contextmanager

@@ -106,7 +106,7 @@ def near_best(
     search = _NearBest(instance, (1 - share) * best)
     finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
     if not finished:
-        search.exchange(np.flatnonzero(np.isin(instance.original, chosen)))
+        search.take_exchanges(np.flatnonzero(np.isin(instance.original, chosen)))
     rows = _in_rows([np.sort(instance.original[list(found)]) for found in search.found], len(chosen))
     used = np.append(problem.positions, -1)[rows]
     in_common = np.isin(used, problem.positions[chosen]).sum(axis=1)
@@ -124,20 +124,20 @@ class _NearBest(Search):
     """Lists every placement that reaches the goal."""
 
     def __init__(self, instance: Instance, goal: float) -> None:
-        super().__init__(instance, goal)
+        super().__init__(instance, goal, depth_first=True)
         self.found: dict[tuple[int, ...], float] = {}
 
-    def exchange(self, chosen: Integer) -> None:
+    def take_exchanges(self, chosen: Integer) -> None:
         """Take a placement, and those that have another candidate in place of one of its own."""
-        self._take(tuple(chosen.tolist()), self.instance.covered(chosen))
+        self.offer(chosen)
         for kept in (np.delete(chosen, number) for number in range(len(chosen))):
             values = self.instance.covered(kept) + self.instance.gains(self.instance.uncovered(kept))
             for other in np.setdiff1d(np.flatnonzero(values >= self.goal), kept):
-                self._take((*kept.tolist(), int(other)), float(values[other]))
+                self.offer(np.append(kept, other))
 
-    def _take(self, chosen: tuple[int, ...], value: float) -> float:
-        key = tuple(sorted(chosen))
-        if key not in self.found and self.instance.feasible(np.array(key)):
+    def _take(self, placement: Integer, value: float) -> float:
+        key = tuple(placement.tolist())
+        if value >= self.goal and key not in self.found and self.instance.feasible(placement):
             if len(self.found) == MOST_LISTED:
                 self.satisfied = True
             else:

@@ -13,7 +13,7 @@ from ..errors import SeipError
 from ..progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .clock import Clock
-from .exact import prove, solve
+from .exact import prove, solve_within
 from .feasibility import starting_choice
 from .greedy import greedy, greedy_and_exchange, without_idle
 from .instance import Instance, common_unit, make_instance
@@ -23,17 +23,23 @@ from .scale_notes import scale_notes
 from .ties import fewest
 
 FINISH = 1.0
-"""Seconds that choosing among equally cheap placements may take when the time limit is used up."""
+"""Seconds, or units of work, that choosing among equally cheap placements may always take."""
 
 
 def cheapest_for_coverage(
-    problem: PlacementProblem, coverage: float, *, solver: str = "highs", time_limit: float = 60.0
+    problem: PlacementProblem,
+    coverage: float,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
 ) -> Generator[Progress, None, Placement]:
     """Choose the cheapest placement that covers a share of all weight.
 
     Among the cheapest the one that covers most is returned, and among those
-    the one that `solve` prefers. With equal prices this is the placement of
-    fewest sensors. The result's objective, bound and gap are prices.
+    the one that `solve` prefers. Where all prices are equal, zero included,
+    the number of sensors stands for the price: the placement has the fewest
+    that suffice. The result's objective, bound and gap are prices.
 
     Parameters
     ----------
@@ -44,6 +50,8 @@ def cheapest_for_coverage(
     solver : str
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds
+    effort : float, units of work
+        As for `solve`.
 
     Yields
     ------
@@ -60,15 +68,16 @@ def cheapest_for_coverage(
     """
     if not 0 < coverage <= 1:
         raise SeipError(f"the coverage to reach is {coverage:g}; give a share above 0 and at most 1")
-    clock = Clock(time_limit)
+    clock = Clock(time_limit, effort)
     check_solver(solver)
     instance, factor = make_instance(problem)
     whole = math.fsum(problem.weights) * factor
     goal = instance.attainable(coverage * whole)
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
     cheapest, bound = yield from _cheapest(instance, without_idle(instance, chosen, goal), goal, solver, clock)
-    best = yield from solve(_no_dearer(problem, instance, cheapest), solver=solver, time_limit=max(clock.left, FINISH))
-    reached = best.covered * factor >= goal - instance.slack
+    finishing = clock.part(clock.elapsed, FINISH)  # no longer than it took to find the price
+    best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
+    reached = best.covered * factor >= goal - instance.margin
     chosen = best.chosen if reached else instance.original[cheapest]
     return _record(problem, chosen, bound, best, clock)
 
@@ -87,13 +96,13 @@ def _reaching(
     if covered >= goal - instance.slack:
         return proof.chosen
     wanted = f"a coverage of {goal / whole:.2%}"
-    if proof.bound < goal - instance.slack:
+    if instance.attained(proof.bound) < goal - instance.slack:
         raise SeipError(
             f"{wanted} cannot be reached: no placement covers more than {proof.bound / whole:.2%}; "
             "ask for less, or allow more or better sensors"
         )
     raise SeipError(
-        f"no placement with {wanted} was found in {clock.elapsed:.0f} s: the best one covers {covered / whole:.2%}; "
+        f"no placement with {wanted} was found in {clock.seconds:.0f} s: the best one covers {covered / whole:.2%}; "
         "ask for less or raise the time limit"
     )
 
@@ -101,8 +110,14 @@ def _reaching(
 def _cheapest(
     instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, float]]:
-    """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
+    """Return the cheapest placement that reaches the goal and a lower bound on the price of any.
+
+    Where all prices are zero the bound is -inf unless no fewer sensors suffice.
+    """
     price = math.fsum(instance.price[chosen])
+    if not instance.price.any():
+        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        return chosen, 0.0 if proven else -math.inf
     if price == 0:
         return chosen, price
     no_dearer = replace(instance, budget=min(price, instance.budget))
@@ -120,7 +135,7 @@ def _cheapest(
         return chosen, price
     yield Progress(0, 0, f"looking for a cheaper placement among {len(keep)} candidates")
     program = reaching(cheaper, goal)
-    outcome = yield from program.maximise(-1 * program.price, solver, clock.left)
+    outcome = yield from program.maximise(-1 * program.price, solver, clock)
     if outcome.chosen is not None:
         chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
     if outcome.finished:
@@ -143,7 +158,7 @@ def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer)
 
 def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
     record = record_choice(
-        problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.elapsed, notes=()
+        problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.seconds, notes=()
     )
     price = record.price
     optimal = bound >= price * (1 - 3 * TIE)
@@ -157,8 +172,8 @@ def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Plac
     return replace(
         record,
         objective=price,
-        bound=price if optimal else bound,
-        gap=0.0 if optimal else relative_gap(price, bound),
+        bound=price if optimal else max(bound, 0.0),
+        gap=0.0 if optimal else relative_gap(price, max(bound, 0.0)),
         status="optimal" if optimal else "feasible",
         notes=tuple(notes),
     )

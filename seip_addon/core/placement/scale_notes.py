@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .instance import common_unit
 from .problem import TIE, PlacementProblem
 
 
@@ -22,7 +23,7 @@ def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
     notes = []
     weights = problem.weights[problem.weights > 0]
     light = int(np.count_nonzero(weights < TIE * weights.sum()))
-    if light:
+    if light and not common_unit(weights)[1]:
         notes.append(
             f"{light:,} of {len(weights):,} targets weigh less than {TIE:g} of all weight each: beside the others "
             "they cannot decide; bring the weights closer together"

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Integer
 from ..progress import Progress
 from .bounds import lagrangian_bound
-from .branch_and_bound import best_placements, first_in_order, is_worthwhile, merit
+from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
 from .clock import Clock
 from .greedy import exchange, without_idle, without_weakest
 from .instance import Instance
@@ -71,8 +71,9 @@ def canonical_optimum(
     yield Progress(0, 0, f"breaking ties among {len(keep)} candidates")
     part, within = same_number.part(keep), np.searchsorted(keep, chosen)
     if is_worthwhile(same_number, keep):
-        found, finished = yield from first_in_order(part, goal, clock, clock.left)
-        candidates = [within] if found is None else [within, found]
+        search = FirstInOrder(part, goal)
+        finished = yield from search.run(clock, clock.left)
+        candidates = [within] if search.best is None else [within, search.best]
         return keep[min(candidates, key=lambda choice: merit(part, choice))], finished
     equal, all_found = yield from _all_equal(part, within, goal, solver, clock)
     best = min(equal, key=lambda choice: merit(part, choice))
@@ -97,13 +98,14 @@ def fewest(
             break
         yield Progress(0, 0, f"looking for fewer than {len(chosen)} sensors among {len(keep)} candidates")
         if is_worthwhile(fewer, keep):
-            found = yield from best_placements(fewer.part(keep), goal, 0, goal, clock, clock.left / 2)
-            if found.placements:
-                chosen = without_idle(fewer, keep[found.placements[0]], goal)
+            search = BestPlacements(fewer.part(keep), goal, 1, goal)
+            finished = yield from search.run(clock, clock.left / 2)
+            if search.found:
+                chosen = without_idle(fewer, keep[search.found[0]], goal)
                 continue
-            if found.finished:
+            if finished:
                 break
-        outcome = yield from reaching(fewer.part(keep), goal).maximise_coverage(solver, clock.left)
+        outcome = yield from reaching(fewer.part(keep), goal).maximise_coverage(solver, clock)
         if outcome.chosen is None:
             return chosen, outcome.finished
         chosen = without_idle(fewer, keep[outcome.chosen], goal)
@@ -122,7 +124,7 @@ def _all_equal(
     found = [chosen]
     while len(found) < SOME:
         program.require(program.number_among(found[-1]) <= len(chosen) - 1)
-        outcome = yield from program.maximise_coverage(solver, clock.left)
+        outcome = yield from program.maximise_coverage(solver, clock)
         if outcome.chosen is None:
             return found, outcome.finished
         found.append(outcome.chosen)
@@ -141,7 +143,7 @@ class _Stages:
 
     def maximise(self, objective: Any) -> Generator[Progress, None, None]:  # noqa: ANN401 -- PuLP's expressions are untyped
         if self.settled:
-            outcome = yield from self.program.maximise(objective, self._solver, self._clock.left)
+            outcome = yield from self.program.maximise(objective, self._solver, self._clock)
             self.settled = outcome.finished and outcome.chosen is not None
             if self.settled and outcome.chosen is not None:
                 self.chosen = outcome.chosen

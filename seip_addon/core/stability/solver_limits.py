@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..placement import Placement, PlacementProblem, solve, solve_greedy
+from ..placement.clock import Clock
 from ..placement.instance import make_instance
 from ..placement.integer_program import is_available, reaching
 from ..placement.near_best import FlatTop
@@ -264,7 +265,7 @@ def _span_check(
 def _by_program(problem: PlacementProblem, solver: str) -> Integer:
     """Return the choice of the integer program alone."""
     instance, _ = make_instance(problem)
-    outcome = finish(reaching(instance, 0.0).maximise_coverage(solver, 10.0))
+    outcome = finish(reaching(instance, 0.0).maximise_coverage(solver, Clock(10.0)))
     return np.zeros(0, dtype=np.int64) if outcome.chosen is None else instance.original[outcome.chosen]
 
 
