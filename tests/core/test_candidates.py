@@ -93,6 +93,13 @@ def test_a_pole_serves_its_surroundings():
     assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
 
 
+def test_a_pole_serves_half_the_spacing_and_no_more():
+    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
+    beside = shapely.box(2.5, 8.5, 3.5, 9.5)
+    candidates = lay_candidates(street(poles=(pole,), candidate_areas=beside), PLAIN)
+    assert candidates.on_pole.tolist().count(False) == 1
+
+
 def test_no_sensor_hangs_above_its_pole():
     poles = (Pole("low", np.array((0.0, 9.0, 0.1)), 6.0), Pole("mark", np.array((20.0, 9.0, 0.1))))
     candidates = lay_candidates(
@@ -124,6 +131,18 @@ def test_a_crown_stops_the_tall_post_and_lets_the_low_one_stand():
     candidates = lay_candidates(street(occluders=(crown,)), PLAIN)
     assert set(candidates.height) == {3.5}
     assert candidates.dropped["too close to a wall or object"] > 0
+
+
+@pytest.mark.parametrize(("above", "free"), [(0.2, False), (0.4, True)])
+def test_a_sensor_keeps_its_clearance_from_what_is_above_it(above, free):
+    low = 0.1 + 3.5 + above
+    roof = Mesh("roof", block((-60, 0, low), (60, 20, low + 1)))
+    settings = replace(PLAIN, heights=(3.5,), clearance=0.3)
+    if free:
+        assert len(lay_candidates(street(occluders=(roof,)), settings))
+    else:
+        with pytest.raises(SeipError, match="too close to a wall or object"):
+            lay_candidates(street(occluders=(roof,)), settings)
 
 
 def test_forbidden_areas_and_poles_are_left_out():
