@@ -103,4 +103,5 @@ def _quarters(tiles: Integer) -> Integer:
         for rows in ((bottom, row), (row, top))
     ]
     quarters = np.concatenate(parts)
-    return quarters[(quarters[:, 1] > quarters[:, 0]) & (quarters[:, 3] > quarters[:, 2])]
+    some: Integer = quarters[(quarters[:, 1] > quarters[:, 0]) & (quarters[:, 3] > quarters[:, 2])]
+    return some

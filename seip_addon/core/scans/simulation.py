@@ -74,12 +74,13 @@ class Simulation:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the scans, in sentences."""
-        return tuple(
+        blind = tuple(
             f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
             "look whether it hangs where it should"
             for scanner in self.scanners
             if scanner.sees_nothing
         )
+        return self._static.warnings + blind
 
     def frame(self, number: int, time: float) -> Frame:
         """Return what all sensors measure in the revolution that begins at a time.
