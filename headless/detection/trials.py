@@ -170,7 +170,7 @@ def disturbed_frames(
         bodies = [fitted_body(user) for user in trajectories.users]
         simulation = finish(prepare(studio.static, sensors, trajectories, bodies, studio.settings))
         for number, time in enumerate(run.times.tolist()):
-            random = np.random.default_rng([studio.settings.seed, number])
+            random = np.random.default_rng([studio.settings.seed, int(run.key, 16), number])
             yield run, disturbance.shown(disturbance.taken(simulation, number, time), sensors, random)
 
 
