@@ -109,6 +109,7 @@ def set_stage(options: argparse.Namespace) -> Stage:
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
     paths = options.traffic or runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
+    session.say(traffic.overlap())
     steps = case_study.place_all(
         surveyed.layout.site,
         surveyed.layout.models,

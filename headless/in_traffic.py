@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -34,6 +35,7 @@ from seip_addon.core.stability.traffic_study import (
 )
 from seip_addon.core.survey import surroundings
 from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 
 CHARTS = ("time_seen.png", "traffic.png")
 
@@ -86,6 +88,8 @@ def _runs(surveyed: survey.Survey, options: argparse.Namespace) -> tuple[list[Tr
         )
     runs = load_runs(paths, surveyed.layout.geometry.origin)
     check_runs(runs, surveyed.layout.site.region)
+    positions = [vehicle_positions(str(path), run) for path, run in zip(paths, runs, strict=True)]
+    session.say(require_independent(product(*parted(positions))))
     return parted(runs)
 
 

@@ -30,7 +30,7 @@ from seip_addon.core.pictures import stability_traffic_charts as traffic_charts
 from seip_addon.core.placement import PlacementProblem, solve
 from seip_addon.core.placement.near_best import FlatTop, near_best
 from seip_addon.core.progress import Progress
-from seip_addon.core.results.placement_record import versions
+from seip_addon.core.source_digest import source_digest
 from seip_addon.core.stability.arithmetic import arithmetic_rows, arithmetic_study
 from seip_addon.core.stability.criterion import criterion_rows, criterion_study
 from seip_addon.core.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
@@ -151,9 +151,9 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         grid_key(surveyed.layout),
         repr(surveyed.layout.settings),
         repr(stage.scope),
-        *(run.position for run in runs),
+        *(run.key for run in runs),
         *(other.name for other in options.other),
-        versions()["seip"],
+        source_digest("headless.stability"),
     )
     chapters = []
     for name, work in _chapters(stage):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.traffic import Trajectories
+
+_Run = TypeVar("_Run")
 
 JUDGES = 1 / 3
 """Share of the runs, the last ones, that placements are judged in and not chosen on."""
@@ -33,7 +36,7 @@ def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
     return [Trajectories.load(path).moved_to(origin) for path in paths]
 
 
-def parted(runs: list[Trajectories]) -> tuple[list[Trajectories], list[Trajectories]]:
+def parted(runs: list[_Run]) -> tuple[list[_Run], list[_Run]]:
     """Return the runs to choose on, and those to judge in."""
     judges = max(1, round(JUDGES * len(runs)))
     return runs[:-judges], runs[-judges:]

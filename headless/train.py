@@ -24,7 +24,7 @@ from headless.detection.average_precision import evaluate
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
-from headless.detection.frames import SampledRecording, recording_of, require_separate
+from headless.detection.frames import SampledRecording, recording_of, require_independent_splits, require_separate
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import grid_of
@@ -55,6 +55,7 @@ def main(argv: list[str]) -> None:
         name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
     }
     require_separate(splits)
+    session.say(require_independent_splits(splits))
     check_device(options.device)
     session.check_folder(options.output)
     session.open_scene(options.scene)

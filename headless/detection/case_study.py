@@ -25,6 +25,7 @@ from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
 from seip_addon.core.site import Site
 from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.visibility.grid import VisibilityGrid
 
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
@@ -77,7 +78,7 @@ class Traffic:
     Raises
     ------
     SeipError
-        A run is for two things: neighbouring frames show the same vehicles in the same places.
+        Two runs are nearly the same: their frames show the same vehicles in the same places.
     """
 
     training: tuple[TrafficRun, ...]
@@ -85,11 +86,12 @@ class Traffic:
     test: tuple[TrafficRun, ...]
 
     def __post_init__(self) -> None:
-        for one, other in combinations((*self.training, *self.validation, *self.test), 2):
-            if one.key == other.key:
-                raise SeipError(
-                    f"{one.name} and {other.name} are the same traffic: name runs that were simulated with other seeds"
-                )
+        self.overlap()
+
+    def overlap(self) -> str:
+        """Return a sentence on how much the runs of each pair overlap; see `require_independent`."""
+        runs = (*self.training, *self.validation, *self.test)
+        return require_independent(combinations([vehicle_positions(run.name, run.trajectories) for run in runs], 2))
 
 
 def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:

@@ -15,6 +15,7 @@ from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
 from seip_addon.core.scans.frame import Frame
 from seip_addon.core.scans.run_folder import frame_path, load_manifest
+from seip_addon.core.traffic.run_overlap import VehiclePositions, require_independent
 
 from .detector import Experience
 from .pillars import PillarGrid, fill_pillars
@@ -194,3 +195,28 @@ def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
                     f"{a.name} ({one}) and {b.name} ({other}) show the same run of traffic: "
                     "a detector must be tested on traffic that it has not seen, so simulate another run for one of them"
                 )
+
+
+def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str:
+    """See that no two splits show nearly the same traffic; return a sentence on how much their runs overlap.
+
+    Where vehicles are is read from the labels of all frames.
+
+    Raises
+    ------
+    SeipError
+        Two do.
+    """
+    runs = {
+        what: [_positions(recording) for recording in recordings] for what, recordings in splits.items() if recordings
+    }
+    return require_independent(pair for one, other in combinations(runs.values(), 2) for pair in product(one, other))
+
+
+def _positions(recording: Recording) -> VehiclePositions:
+    frames = [recording.frames[number] for number in range(len(recording.frames))]
+    return VehiclePositions(
+        name=recording.name,
+        time=np.array([frame.time for frame in frames]),
+        xy=[frame.labels.centre[frame.labels.category != "pedestrian", :2] for frame in frames],
+    )

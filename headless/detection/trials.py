@@ -16,6 +16,7 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import Frame, prepare
 from seip_addon.core.scans.run_folder import Run
+from seip_addon.core.source_digest import source_digest
 from seip_addon.core.storage import ArrayFile, digest
 from seip_addon.core.traffic.bodies import fitted_body
 
@@ -129,7 +130,7 @@ def trials(
     list of Trial
         One for each detector.
     """
-    setting = digest(ground.key(configuration), repr(RULE), repr(disturbance))
+    setting = digest(source_digest(__name__), ground.key(configuration), repr(RULE), repr(disturbance))
     paths = [store / f"{digest(setting, entrant.key)[:32]}.npz" for entrant in entrants]
     missing = [(entrant, path) for entrant, path in zip(entrants, paths, strict=True) if not path.exists()]
     if missing:
@@ -170,7 +171,7 @@ def disturbed_frames(
         bodies = [fitted_body(user) for user in trajectories.users]
         simulation = finish(prepare(studio.static, sensors, trajectories, bodies, studio.settings))
         for number, time in enumerate(run.times.tolist()):
-            random = np.random.default_rng([studio.settings.seed, number])
+            random = np.random.default_rng([studio.settings.seed, int(run.key, 16), number])
             yield run, disturbance.shown(disturbance.taken(simulation, number, time), sensors, random)
 
 

@@ -189,7 +189,8 @@ class Judge:
 
     def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Goal) -> None:
         spacing = max(JUDGED_ON, math.sqrt(geometry.region.area / MOST_JUDGED))
-        self.site = make_site(geometry, replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS)), spacing)
+        wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
+        self.site = make_site(geometry, wide, spacing, settings.reach())
         self.weights = target_weights(self.site, goal)
         self.geometry, self._goal = geometry, goal
         self._models = settings.models()
@@ -197,7 +198,7 @@ class Judge:
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
         """Find the best placement under some settings, and judge it."""
-        site = make_site(self.geometry, settings.candidates, settings.grid_spacing)
+        site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach())
         plan = yield from self.plan(site, settings)
         seen = plan.deployment.seen_by > 0
         return Answer(

@@ -75,7 +75,7 @@ def make_run(
         As for `frame_times`.
     """
     return Run(
-        static=static_scene(geometry),
+        static=static_scene(geometry, sensors),
         origin=geometry.origin,
         sensors=sensors,
         trajectories=trajectories,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from .arrays import Float
 from .candidates import Candidates, CandidateSettings, lay_candidates
 from .errors import SeipError
+from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined
 from .targets import Targets, lay_targets
 
@@ -31,7 +33,7 @@ class Site:
     targets : Targets
     candidates : Candidates
     triangles : (n, 3, 3) float64, metres
-        All static surfaces that a ray can end on, roads included.
+        All static surfaces that a ray which counts can end on, roads included.
     """
 
     name: str
@@ -42,7 +44,9 @@ class Site:
     triangles: Float
 
 
-def make_site(geometry: SceneGeometry, settings: CandidateSettings, grid_spacing: float = 1.0) -> Site:
+def make_site(
+    geometry: SceneGeometry, settings: CandidateSettings, grid_spacing: float = 1.0, reach: float = math.inf
+) -> Site:
     """Lay targets and candidates into a scene.
 
     Parameters
@@ -51,6 +55,8 @@ def make_site(geometry: SceneGeometry, settings: CandidateSettings, grid_spacing
     settings : CandidateSettings
     grid_spacing : float, metres
         Distance between neighbouring targets.
+    reach : float, metres
+        What is farther from the region ends no ray that counts, and is left out.
 
     Returns
     -------
@@ -65,7 +71,8 @@ def make_site(geometry: SceneGeometry, settings: CandidateSettings, grid_spacing
     if not geometry.roads:
         raise SeipError("there is no road: put the meshes of the carriageway into SEIP Roads")
     road = joined(geometry.roads)
-    everything = joined((*geometry.roads, *geometry.ground, *geometry.occluders))
+    near, _ = without_far_objects(geometry, geometry.region, reach)
+    everything = joined((*near.roads, *near.ground, *near.occluders))
     return Site(
         name=geometry.name,
         origin=geometry.origin,

@@ -14,6 +14,7 @@ import numpy as np
 from .candidates import CandidateSettings
 from .deployment import deploy
 from .errors import SeipError
+from .far_objects import without_far_objects
 from .goal import Goal, Plan, make_plan, placement_problem, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
 from .placement import Placement
@@ -79,6 +80,10 @@ class SurveySettings:
         check_solver(self.solver)
         return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
 
+    def reach(self) -> float:
+        """Return how far from a target a ray that sees it can begin, or be stopped, in metres."""
+        return max(model.max_range for model in self.models().values()) + self.visibility.delta
+
     def as_record(self) -> dict[str, Any]:
         """Return the settings as records hold them: defaults included, values that JSON knows."""
         return {
@@ -138,8 +143,9 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
         As for `SurveySettings.models` and `make_site`.
     """
     models = settings.models()
-    site = make_site(geometry, settings.candidates, settings.grid_spacing)
-    limits = (*rounding_warnings(geometry), *resolution_warnings(site, models, settings.visibility))
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach())
+    near, far = without_far_objects(geometry, geometry.region, settings.reach())
+    limits = (*far, *rounding_warnings(near), *resolution_warnings(site, models, settings.visibility))
     return Layout(geometry, site, models, settings, (*warnings, *limits))
 
 

@@ -131,6 +131,36 @@ def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
     assert len(near_rays(Beams.of([model], 0.0), patches)) == 0
 
 
+def test_least_range_is_measured_along_the_ray() -> None:
+    """Straight below a sensor a return is near in plan and as far off as the sensor is high."""
+    model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.4), azimuth_offsets=np.zeros(1))
+    surfaces = near_surfaces(road(20.0), np.array([[0.5, 0.0, 0.0]]), 1.0)
+    patches = target_patches(np.array([0.0, 0.0, 6.0]), surfaces)
+    for least, some in ((5.0, True), (7.0, False)):
+        beams = Beams.of([replace(model, min_range=least)], 0.0)
+        assert (len(near_rays(beams, patches)) > 0) == some
+
+
+def test_the_sign_of_a_level_beam_does_not_matter() -> None:
+    wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]]])
+    surfaces = near_surfaces(wall, np.array([[10.0, 4.0, 0.5]]), 1.0)
+    patches, planes = disc_patches(np.array([0.0, 0.0, 0.5]), surfaces, np.array([True]))
+    model = replace(random_model(np.random.default_rng(0)), points_per_second=10.0 * 360)
+    one = {"azimuth_offsets": np.zeros(1)}
+    kept = [
+        near_rays(Beams.of([replace(model, elevations=np.array([level]), **one)], 0.0), patches, planes)
+        for level in (0.0, -0.0)
+    ]
+    assert kept[0].width.tolist() == kept[1].width.tolist() != []
+
+
+def test_a_sensor_as_far_above_a_face_as_returns_may_lie_off_it() -> None:
+    surfaces = near_surfaces(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
+    patches, planes = disc_patches(np.array([0.0, 0.0, surfaces.tolerance]), surfaces, np.array([True]))
+    model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.2), azimuth_offsets=np.zeros(1))
+    assert (near_rays(Beams.of([model], 0.0), patches, planes).width == model.azimuth_count).any()
+
+
 def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
     model = LidarModel(
         key="k",

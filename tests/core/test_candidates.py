@@ -78,6 +78,45 @@ def test_spread_is_even_and_leaves_no_room(spacing, angle, width):
     assert room.area < 0.02 * spacing**2
 
 
+def one_by_one(area, spacing):
+    """A point of the fine grid is taken unless one taken before is too near."""
+    low_x, low_y, high_x, high_y = area.bounds
+    taken = np.empty((0, 2))
+    for x in np.arange(low_x + spacing / 16, high_x, spacing / 8):
+        for y in np.arange(low_y + spacing / 16, high_y, spacing / 8):
+            free = (np.hypot(taken[:, 0] - x, taken[:, 1] - y) >= spacing * (1 - 1e-9)).all()
+            if free and shapely.intersects_xy(area, x, y):
+                taken = np.vstack((taken, (x, y)))
+    return taken
+
+
+@settings(max_examples=15)
+@given(spacing=st.floats(1.5, 6.0), angle=st.floats(0, 3), width=st.floats(0.2, 20.0), hole=st.floats(0.1, 8.0))
+def test_spread_is_the_same_as_one_by_one(spacing, angle, width, hole):
+    area = shapely.affinity.rotate(shapely.box(0, 0, 30, width), angle, use_radians=True)
+    area = area.difference(area.centroid.buffer(hole))
+    np.testing.assert_array_equal(spread(area, spacing), one_by_one(area, spacing))
+
+
+def test_an_area_between_the_points_of_the_fine_grid_gets_none():
+    assert spread(shapely.box(0, 0, 30, 0.2), 6.0).shape == (0, 2)
+
+
+def test_the_work_of_spreading_grows_with_the_positions_alone(monkeypatch):
+    looked_at, compared = [], []
+    inside, distance = shapely.intersects_xy, np.hypot
+    monkeypatch.setattr(shapely, "intersects_xy", lambda area, x, y: looked_at.append(len(x)) or inside(area, x, y))
+    monkeypatch.setattr(np, "hypot", lambda x, y: compared.append(len(x)) or distance(x, y))
+    circle = shapely.Point(0, 0).buffer(1500, quad_segs=64)
+    for area in (shapely.box(0, 0, 200, 200), circle.difference(circle.buffer(-3))):
+        looked_at.clear()
+        compared.clear()
+        positions = len(spread(area, 4.0))
+        assert positions > 2000
+        assert sum(looked_at) < 1500 * positions
+        assert sum(compared) < 300 * positions
+
+
 def test_a_pole_carries_its_sensor_on_a_bracket_towards_the_region():
     pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
     candidates = lay_candidates(street(candidate_areas=shapely.Polygon(), poles=(pole,)), PLAIN)
@@ -91,6 +130,13 @@ def test_a_pole_serves_its_surroundings():
     candidates = lay_candidates(street(poles=(pole,)), PLAIN)
     posts = candidates.position[~candidates.on_pole]
     assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
+
+
+def test_a_pole_serves_half_the_spacing_and_no_more():
+    pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
+    beside = shapely.box(2.5, 8.5, 3.5, 9.5)
+    candidates = lay_candidates(street(poles=(pole,), candidate_areas=beside), PLAIN)
+    assert candidates.on_pole.tolist().count(False) == 1
 
 
 def test_no_sensor_hangs_above_its_pole():
@@ -124,6 +170,18 @@ def test_a_crown_stops_the_tall_post_and_lets_the_low_one_stand():
     candidates = lay_candidates(street(occluders=(crown,)), PLAIN)
     assert set(candidates.height) == {3.5}
     assert candidates.dropped["too close to a wall or object"] > 0
+
+
+@pytest.mark.parametrize(("above", "free"), [(0.2, False), (0.4, True)])
+def test_a_sensor_keeps_its_clearance_from_what_is_above_it(above, free):
+    low = 0.1 + 3.5 + above
+    roof = Mesh("roof", block((-60, 0, low), (60, 20, low + 1)))
+    settings = replace(PLAIN, heights=(3.5,), clearance=0.3)
+    if free:
+        assert len(lay_candidates(street(occluders=(roof,)), settings))
+    else:
+        with pytest.raises(SeipError, match="too close to a wall or object"):
+            lay_candidates(street(occluders=(roof,)), settings)
 
 
 def test_forbidden_areas_and_poles_are_left_out():

@@ -13,7 +13,9 @@ from engines import each_engine, needs_embree
 from float64_rays import first_hits as plain_first_hits
 
 from seip_addon.core.candidates import CandidateSettings
+from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.pictures.stability_limits_charts import save_rounding_chart
+from seip_addon.core.scans import MountedSensor, static_scene
 from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.stability.arithmetic import (
     ArithmeticStudy,
@@ -25,7 +27,7 @@ from seip_addon.core.stability.arithmetic import (
 from seip_addon.core.stability.float64_rays import first_hits
 from seip_addon.core.stability.hard_scenes import far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray
 from seip_addon.core.stability.shares import Share
-from seip_addon.core.survey import SurveySettings, lay_out
+from seip_addon.core.survey import SurveySettings, grid_key, lay_out
 from seip_addon.core.visibility import ray_casting
 from seip_addon.core.visibility.ray_casting import Engine
 from seip_addon.core.visibility.rounding import rounding_warnings
@@ -121,12 +123,47 @@ def test_a_stray_mesh_is_warned_of_by_name() -> None:
     assert "30,0" in warning
 
 
+SHORT = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))
+
+
+def wide_ground(extent: float) -> np.ndarray:
+    """A triangle from beside the road to far away."""
+    return np.array([[[-20.0, 8, 0], [20, 8, 0], [extent, 9, 0]]])
+
+
 def test_a_survey_carries_the_warning() -> None:
-    settings = SurveySettings(candidates=CandidateSettings(sensors=("type3",), heights=(5.4,), setback=0.5))
-    plain = lay_out(geometry(GROUND), settings)
-    stray = lay_out(geometry(GROUND, Mesh("left behind", moved(3e4, 0))), settings)
-    assert [w for w in stray.warnings if "left behind" in w]
+    plain = lay_out(geometry(GROUND), SHORT)
+    wide = lay_out(geometry(GROUND, Mesh("terrain", wide_ground(3e4))), SHORT)
+    assert [w for w in wide.warnings if "'terrain'" in w and "wide" in w]
     assert not [w for w in plain.warnings if "wide" in w]
+
+
+def test_what_was_forgotten_far_away_changes_nothing_and_is_named() -> None:
+    plain = lay_out(geometry(GROUND), SHORT)
+    stray = lay_out(geometry(GROUND, Mesh("left behind", moved(5e5, 0)), Mesh("another", moved(0, 400))), SHORT)
+    np.testing.assert_array_equal(stray.site.triangles, plain.site.triangles)
+    assert grid_key(stray) == grid_key(plain)
+    (warning,) = set(stray.warnings) - set(plain.warnings)
+    assert "4 triangles of 2 objects lie beyond every sensor's range of 301 m" in warning
+    assert "'left behind'" in warning
+    assert "499,9" in warning
+    assert "wide" not in warning
+
+
+def test_what_is_just_within_reach_stays() -> None:
+    inside, beyond = (lay_out(geometry(GROUND, Mesh("wall", moved(x, 0))), SHORT) for x in (340.5, 343))
+    assert len(inside.site.triangles) == 4
+    assert len(beyond.site.triangles) == 2
+
+
+def test_scans_leave_out_what_no_sensor_reaches() -> None:
+    sensor = MountedSensor("one", load_catalogue()["type1"], np.array([0.0, 0.0, 5.0]), np.eye(3))
+    stray = Mesh("left behind", moved(5e5, 0), np.full(2, 0.7))
+    near, far = static_scene(geometry(GROUND), [sensor]), static_scene(geometry(GROUND, stray), [sensor])
+    np.testing.assert_array_equal(far.triangles, near.triangles)
+    np.testing.assert_array_equal(far.reflectivity, near.reflectivity)
+    assert near.warnings == ()
+    assert "'left behind'" in far.warnings[0]
 
 
 def test_rows_say_where_it_begins(tmp_path: Path) -> None:

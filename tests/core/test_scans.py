@@ -232,6 +232,38 @@ def test_noise_of_what_stands_still_does_not_depend_on_the_traffic() -> None:
     assert set(still) <= points
 
 
+def share_in(points: np.ndarray, others: np.ndarray) -> float:
+    """Which share of points is, bit for bit, among others."""
+    known = {tuple(point) for point in others.tolist()}
+    return sum(tuple(point) in known for point in points.tolist()) / len(points)
+
+
+def test_runs_of_traffic_have_independent_noise() -> None:
+    static, sensor = make_static(ground()), make_sensor()
+    one, other = (
+        simulation(static, [sensor], parked((10.0, y, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0) for y in (0.0, 1e-3)
+    )
+    still, elsewhere = (frame.points[frame.instance == STATIC] for frame in (one, other))
+    assert len(still) > 1000
+    assert share_in(still, elsewhere) < 0.01
+
+
+def test_the_name_of_a_run_changes_no_noise() -> None:
+    static, cars = make_static(ground()), parked((10.0, 0.0, 0.0, 0.0, 0.0))
+    renamed = replace(cars, source="elsewhere", users=tuple(replace(user, name="other") for user in cars.users))
+    one, other = (simulation(static, [make_sensor()], motion, NOISY).frame(4, 0.0) for motion in (cars, renamed))
+    assert same(one, other)
+
+
+def test_sensors_have_independent_noise() -> None:
+    """Two of one model at one place: every return of one is measured anew by the other."""
+    sensors = [make_sensor(), make_sensor(label="S2")]
+    frame = simulation(make_static(ground()), sensors, parked((10.0, 0.0, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0)
+    one, other = (frame.points[frame.sensor == number] for number in (0, 1))
+    assert len(one) > 1000
+    assert share_in(one, other) < 0.01
+
+
 def test_noise_is_that_of_the_model() -> None:
     static, sensor = (
         make_static(ground()),

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from seip_addon.core.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
 from seip_addon.core.stability.rows import Row
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 CHAPTER = Chapter(
     "Poses",
@@ -46,3 +44,10 @@ def test_the_page_holds_all_rows_and_charts(tmp_path: Path) -> None:
     assert r"| coverage | σ 0.3 m | 45 % [44 %, 46 %] | 500 draws | warns \| names the sensor |" in text
     assert "![Distribution](stability/spread.png)" in text
     assert text.index("## Poses") < text.index("## Solvers")
+
+
+def test_the_shipped_page_says_differences_in_points() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "stability.md").read_text(encoding="utf-8")
+    of_what = re.compile(r"(gives away|loses at most|loses up to|standard deviation|hides) [\d.]+%|%\] (more|of it)")
+    assert [found.group() for found in of_what.finditer(page)] == []
+    assert "points of planned coverage" in page

@@ -25,11 +25,13 @@ from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.sight_lines import pose_at
 from seip_addon.core.site import Site, Targets
+from seip_addon.core.source_digest import source_digest
 from seip_addon.core.stability.criterion import in_view
 from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views
 from seip_addon.core.stability.pose_errors import PoseDraws
 from seip_addon.core.storage import digest
 from seip_addon.core.survey import SurveySettings
+from seip_addon.core.visibility import grid
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import (
     FILE,
@@ -153,7 +155,17 @@ def test_the_key_of_an_upright_grid_is_as_it_was_before_there_were_tilts():
     pattern = [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
     pattern += [float(model.min_range), float(model.max_range), float(model.attenuation)]
     known = digest(
-        *(FILE.schema, FILE.version, ANY, 1.0, 0.0, site.triangles, site.targets.xyz, poses.xyz, poses.yaw),
+        *(
+            FILE.schema,
+            source_digest(grid.__name__),
+            ANY,
+            1.0,
+            0.0,
+            site.triangles,
+            site.targets.xyz,
+            poses.xyz,
+            poses.yaw,
+        ),
         *(np.zeros(len(poses), dtype=np.int64), *pattern),
     )
     assert visibility_key(site, MODELS, SIGHT, ANY) == known

@@ -89,7 +89,8 @@ def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study)
             assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
             assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
-            assert seen.hidden.value >= seen.lost.value - 1e-12
+            assert seen.hidden.value == pytest.approx(seen.hidden_at.mean() / seen.empty, abs=1e-12)
+            assert seen.hidden.value * seen.empty >= seen.lost.value - 1e-12
         assert (placed.seen["height"].at <= placed.seen["height"].empty + 1e-12).all()
 
 
@@ -127,6 +128,9 @@ def test_it_says_what_traffic_hides(study):
     rows = traffic_rows(found)
     assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime
+    road = found.empty.seen["road"]
+    assert f"of what the empty road promises vehicles hide {road.hidden.in_words()}" in rows[0].begins
+    assert f", {found.won(found.layer).in_points()} more" in rows[2].begins
 
 
 def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_empty_road(study):

@@ -76,6 +76,7 @@ def test_an_evaluation_goes_on_and_ends_the_same(folder, tmp_path, capsys, monke
     run(tmp_path, "--ablation")
     said = capsys.readouterr().out
     assert all(f"warning: {count} × type1: " in said for count in (1, 2, 4))
+    assert "vehicles of one run within 1 m of one of another at the same instant: run-1 and run-2 11%, " in said
     assert "of the pillars with points have more than the 16 that are kept" in said
     for path in folder.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
@@ -85,7 +86,7 @@ def test_an_evaluation_goes_on_and_ends_the_same(folder, tmp_path, capsys, monke
     ("options", "runs", "sentence"),
     [
         ((), RUNS[:3], "3 runs of traffic are too few"),
-        ((), [*RUNS[:3], RUNS[0]], "run-1 and run-1 are the same traffic"),
+        ((), [*RUNS[:3], RUNS[0]], "run-1 and run-1 are nearly the same traffic"),
         (("--every", "0"), RUNS, "time between frames"),
         (("--seeds", "0"), RUNS, "one training or more"),
         (("--device", "abacus"), RUNS, "torch cannot use the device 'abacus'"),

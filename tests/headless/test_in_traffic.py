@@ -45,6 +45,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
+    assert "vehicles of one run within 1 m of one of another at the same instant: " in said
     assert "placing on traffic sees" in said
 
 
@@ -56,5 +57,7 @@ def test_traffic_that_is_of_no_use_is_refused(tmp_path):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "there.npz", x=9000.0))
     with pytest.raises(SeipError, match="simulate more traffic"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", end=1.0))
+    with pytest.raises(SeipError, match=r"here.npz and .*again.npz are nearly the same traffic"):
+        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "again.npz", x=0.5))
     with pytest.raises(SeipError, match="ask for one instant"):
         run(tmp_path / "out", "--instants", "0")

@@ -71,6 +71,10 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
     assert "Arithmetic:" in said
     assert "Poses" not in said
 
+    with patch.object(stability, "source_digest", lambda module: f"another version of {module}"):
+        run(tmp_path)
+    assert "Poses" in capsys.readouterr().out
+
 
 @pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic beside")])
 def test_another_scene_that_is_of_no_use_is_named_before_any_work(tmp_path, name, sentence):

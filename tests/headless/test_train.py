@@ -71,7 +71,9 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
     figures = json.loads((folder / "detector" / "evaluation.json").read_text(encoding="utf-8"))
     assert list(figures) == [str(folder / "third")]
     assert all(0 <= value <= 1 and math.isfinite(value) for value in figures[str(folder / "third")].values())
-    assert "pillars of 0.4 m" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "pillars of 0.4 m" in said
+    assert "vehicles of one run within 1 m of one of another at the same instant: " in said
 
 
 def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
@@ -101,6 +103,17 @@ def test_a_finished_training_is_not_done_again(folder):
 def test_the_same_traffic_in_two_splits_is_refused(folder):
     with pytest.raises(SeipError, match=r"first \(train\) and .*first \(test\) show the same run of traffic"):
         train.main(arguments(folder, "leak", test="first"))
+    assert not (folder / "leak").exists()
+
+
+def test_the_same_traffic_under_another_name_is_refused(folder):
+    shutil.copytree(folder / "first", folder / "copy")
+    manifest = folder / "copy" / "manifest.json"
+    record = json.loads(manifest.read_text(encoding="utf-8"))
+    record["trajectories"]["source"] = "elsewhere"
+    manifest.write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(SeipError, match=r"first and .*copy are nearly the same traffic: 100% of the vehicles"):
+        train.main(arguments(folder, "leak", test="copy"))
     assert not (folder / "leak").exists()
 
 

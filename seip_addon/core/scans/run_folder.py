@@ -14,6 +14,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..progress import Progress
+from ..source_digest import source_digest
 from ..storage import digest, save_json
 from ..traffic import Trajectories
 from .frame import Frame, Labels
@@ -70,6 +71,7 @@ class Run:
         return digest(
             SCHEMA,
             self.versions["seip"],
+            source_digest(__name__),
             json.dumps(asdict(self.settings)),
             *(self.static.triangles, self.static.reflectivity, self.static.region.wkb, self.origin, self.times),
             *(users, *motion, *sensors, *models),

@@ -74,12 +74,13 @@ class Simulation:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the scans, in sentences."""
-        return tuple(
+        blind = tuple(
             f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
             "look whether it hangs where it should"
             for scanner in self.scanners
             if scanner.sees_nothing
         )
+        return self._static.warnings + blind
 
     def frame(self, number: int, time: float) -> Frame:
         """Return what all sensors measure in the revolution that begins at a time.
@@ -87,7 +88,8 @@ class Simulation:
         Parameters
         ----------
         number : int
-            Of the frame: noise and losses follow from it, the seed and the sensor's number, and from nothing else.
+            Of the frame: noise and losses follow from it, the seed, the traffic and the sensor's number, and from
+            nothing else.
         time : float, seconds
         """
         snapshot = self._trajectories.at(time)
@@ -113,7 +115,9 @@ class Simulation:
     def _random(self, sensor: int, frame: int) -> np.random.Generator | None:
         if not self._settings.noise:
             return None
-        seed = np.random.SeedSequence(self._settings.seed, spawn_key=(sensor, frame))
+        # The traffic's digest is in it: else what stands still would be measured alike in frames of two runs.
+        entropy = [self._settings.seed, int(self._trajectories.key, 16)]
+        seed = np.random.SeedSequence(entropy, spawn_key=(sensor, frame))
         return np.random.Generator(np.random.SFC64(seed))
 
     def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], parts: Sequence[_Returns]) -> Labels:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
+from ..far_objects import without_far_objects
 from ..scene_geometry import DEFAULT_REFLECTIVITY, SceneGeometry, joined
+from .sensor import MountedSensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,19 +26,33 @@ class StaticScene:
     reflectivity : (n,) float64, 0 to 1
     region : shapely geometry
         Region of interest in plan.
+    warnings : tuple of str
+        What was left out of it.
     """
 
     triangles: Float
     reflectivity: Float
     region: BaseGeometry
+    warnings: tuple[str, ...] = ()
 
     def inside(self, xyz: Float) -> Boolean:
         """Tell which points (k, 3) are in the region of interest in plan, (k,)."""
         return np.asarray(shapely.contains_xy(self.region, xyz[:, 0], xyz[:, 1]), dtype=bool)
 
 
-def static_scene(geometry: SceneGeometry) -> StaticScene:
-    """Join a scene's surfaces, in an order that does not depend on that of the objects."""
+def static_scene(geometry: SceneGeometry, sensors: Sequence[MountedSensor] = ()) -> StaticScene:
+    """Join a scene's surfaces, in an order that does not depend on that of the objects.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    sensors : sequence of MountedSensor
+        What lies beyond the range of all of them is left out; nothing is where none are given.
+    """
+    warnings: tuple[str, ...] = ()
+    if sensors:
+        places = shapely.MultiPoint([sensor.xyz[:2] for sensor in sensors])
+        geometry, warnings = without_far_objects(geometry, places, max(s.model.max_range for s in sensors))
     meshes = (*geometry.roads, *geometry.ground, *geometry.occluders)
     given = [
         np.full(len(mesh.triangles), DEFAULT_REFLECTIVITY) if mesh.reflectivity is None else mesh.reflectivity
@@ -43,4 +60,4 @@ def static_scene(geometry: SceneGeometry) -> StaticScene:
     ]
     triangles, reflectivity = joined(meshes), np.concatenate([np.empty(0), *given])
     order = np.lexsort([reflectivity, *triangles.reshape(len(triangles), 9).T[::-1]])
-    return StaticScene(triangles[order], reflectivity[order], geometry.region)
+    return StaticScene(triangles[order], reflectivity[order], geometry.region, warnings)

@@ -318,7 +318,7 @@ def arithmetic_rows(study: ArithmeticStudy) -> list[Row]:
     for name, checks, answer in (
         ("far origin, computed", study.moved, "moves every scene to its middle in float64 before it casts"),
         ("far origin, stored by Blender", study.stored, "warns where the scene lies so far out"),
-        ("stray mesh", study.stray, "warns, and names the mesh"),
+        ("stray mesh", study.stray, "leaves out what no sensor reaches, and warns of wider meshes by name"),
     ):
         first, second = border(checks, NOTICEABLE), border(checks, 10 * NOTICEABLE)
         rows.append(

@@ -36,6 +36,7 @@ from ..visibility.grid import VisibilitySettings
 from ..visibility.ray_casting import RayCaster, make_ray_caster
 from ..visibility.ring_resolution import unresolved_from
 from ..visibility.turned import onlooker
+from .estimates import Estimate
 from .rows import Row
 from .shares import NORMAL, Share
 
@@ -426,9 +427,9 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
             Row(
                 method=f"coverage, {by_delta} at {least.height:g} m",
                 regime=f"δ from {least.delta:g} to {most.delta:g} m",
-                begins=f"coverage goes from {least.coverage:.1%} to {most.coverage:.1%} while {least.view:.1%} to "
-                f"{most.view:.1%} are in view; the placement loses at most "
-                f"{max(a.judged for a in answers) - min(a.judged for a in answers):.1%} of coverage",
+                begins=f"coverage goes from {least.coverage:.1%} to {most.coverage:.1%} of the targets while "
+                f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at most "
+                f"{100 * (max(a.judged for a in answers) - min(a.judged for a in answers)):.1f} points of coverage",
                 how="best placements under each δ, judged under the one asked for",
                 answer="the record holds δ; warns where it cannot resolve the rings",
             )
@@ -444,7 +445,7 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
             Row(
                 method="placement",
                 regime=what,
-                begins=f"loses up to {finest - worst.judged:.2%} of coverage ({spacing:g} m)",
+                begins=f"loses up to {100 * (finest - worst.judged):.2f} points of coverage ({spacing:g} m)",
                 how=f"best placements under each spacing, judged on targets {JUDGED_ON:g} m apart",
                 answer=f"--tolerance {study.convergence.tolerance:g} picks {picked:g} m",
             )
@@ -455,7 +456,7 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
             Row(
                 method="coverage",
                 regime=draws.what,
-                begins=f"standard deviation {draws.spread:.2%} [{low:.2%}, {high:.2%}]",
+                begins=f"standard deviation {Estimate(draws.spread, low, high).in_points()}",
                 how=f"{len(draws.coverage)} draws" + ("" if draws.settled else "; half of them say otherwise"),
                 answer="differences of coverage below twice that decide nothing",
             )

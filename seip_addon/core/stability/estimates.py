@@ -41,6 +41,11 @@ class Estimate:
         """Return value and interval as shares in per cent."""
         return f"{self.value:.{decimals}%} [{self.low:.{decimals}%}, {self.high:.{decimals}%}]"
 
+    def in_points(self, decimals: int = 2) -> str:
+        """Return value and interval as differences of shares, in percentage points."""
+        value, low, high = (f"{100 * part:.{decimals}f}" for part in (self.value, self.low, self.high))
+        return f"{value} points [{low}, {high}]"
+
 
 def mean_of(values: Float) -> Estimate:
     """Estimate a mean; its interval is that of the normal approximation, for some thirty draws and more.

@@ -222,7 +222,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             "a sensor's own error",
             regime,
             f"{worst} costs most{'' if certain else ', though not for certain'}: "
-            + ", ".join(f"{label} {loss.in_words()}" for label, loss in zip(study.labels, losses, strict=True)),
+            + ", ".join(f"{label} {loss.in_points()}" for label, loss in zip(study.labels, losses, strict=True)),
             "mean loss of coverage when one sensor alone errs, the same draws",
             "the warning names the sensor",
         ),
@@ -233,7 +233,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             Row(
                 "a kind of error",
                 regime,
-                f"{costly} costs most: " + ", ".join(f"{kind} {loss.in_words()}" for kind, loss in kinds.items()),
+                f"{costly} costs most: " + ", ".join(f"{kind} {loss.in_points()}" for kind, loss in kinds.items()),
                 f"mean loss of coverage, each kind alone, {settings.draws_of_kind} draws",
                 "set what the installer must hold to by the costly kind first",
             )

@@ -219,10 +219,10 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
         Row(
             f"placement for {contender.name}",
             regime,
-            f"gives away {study.price(contender):.2%} of planned coverage; 5 % quantile of "
+            f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
             f"{contender.judged_by.outcome_in_words()} {contender.low.in_words()} against "
             f"{study.beside(contender).low.in_words()} of the nominal optimum: "
-            f"{study.saving(contender).in_words()} more",
+            f"{study.saving(contender).in_points()} more",
             f"{settings.unseen} draws that nothing was chosen on; half of them "
             f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
             f"certificate: within {contender.placement.gap:.2%} of the best objective possible",

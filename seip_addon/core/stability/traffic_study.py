@@ -95,8 +95,8 @@ class Seen:
 
     @property
     def hidden(self) -> Estimate:
-        """The share of the weight that is seen on the empty road and hidden by vehicles, on average over time."""
-        return mean_over_time(self.hidden_at, self.stretch)
+        """Of the weight that is seen on the empty road, the share that vehicles hide, on average over time."""
+        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.stretch)
 
     @property
     def rarely(self) -> float:
@@ -294,11 +294,12 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
         Row(
             f"view of the {WHAT[layer]}",
             regime,
-            f"the empty road promises {seen.empty:.2%}, traffic leaves {seen.held.in_words()} on average over time "
-            f"and hides {seen.hidden.in_words()} of it; "
-            f"{seen.rarely:.1%} of what counts as seen is seen less than {MOSTLY:.0%} of the time",
+            f"of the targets' weight the empty road promises {seen.empty:.2%} and traffic leaves "
+            f"{seen.held.in_words()} on average over time; of what the empty road promises vehicles hide "
+            f"{seen.hidden.in_words()}, and {seen.rarely:.1%} of its targets are seen less than {MOSTLY:.0%} of the "
+            "time",
             how,
-            f"a warning where {NOTABLE:.0%} or more is lost, and a map of the share of time",
+            f"a warning where {NOTABLE:.0%} of the weight or more is lost, and a map of the share of time",
         )
         for layer, seen in study.empty.seen.items()
     )
@@ -306,7 +307,7 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
         f"placement for the empty road, to see the {WHAT[study.layer]}",
         regime,
         f"placing on traffic holds {study.traffic.seen[study.layer].held.in_words()}, "
-        f"{study.won(study.layer).in_words()} more",
+        f"{study.won(study.layer).in_points()} more",
         f"chosen on {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Float, Integer
-from ..storage import ArrayFile
+from ..storage import ArrayFile, digest
 
 FILE = ArrayFile("seip.trajectories", 1, "file of trajectories", "import or simulate them again")
 _ARRAYS = ("origin", "first", "time", "position", "yaw", "pitch", "speed")
@@ -107,6 +108,12 @@ class Trajectories:
     def __len__(self) -> int:
         """Return the number of road users."""
         return len(self.users)
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of who moves how, whatever the road users and the source are called."""
+        sizes = [(user.category, user.length, user.width, user.height, user.paint) for user in self.users]
+        return digest(repr(sizes), self.first, self.time, self.position, self.yaw, self.pitch, self.speed)
 
     @property
     def span(self) -> tuple[float, float]:

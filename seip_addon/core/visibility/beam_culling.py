@@ -308,6 +308,7 @@ def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
 
 def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Float]:
     """Distances in plan at which a beam enters and leaves heights; NaN where it always is between them."""
+    slope = slope + 0.0  # the slope of a level beam may be -0.0, whose quotients have the wrong sign
     with np.errstate(divide="ignore", invalid="ignore"):
         at_bottom, at_top = bottom / slope, top / slope
     return np.where(slope < 0, at_top, at_bottom), np.where(slope < 0, at_bottom, at_top)
@@ -330,7 +331,7 @@ def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
     nearest, farthest = distance - planes.tolerance, distance + planes.tolerance
     climb = normal[:, 2] * arcs.slope
     with np.errstate(divide="ignore"):
-        least = nearest / np.where(nearest > 0, arcs.end, arcs.begin)
+        least = nearest / np.where(nearest >= 0, arcs.end, arcs.begin)
         most = farthest / arcs.begin
     outer = np.arccos(np.clip((least - climb) / level, -1, 1)) + _MARGIN
     inner = np.arccos(np.clip((most - climb) / level, -1, 1)) - _MARGIN

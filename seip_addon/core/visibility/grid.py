@@ -22,6 +22,7 @@ from ..errors import SeipError
 from ..lidar import LidarModel, find_models
 from ..progress import Progress
 from ..site import Site
+from ..source_digest import source_digest
 from ..storage import ArrayFile, digest
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
@@ -129,7 +130,7 @@ class VisibilityGrid:
 
 
 def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: str) -> str:
-    """Return the digest of all that a grid follows from, names left out.
+    """Return the digest of all that a grid follows from, the program's code among it and names left out.
 
     A stored grid with this key needs no computing again. ``engine`` is ``bvh`` or ``embree``.
     """
@@ -145,7 +146,7 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     which = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
     tilts = (site.candidates.tilt,) if site.candidates.tilt.any() else ()  # a level grid has the key that it always had
     return digest(
-        *(FILE.schema, FILE.version, engine, float(settings.delta), float(settings.min_intensity)),
+        *(FILE.schema, source_digest(__name__), engine, float(settings.delta), float(settings.min_intensity)),
         *(site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, which),
         *patterns,
         *tilts,

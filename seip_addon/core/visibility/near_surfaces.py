@@ -52,8 +52,9 @@ class Cuts:
         middle = self.middle
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
         half = self.radius * np.sqrt(np.maximum(1 - self.normal[:, 2] ** 2, 0.0))
-        low = np.maximum(middle[:, 2] - half, np.minimum(np.minimum(a[:, 2], b[:, 2]), c[:, 2]))
-        high = np.minimum(middle[:, 2] + half, np.maximum(np.maximum(a[:, 2], b[:, 2]), c[:, 2]))
+        # The tolerance comes before any comparison: on a level face both heights are one but for rounding.
+        low = np.maximum(middle[:, 2] - half, np.minimum(np.minimum(a[:, 2], b[:, 2]), c[:, 2])) - tolerance
+        high = np.minimum(middle[:, 2] + half, np.maximum(np.maximum(a[:, 2], b[:, 2]), c[:, 2])) + tolerance
         # In plan a small or steep triangle lies in a circle about its centroid that is narrower than the disc.
         centroid = (a + b + c) / 3
         x, y = ((self.corners - centroid[:, None])[:, :, axis] for axis in (0, 1))
@@ -67,8 +68,8 @@ class Cuts:
             centre=centre[both],
             normal=self.normal[both],
             radius=radius[both],
-            low=low[both] - tolerance,
-            high=high[both] + tolerance,
+            low=low[both],
+            high=high[both],
             cuts=self,
         )
 
