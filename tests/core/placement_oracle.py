@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 
 from seip_addon.core.placement import PlacementProblem
 
+WEIGHTS = [[1.0], [1.0, 2.0], [0.0, 0.5, 3.0], [1e-3, 1.0, 7.0], [2.0**21 - 1, 2.0**21 + 1]]
+"""Weights to draw from. The last ones have sums that single precision holds, while sums of their sums are rounded."""
+
 
 @st.composite
 def small_problems(draw: st.DrawFn, *, limits: bool = True, seen: bool = True) -> PlacementProblem:
@@ -18,7 +21,7 @@ def small_problems(draw: st.DrawFn, *, limits: bool = True, seen: bool = True) -
     targets = draw(st.integers(1, 7))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     visible = rng.random((number, targets)) < draw(st.sampled_from([0.2, 0.4, 0.7]))
-    weights = rng.choice(draw(st.sampled_from([[1.0], [1.0, 2.0], [0.0, 0.5, 3.0], [1e-3, 1.0, 7.0]])), targets)
+    weights = rng.choice(draw(st.sampled_from(WEIGHTS)), targets)
     forbidden = rng.random(number) < (0.15 if limits else 0)
     forbidden[0] = False
     positions = rng.integers(0, 5, number) if limits else np.arange(number)
