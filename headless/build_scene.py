@@ -38,6 +38,8 @@ def main(argv: list[str]) -> None:
     save_blend(asked.output)
     for note in model.notes:
         sys.stdout.write(f"note: {note}\n")
+    for warning in model.warnings:
+        sys.stdout.write(f"warning: {warning}\n")
     x, y, z = model.origin + 0.0  # no negative zero
     sys.stdout.write(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "

@@ -209,6 +209,11 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         soft_max=5.0,
         step=10,
     )
+    assumed_poles: BoolProperty(
+        name="Assumed Poles",
+        description="Let poles carry sensors that are assumed, since the map has none for its traffic lights",
+        default=_LAYOUT.assumed_poles,
+    )
     engine: EnumProperty(
         name="Ray Caster",
         description="What casts the rays",
@@ -258,6 +263,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 setback=_written(self.setback),
                 clearance=_written(self.clearance),
                 bracket=_written(self.bracket),
+                assumed_poles=self.assumed_poles,
             ),
             visibility=VisibilitySettings(_written(self.delta), _written(self.min_intensity)),
             grid_spacing=_written(self.grid),

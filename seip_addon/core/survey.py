@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from .candidates import CandidateSettings
+from .candidates import CandidateSettings, assumed_pole_warnings
 from .deployment import deploy
 from .errors import SeipError
 from .goal import Goal, Plan, make_plan, placement_problem, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
+from .obstruction import bareness_warnings
 from .placement import Placement
 from .placement.integer_program import check_solver
 from .placement.near_best import near_best
@@ -139,7 +140,12 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     """
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
-    limits = (*rounding_warnings(geometry), *resolution_warnings(site, models, settings.visibility))
+    limits = (
+        *bareness_warnings(geometry),
+        *assumed_pole_warnings(geometry, site.candidates),
+        *rounding_warnings(geometry),
+        *resolution_warnings(site, models, settings.visibility),
+    )
     return Layout(geometry, site, models, settings, (*warnings, *limits))
 
 

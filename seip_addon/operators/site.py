@@ -118,6 +118,8 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
             bpy.context.window.scene = built
         for note in result.model.notes:
             self.report({"INFO"}, note)
+        for warning in result.model.warnings:
+            self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{len(result.model.parts)} objects, region {result.model.region.area:,.0f} m²")
 
 

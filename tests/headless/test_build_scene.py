@@ -54,6 +54,7 @@ def test_the_command_runs_as_a_module_and_as_a_file(road, tmp_path, form):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "region of interest" in done.stdout
+    assert done.stdout.count("warning: nothing in this scene can hide anything") == 1
     assert list(opened(output)[contract.ORIGIN]) == [1100, 2000, 0]
 
 

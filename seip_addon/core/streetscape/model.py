@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -11,8 +11,10 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..obstruction import BARE, can_hide
 from ..opendrive import (
     LaneSurface,
+    PlacedObject,
     RoadMap,
     find_junction,
     junction_area,
@@ -22,11 +24,22 @@ from ..opendrive import (
     placed_signals,
 )
 from ..progress import Progress
-from ..scene_geometry import DEFAULT_WEIGHT
+from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
 from .description import Poles, SiteDescription, WeightedRegion
-from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
+from .map_furniture import (
+    CROWN_SHARE,
+    arm_heading,
+    building_parts,
+    is_trunk,
+    local_objects,
+    object_parts,
+    pole_part,
+    tree_part,
+)
 from .parts import Part, Role
+from .road_surface import Roadside
+from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
 
 STAGES = 6
@@ -83,6 +96,8 @@ class SiteModel:
         Region of interest in plan, local axes.
     notes : tuple of str
         What was assumed because the map does not say it, a sentence each.
+    warnings : tuple of str
+        What makes results of the scene worth little, a sentence each.
     """
 
     name: str
@@ -92,6 +107,7 @@ class SiteModel:
     parts: tuple[Part, ...]
     region: BaseGeometry
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +119,7 @@ class _Street:
     region: BaseGeometry
     extent: BaseGeometry
     carriageway: BaseGeometry
+    roadside: Roadside
     terrain: Terrain
 
 
@@ -139,9 +156,11 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     street = _street(surfaces, origin, _shifted(region, -origin))
     yield next(stages)
     around = _shifted(street.extent, origin)
-    objects = object_parts(placed_objects(road_map, area=around), origin, street.carriageway)
-    signals = signal_parts(placed_signals(road_map, area=around), origin, street.carriageway, street.terrain)
-    furniture = [*objects, *signals, *_described_parts(description, street)]
+    placed = local_objects(placed_objects(road_map, area=around), origin)
+    hung = [replace(one, position=one.position - origin) for one in placed_signals(road_map, area=around)]
+    others, lights = split_posts(placed, hung, street.roadside)
+    signals = signal_parts(lights, street.roadside, street.terrain)
+    furniture = [*object_parts(others, street.carriageway), *signals, *_described_parts(description, street)]
     yield next(stages)
     pavement, notes = _pavement_parts(street)
     yield next(stages)
@@ -166,8 +185,25 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
-        notes=notes,
+        notes=(*notes, *_furniture_notes(placed, signals)),
+        warnings=() if any(_hides(part) for part in furniture) else (BARE,),
     )
+
+
+def _hides(part: Part) -> bool:
+    return Role.OCCLUDERS in part.roles and can_hide(part.solid.vertices)
+
+
+def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
+    """Say what was made up of furniture that the map does not describe."""
+    assumed = sum(part.source == ASSUMED for part in signals)
+    if assumed:
+        posts = f"{assumed} posts of traffic lights are" if assumed > 1 else "1 post of traffic lights is"
+        yield f"{posts} assumed, since the map has none there: no sensor hangs there unless assumed poles are asked for"
+    trunks = sum(map(is_trunk, placed))
+    if trunks:
+        trees = f"{trunks} tree{'s' * (trunks > 1)}"
+        yield f"the map gives {trees} the width of a trunk: the crown is taken as {CROWN_SHARE:g} times the height"
 
 
 def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface, ...]]:
@@ -241,9 +277,9 @@ def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
-    carriageway = road_surface.lane_outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
-    shapely.prepare(carriageway)
-    return _Street(origin, lanes, region, extent, carriageway, Terrain(triangles))
+    roadside = road_surface.roadside(lanes)
+    shapely.prepare(roadside.carriageway)
+    return _Street(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
 
 
 def _surface_parts(street: _Street) -> list[Part]:
@@ -393,11 +429,11 @@ def _described_parts(description: SiteDescription, street: _Street) -> list[Part
 def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]:
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
-        yield pole_part(f"Street light {number}", shape, foot, heading)
+        yield pole_part(f"Street light {number}", shape, foot, heading, DESCRIBED)
     keeps_left = any(lane.keeps_left for lane in street.lanes)
     for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
         shape = street_furniture.signal_pole(row.height, row.arm, faces_left=not keeps_left)
-        yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading)
+        yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading, DESCRIBED)
 
 
 def _pole_places(rows: Sequence[Poles], street: _Street) -> Iterator[tuple[Float, float, Poles]]:

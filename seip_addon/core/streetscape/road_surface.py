@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -48,6 +49,62 @@ NARROW = 1.0
 """Lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them."""
 SEAM = 0.05
 """Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
+
+ISLAND = 400.0
+"""Holes of the carriageway smaller than this (m²) are islands, on which no post is assumed."""
+MEDIAN = 12.0
+"""Holes narrower than this (metres) are medians: likewise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Roadside:
+    """The carriageway and where it ends at its sides, in local axes.
+
+    Parameters
+    ----------
+    carriageway : shapely geometry
+        In plan.
+    filled : shapely geometry
+        The carriageway with its islands and medians: holes between the lanes of
+        a junction, small ones and narrow ones.
+    mouths : shapely geometry
+        Lines across the carriageway where lanes end and the road goes on.
+    """
+
+    carriageway: BaseGeometry
+    filled: BaseGeometry
+    mouths: BaseGeometry
+
+    def sides(self) -> BaseGeometry:
+        """Return the edges of the filled carriageway, as lines, without its mouths."""
+        edges = shapely.boundary(self.filled).difference(self.mouths.buffer(2 * SEAM))
+        return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
+
+
+def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
+    """Return the carriageway of lanes and its sides."""
+    paved = in_groups(surfaces, CARRIAGEWAY)
+    carriageway = lane_outline(paved)
+    junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
+    inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
+    whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
+    filled = _without_holes(whole, least=ISLAND, narrow=MEDIAN)
+    ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
+    across = shapely.linestrings(np.array(ends).reshape(-1, 2, 2))
+    at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * SEAM)))
+    length = shapely.length(across)
+    return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * SEAM) & (at_edge > length / 2)]))
+
+
+def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
+    """Return the area without its holes: all, or those smaller than ``least`` m² or narrower than ``narrow`` metres."""
+
+    def kept(hole: shapely.LinearRing) -> bool:
+        inside = shapely.Polygon(hole)
+        return bool(inside.area >= least and not inside.buffer(-narrow / 2).is_empty)
+
+    parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+    return shapely.union_all([shapely.Polygon(part.exterior, list(filter(kept, part.interiors))) for part in parts])
 
 
 def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry) -> tuple[LaneSurface, ...]:
