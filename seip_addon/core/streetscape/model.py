@@ -23,6 +23,7 @@ from ..opendrive import (
     placed_objects,
     placed_signals,
 )
+from ..plan_geometry import signed_area
 from ..progress import Progress
 from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
@@ -296,12 +297,13 @@ def _surface_parts(street: _Street) -> list[Part]:
 
 
 def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
-    """Return pavements near the region (where posts may stand), those beyond, their kerbs, and notes."""
-    triangles = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
-    if len(triangles) == 0:
-        return [_verge_strip(street)], ("the map has no pavements: new posts may stand on a strip of verge",)
-    corners = road_surface.corner_pavements(triangles, street.lanes)
-    triangles = np.concatenate([triangles, corners])
+    """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
+    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
+    if len(own) == 0:
+        verge = _verge_strip(street, street.roadside.sides())
+        return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
+    corners = road_surface.corner_pavements(own, street.lanes)
+    triangles = np.concatenate([own, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
     kerbs = road_surface.kerb_faces(triangles)
@@ -310,15 +312,26 @@ def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
         Part("Kerbs", _solid(kerbs, "kerb"), (Role.GROUND,)),
     ]
-    notes = (
-        ("the pavements are closed round the corners of junctions, where the map leaves gaps",) if len(corners) else ()
-    )
-    return parts, notes
+    notes = []
+    if len(corners):
+        added, had = (float(np.abs(signed_area(faces)).sum()) for faces in (corners, own))
+        notes.append(
+            f"the pavements are closed round the corners of junctions, where the map leaves gaps: {added:,.0f} m² are "
+            f"added to its {had:,.0f} m²"
+        )
+    bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.GRID))
+    verge = _verge_strip(street, bare)
+    if verge.solid.faces:
+        parts.append(verge)
+        length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
+        notes.append(f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there")
+    return parts, tuple(notes)
 
 
-def _verge_strip(street: _Street) -> Part:
+def _verge_strip(street: _Street, sides: BaseGeometry) -> Part:
+    """Return the verge along sides of the carriageway; where the map ends, and the road goes on, there is none."""
     inner, outer = VERGE_STRIP
-    strip = street.carriageway.buffer(outer).difference(street.carriageway.buffer(inner))
+    strip = sides.buffer(outer, cap_style="flat").difference(street.roadside.filled.buffer(inner))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 

@@ -55,6 +55,11 @@ ISLAND = 400.0
 MEDIAN = 12.0
 """Holes narrower than this (metres) are medians: likewise."""
 
+BESIDE = 6.0
+"""A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
+SIDE_STEP, LEAST_SIDE = 2.0, 10.0
+"""Sides of roads are looked at in steps (metres), and count as bare where they are so from this length on."""
+
 
 @dataclass(frozen=True, eq=False)
 class Roadside:
@@ -94,6 +99,24 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * SEAM)))
     length = shapely.length(across)
     return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * SEAM) & (at_edge > length / 2)]))
+
+
+def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
+    """Return the sides of the carriageway, as lines, along which no pavement lies."""
+    sides = roadside.sides()
+    if pavement.is_empty or sides.is_empty:
+        return sides
+    lines = [shapely.get_coordinates(line) for line in shapely.get_parts(shapely.segmentize(sides, SIDE_STEP))]
+    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
+    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0]])
+    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * SEAM * aside)
+    outwards = BESIDE * np.where(inner[:, None], -aside, aside)
+    beside = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
+    shapely.prepare(pavement)
+    is_bare = ~shapely.intersects(pavement, beside)
+    bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
+    return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= LEAST_SIDE])
 
 
 def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
@@ -189,18 +212,23 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
     """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
 
     Many maps end the pavements where the junction begins. A notch between the
-    ends of two pavements and the carriageway is filled at the pavements' height.
+    ends of two pavements and the carriageway is filled at the pavements' height,
+    unless the map has a pavement of its own there, within the junction.
     """
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
         return np.empty((0, 3, 3))
     walked = outline(pavement, GRID)
+    own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
     street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
     notches = closed(street, CORNER_NOTCH).difference(street)
     corners = [
         notch
         for notch in shapely.get_parts(notches)
-        if notch.area > 1.0 and notch.distance(inside) < SEAM and notch.distance(walked) < SEAM
+        if notch.area > 1.0
+        and notch.distance(inside) < SEAM
+        and notch.distance(walked) < SEAM
+        and not notch.distance(own) < CORNER_NOTCH
     ]
     return Terrain(pavement).drape(shapely.union_all(corners), spacing=LONGEST_STEP)
 
