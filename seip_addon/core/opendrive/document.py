@@ -62,8 +62,16 @@ class Node:
             raise SeipError(f"{self.place}: <{self.tag}> has no {name!r}; OpenDRIVE asks for it, export the map again")
         return value.strip()
 
-    def number(self, name: str, default: float | None = None) -> float:
-        """Return an attribute as a number of earthly size; without a default it must be there."""
+    def number(self, name: str, default: float | None = None, *, most: float = _GREATEST) -> float:
+        """Return an attribute as a number of earthly size; without a default it must be there.
+
+        Parameters
+        ----------
+        name : str
+        default : float, optional
+        most : float
+            What its amount may be at most, where that is known better.
+        """
         if default is not None and name not in self.element.attrib:
             return default
         text = self.text(name)
@@ -73,6 +81,10 @@ class Node:
             value = math.nan
         if not abs(value) <= _GREATEST:
             raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no sensible number; correct the map")
+        if abs(value) > most:
+            raise SeipError(
+                f"{self.place}: {name}={value:g} of <{self.tag}> is beyond {most:g} m; correct it in the map"
+            )
         return value
 
     def length(self, name: str) -> float:

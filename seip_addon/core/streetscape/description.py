@@ -28,6 +28,12 @@ DESCRIPTION_SUFFIX = ".toml"
 LARGEST = 100_000.0
 """Metres (or degrees, or a weight) that nothing described may exceed."""
 
+HIGHEST = 1_000.0
+"""Metres that nothing described is high."""
+
+LARGEST_RADIUS = 5_000.0
+"""Metres from the middle of the place to the end of its region at most."""
+
 LONGEST_ROW = 10_000
 """Trees or lights of a row beyond which its spacing is a slip."""
 
@@ -163,7 +169,7 @@ def read_site_description(path: Path) -> SiteDescription:
         map=None if map_name is None else path.parent / map_name,
         near=table.point("near"),
         junction=table.text("junction", None),
-        radius=table.number("radius", DEFAULT_RADIUS, above=0.0),
+        radius=table.number("radius", DEFAULT_RADIUS, above=0.0, most=LARGEST_RADIUS),
         region=table.region("region"),
         weighted_regions=tuple(_weighted_region(row) for row in table.rows("weighted_region")),
         buildings=tuple(_building(row) for row in table.rows("building")),
@@ -217,8 +223,8 @@ def describe_place(
             raise SeipError("the middle of the place must be two finite numbers, x and y in metres")
         described = replace(described, near=near, junction=junction, region=None)
     if radius is not None:
-        if not 0 < radius < math.inf:
-            raise SeipError(f"the radius must be above 0 m, not {radius:g}")
+        if not 0 < radius <= LARGEST_RADIUS:
+            raise SeipError(f"the radius must be above 0 m and at most {LARGEST_RADIUS:g} m, not {radius:g}")
         described = replace(described, radius=radius, region=None)
     return map_path, described
 
@@ -246,13 +252,15 @@ def _weighted_region(table: _Table) -> WeightedRegion:
 def _building(table: _Table) -> Building:
     outline = table.polygon("outline")
     assert outline is not None  # noqa: S101  # for the type checker: a needed polygon is there
-    building = Building(outline, table.number("height", None, above=0.0), table.number("base", 0.0))
+    building = Building(
+        outline, table.number("height", None, above=0.0, most=HIGHEST), table.number("base", 0.0, most=HIGHEST)
+    )
     table.finish()
     return building
 
 
 def _trees(table: _Table) -> Trees:
-    height = table.number("height", 8.0, above=0.0)
+    height = table.number("height", 8.0, above=0.0, most=HIGHEST)
     trees = Trees(table.positions(), height, table.number("crown_diameter", 0.6 * height, above=0.0))
     table.finish()
     return trees
@@ -260,7 +268,7 @@ def _trees(table: _Table) -> Trees:
 
 def _wall(table: _Table) -> Wall:
     line = table.line("line")
-    wall = Wall(line, table.number("height", 2.0, above=0.0), table.number("thickness", 0.25, above=0.0))
+    wall = Wall(line, table.number("height", 2.0, above=0.0, most=HIGHEST), table.number("thickness", 0.25, above=0.0))
     table.finish()
     return wall
 
@@ -269,7 +277,7 @@ def _poles(table: _Table, *, height: float, arm: float) -> Poles:
     degrees = table.number("heading", math.nan)
     poles = Poles(
         table.positions(),
-        table.number("height", height, above=0.0),
+        table.number("height", height, above=0.0, most=HIGHEST),
         table.number("arm", arm, least=0.0),
         None if math.isnan(degrees) else math.radians(degrees),
     )
@@ -308,7 +316,15 @@ class _Table:
             raise self._wrong(key, "a text in quotes")
         return value
 
-    def number(self, key: str, default: float | None, *, above: float = -math.inf, least: float = -math.inf) -> float:
+    def number(
+        self,
+        key: str,
+        default: float | None,
+        *,
+        above: float = -math.inf,
+        least: float = -math.inf,
+        most: float = LARGEST,
+    ) -> float:
         value = self._take(key)
         if value is None:
             if default is None:
@@ -317,8 +333,8 @@ class _Table:
             return default
         if not _is_number(value):
             raise self._wrong(key, "a number below 1e9")
-        if abs(value) > LARGEST:
-            raise self._wrong(key, f"at most {LARGEST:g}, not {value:g}")
+        if abs(value) > most:
+            raise self._wrong(key, f"at most {most:g}, not {value:g}")
         if not (value > above and value >= least):
             raise self._wrong(
                 key, f"{'above' if above > -math.inf else 'at least'} {max(above, least):g}, not {value:g}"
@@ -351,8 +367,11 @@ class _Table:
             return None
         several = isinstance(value, list) and bool(value) and not _is_point(value[0])
         rings = value if several else [value]
-        polygons = [self._ring(key, ring) for ring in rings]
-        return MultiPolygon(polygons)
+        region = MultiPolygon([self._ring(key, ring) for ring in rings])
+        low_x, low_y, high_x, high_y = region.bounds
+        if max(high_x - low_x, high_y - low_y) > 2 * LARGEST_RADIUS:
+            raise self._wrong(key, f"at most {2 * LARGEST_RADIUS:g} m across")
+        return region
 
     def positions(self) -> Float:
         """Return (n, 2) positions: one, or a row from one point to another at a spacing."""

@@ -30,6 +30,8 @@ LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
 POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
 """Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
 
+LARGEST_FACADE = 200_000.0
+"""Square metres of walls beyond which a building has no windows: there would be too many."""
 FACADES = ("facade brick", "facade plaster", "facade sand", "facade grey")
 
 
@@ -52,7 +54,8 @@ def building_parts(name: str, base: Float, height: Float, number: int) -> tuple[
     walls = street_furniture.block(base, height, side=FACADES[number % len(FACADES)], cap="roof")
     block = Part(name, walls, (Role.OCCLUDERS,))
     level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1
-    if not level or height[0] < street_furniture.STOREY:
+    facade = float(np.hypot(*np.diff(base[:, :2], axis=0, append=base[:1, :2]).T).sum()) * float(height[0])
+    if not level or height[0] < street_furniture.STOREY or facade > LARGEST_FACADE:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
     return (block, Part(f"{name} windows", panes, (Role.DRESSING,))) if panes.faces else (block,)

@@ -55,6 +55,8 @@ VERGE_STRIP = (0.8, 2.3)
 VERGE_BELOW = 0.03
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
+FARTHEST_GARDEN = 300.0
+"""How far from the extent (metres) it goes on at most: a wall may run on along the whole map."""
 VERGE_SPACING = 12.0
 VEIL_SPACING = 4.0
 """As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
@@ -148,6 +150,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         No such junction, no road at the place, or an empty region of interest.
     """
     surfaces = yield from _all_lanes(road_map)
+    if not surfaces:
+        raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
     centre = _centre(road_map, surfaces, description)
@@ -340,7 +344,8 @@ def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
     """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
-    ground = street.extent if built_up.is_empty else street.extent.union(built_up.buffer(GARDEN)).convex_hull
+    gardens = built_up.buffer(GARDEN).intersection(street.extent.buffer(FARTHEST_GARDEN))
+    ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     beside = road_surface.without_crumbs(ground.difference(covered.buffer(-road_surface.SEAM, join_style="mitre")))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
