@@ -106,6 +106,27 @@ class Node:
         return self.text(name, str(default)).lower() in ("true", "yes", "1")
 
 
+_STARTS = {
+    b"\x1f\x8b": "is compressed with gzip; unpack it (gunzip)",
+    b"PK\x03\x04": "is a zip archive; unpack it",
+    b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
+    b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
+    b"BLENDER": "is a .blend, no map; open it in Blender",
+}
+"""How files begin that are given in place of a map."""
+
+
+def _refuse_other_formats(path: str | os.PathLike[str], name: str) -> None:
+    with open(path, "rb") as file:  # noqa: PTH123 - as above
+        start = file.read(1000)
+    for mark, cure in _STARTS.items():
+        if start.startswith(mark):
+            raise SeipError(f"{name} {cure}")
+    if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["):
+        kind = "CityJSON, a model of buildings" if b'"CityJSON"' in start else "JSON"
+        raise SeipError(f"{name} is {kind}, not OpenDRIVE; choose an .xodr file")
+
+
 def read_document(path: str | os.PathLike[str]) -> Node:
     """Parse an XML file and return its root.
 
@@ -118,6 +139,7 @@ def read_document(path: str | os.PathLike[str]) -> Node:
     """
     name = os.path.basename(os.fspath(path))  # noqa: PTH119 - works for any path-like, existing or not
     try:
+        _refuse_other_formats(path, name)
         tree = parse(path, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     except FileNotFoundError as error:
         raise SeipError(f"no such file: {path}; check the path of the map") from error

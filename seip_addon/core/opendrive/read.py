@@ -33,6 +33,13 @@ from .road_map import (
     RoadSignal,
 )
 
+_OTHER_FORMATS = {
+    "osm": " as OpenStreetMap does",
+    "net": " as networks of SUMO do (netconvert --opendrive-output makes a map of them)",
+    "CityModel": " as CityGML does",
+    "OpenSCENARIO": " as OpenSCENARIO does",
+    "kml": " as KML does",
+}
 _LONGEST_ROAD = 1e6  # metres; beyond it a number has slipped
 _FARTHEST = 5_000.0  # metres that an object reaches, and stands from its road; beyond it a number has slipped
 _HIGHEST = 1_000.0  # metres; no building is higher
@@ -60,7 +67,8 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     """
     root = read_document(path)
     if root.tag != "OpenDRIVE":
-        raise SeipError(f"{root.place} is not OpenDRIVE: it begins with <{root.tag}>; choose an .xodr file")
+        other = _OTHER_FORMATS.get(root.tag, "")
+        raise SeipError(f"{root.place} is not OpenDRIVE: it begins with <{root.tag}>{other}; choose an .xodr file")
     roads = tuple(_road(node.within(f"road {node.text('id')}")) for node in root.children("road"))
     if not roads:
         raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")

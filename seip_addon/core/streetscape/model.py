@@ -27,6 +27,7 @@ from ..plan_geometry import signed_area
 from ..progress import Progress
 from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
+from .degrees import in_metres, looks_like_degrees
 from .description import Poles, SiteDescription, WeightedRegion
 from .map_furniture import (
     CROWN_SHARE,
@@ -152,6 +153,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     surfaces = yield from _all_lanes(road_map)
     if not surfaces:
         raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
+    description, place_notes = in_metres(description, road_map, surfaces)
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
     centre = _centre(road_map, surfaces, description)
@@ -190,7 +192,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
-        notes=(*notes, *_furniture_notes(placed, signals)),
+        notes=(*place_notes, *notes, *_furniture_notes(placed, signals)),
         warnings=() if any(_hides(part) for part in furniture) else (BARE,),
     )
 
@@ -255,7 +257,11 @@ def _region(
         if description.region
         else f"within {description.radius:g} m of ({centre[0]:g}, {centre[1]:g})"
     )
-    raise SeipError(f"there is no driving lane {where}{_nearest(road_map, surfaces, centre)}")
+    x, y = centre.tolist()
+    given = description.near is not None and not (x.is_integer() and y.is_integer())
+    degrees = given and looks_like_degrees((x, y))
+    hint = " (give metres of the map, not latitude and longitude)" if degrees else ""
+    raise SeipError(f"there is no driving lane {where}{hint}{_nearest(road_map, surfaces, centre)}")
 
 
 def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) -> str:
