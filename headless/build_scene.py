@@ -29,7 +29,7 @@ def main(argv: list[str]) -> None:
     asked = _parser().parse_args(argv)
     near = None if asked.near is None else (asked.near[0], asked.near[1])
     map_path, description = describe_place(
-        asked.source, site=asked.site, near=near, junction=asked.junction, radius=asked.radius
+        asked.source, site=asked.site, near=near, junction=asked.junction, radius=asked.radius, level=asked.level
     )
     check_name(asked.output)
     with session.progress_bar() as report:
@@ -56,6 +56,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     place.add_argument("--junction", metavar="ID", help="id or name of the junction in the middle of the place")
     parser.add_argument("--radius", type=float, help="radius of the region of interest in metres (80)")
+    parser.add_argument(
+        "--level",
+        nargs="+",
+        default=[],
+        metavar="ROAD",
+        help="id of a road on the level to study, where roads cross above",
+    )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="BLEND", help="the .blend to write")
     return parser

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -121,6 +121,8 @@ class SiteDescription:
         The region of interest is the driving surface this near to the middle.
     region : shapely geometry or None
         Instead of the radius: the driving surface within this area.
+    level : tuple of str
+        Ids of roads that lie on the level to study, where roads lie above each other.
     weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
         What the file lists.
     """
@@ -131,6 +133,7 @@ class SiteDescription:
     junction: str | None = None
     radius: float = DEFAULT_RADIUS
     region: MultiPolygon | None = None
+    level: tuple[str, ...] = ()
     weighted_regions: tuple[WeightedRegion, ...] = ()
     buildings: tuple[Building, ...] = ()
     trees: tuple[Trees, ...] = ()
@@ -171,6 +174,7 @@ def read_site_description(path: Path) -> SiteDescription:
         junction=table.text("junction", None),
         radius=table.number("radius", DEFAULT_RADIUS, above=0.0, most=LARGEST_RADIUS),
         region=table.region("region"),
+        level=table.texts("level"),
         weighted_regions=tuple(_weighted_region(row) for row in table.rows("weighted_region")),
         buildings=tuple(_building(row) for row in table.rows("building")),
         trees=tuple(_trees(row) for row in table.rows("tree")),
@@ -193,6 +197,7 @@ def describe_place(
     near: tuple[float, float] | None = None,
     junction: str | None = None,
     radius: float | None = None,
+    level: Sequence[str] = (),
 ) -> tuple[Path, SiteDescription]:
     """Return a place's map and description, what is given here in place of what a file says.
 
@@ -208,6 +213,8 @@ def describe_place(
         Id or name of the junction in the middle of the place.
     radius : float, metres, optional
         Of the region of interest.
+    level : sequence of str
+        Ids of roads on the level to study.
 
     Raises
     ------
@@ -226,7 +233,7 @@ def describe_place(
         if not 0 < radius <= LARGEST_RADIUS:
             raise SeipError(f"the radius must be above 0 m and at most {LARGEST_RADIUS:g} m, not {radius:g}")
         described = replace(described, radius=radius, region=None)
-    return map_path, described
+    return map_path, replace(described, level=tuple(level)) if level else described
 
 
 def _described(source: Path, site: Path | None) -> SiteDescription:
@@ -315,6 +322,13 @@ class _Table:
         if not isinstance(value, str) or not value:
             raise self._wrong(key, "a text in quotes")
         return value
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self._take(key)
+        values = value if isinstance(value, list) else [] if value is None else [value]
+        if not all(isinstance(one, str) and one for one in values):
+            raise self._wrong(key, "a text in quotes, or a list of them")
+        return tuple(values)
 
     def number(
         self,

@@ -23,12 +23,13 @@ from ..opendrive import (
     placed_objects,
     placed_signals,
 )
-from ..plan_geometry import signed_area
+from ..plan_geometry import outline, signed_area
 from ..progress import Progress
 from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
 from .degrees import in_metres, looks_like_degrees
 from .description import Poles, SiteDescription, WeightedRegion
+from .levels import APART, Levels, split_levels
 from .map_furniture import (
     CROWN_SHARE,
     arm_heading,
@@ -54,6 +55,8 @@ CANDIDATE_MARGIN = 15.0
 VERGE_STRIP = (0.8, 2.3)
 """Where new posts may stand beside a road without pavements: metres from the carriageway."""
 VERGE_BELOW = 0.03
+NEAR_CROSSING = 10.0
+"""Roads this near to the middle of the place (metres) may each be the one that is meant."""
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
 FARTHEST_GARDEN = 300.0
@@ -157,6 +160,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
     centre = _centre(road_map, surfaces, description)
+    levels = _levels(road_map, surfaces, description, centre)
+    surfaces = levels.studied
     region = _region(road_map, surfaces, description, centre)
     origin = _origin(surfaces, centre)
     yield next(stages)
@@ -164,12 +169,19 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     yield next(stages)
     around = _shifted(street.extent, origin)
     placed = local_objects(placed_objects(road_map, area=around), origin)
-    hung = [replace(one, position=one.position - origin) for one in placed_signals(road_map, area=around)]
+    away = levels.other_roads()
+    hung = [
+        replace(one, position=one.position - origin)
+        for one in placed_signals(road_map, area=around)
+        if one.road_id not in away
+    ]
     others, lights = split_posts(placed, hung, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
-    furniture = [*object_parts(others, street.carriageway), *signals, *_described_parts(description, street)]
+    things = [_on_level(part, street) for part in object_parts(others, street.carriageway)]
+    other_levels, below = _other_level_parts(levels.others, street)
+    furniture = [*things, *signals, *_described_parts(description, street)]
     yield next(stages)
-    pavement, notes = _pavement_parts(street)
+    pavement, notes = _pavement_parts(street, below)
     yield next(stages)
     carriageway = _surface_parts(street)
     yield next(stages)
@@ -177,7 +189,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     parts = [
         *carriageway,
         *pavement,
-        _verge_part(street, furniture),
+        _verge_part(street, furniture, below),
+        *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
         _region_part(street),
@@ -192,8 +205,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
-        notes=(*place_notes, *notes, *_furniture_notes(placed, signals)),
-        warnings=() if any(_hides(part) for part in furniture) else (BARE,),
+        notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
+        warnings=() if any(_hides(part) for part in (*furniture, *other_levels)) else (BARE,),
     )
 
 
@@ -277,6 +290,51 @@ def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) 
     return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
 
 
+def _levels(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float) -> Levels:
+    """Return the lanes on the level of the place, and those that cross above or below."""
+    within = description.region or shapely.Point(centre).buffer(description.radius, quad_segs=32)
+    around = within.convex_hull.buffer(MARGIN, quad_segs=16)
+    if description.near is None and description.junction is not None:
+        junction = find_junction(road_map, surfaces, description.junction).id
+        anchors = {lane.road_id for lane in surfaces if lane.junction_id == junction}
+    else:
+        driving = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
+        away = shapely.distance([lane.polygon for lane in driving], shapely.Point(centre))
+        least = max(away.min(initial=np.inf), NEAR_CROSSING)
+        anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
+    return split_levels(surfaces, around, anchors, description.level)
+
+
+def _level_notes(levels: Levels) -> Iterator[str]:
+    roads = levels.other_roads()
+    for crossing in levels.crossings:
+        away = crossing.above if crossing.above in roads else crossing.below
+        yield f"{crossing}: road {away} is on another level, in the way but not studied"
+
+
+def _other_level_parts(others: Sequence[LaneSurface], street: _Street) -> tuple[list[Part], BaseGeometry]:
+    """Return the roads of other levels, above and below, and the area in plan of those below."""
+    lanes = road_surface.local_strips(others, street.origin, street.extent)
+    if not lanes:
+        return [], shapely.Polygon()
+    triangles = np.concatenate([lane.triangles for lane in lanes])
+    middles = triangles.mean(axis=1)
+    above = middles[:, 2] > street.terrain.height(middles[:, :2])
+    parts = [
+        Part("Roads above", _solid(triangles[above], "asphalt"), (Role.OCCLUDERS,)),
+        Part("Roads below", _solid(triangles[~above], "asphalt"), (Role.GROUND,)),
+    ]
+    return parts, outline(triangles[~above], road_surface.GRID)
+
+
+def _on_level(part: Part, street: _Street) -> Part:
+    """Return a part of the map; a pole that stands on another level carries no sensor."""
+    x, y, z = part.foot
+    if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > APART:
+        return replace(part, roles=(Role.OCCLUDERS,), source="")
+    return part
+
+
 def _origin(surfaces: Sequence[LaneSurface], centre: Float) -> Float:
     """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
     points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in surfaces])
@@ -306,11 +364,11 @@ def _surface_parts(street: _Street) -> list[Part]:
     ]
 
 
-def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
+def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
     own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
     if len(own) == 0:
-        verge = _verge_strip(street, street.roadside.sides())
+        verge = _verge_strip(street, street.roadside.sides(), below)
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
     corners = road_surface.corner_pavements(own, street.lanes)
     triangles = np.concatenate([own, corners])
@@ -330,7 +388,7 @@ def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
             f"added to its {had:,.0f} m²"
         )
     bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.GRID))
-    verge = _verge_strip(street, bare)
+    verge = _verge_strip(street, bare, below)
     if verge.solid.faces:
         parts.append(verge)
         length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
@@ -338,22 +396,27 @@ def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
     return parts, tuple(notes)
 
 
-def _verge_strip(street: _Street, sides: BaseGeometry) -> Part:
-    """Return the verge along sides of the carriageway; where the map ends, and the road goes on, there is none."""
+def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> Part:
+    """Return the verge along sides of the carriageway.
+
+    There is none where the map ends and the road goes on, nor beside a bridge.
+    """
     inner, outer = VERGE_STRIP
     strip = sides.buffer(outer, cap_style="flat").difference(street.roadside.filled.buffer(inner))
+    strip = strip.difference(below.buffer(outer))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
+def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry) -> Part:
     """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
     gardens = built_up.buffer(GARDEN).intersection(street.extent.buffer(FARTHEST_GARDEN))
     ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
-    beside = road_surface.without_crumbs(ground.difference(covered.buffer(-road_surface.SEAM, join_style="mitre")))
+    lanes = covered.buffer(-road_surface.SEAM, join_style="mitre").union(below)
+    beside = road_surface.without_crumbs(ground.difference(lanes))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
