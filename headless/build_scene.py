@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -29,8 +30,15 @@ def main(argv: list[str]) -> None:
     asked = _parser().parse_args(argv)
     near = None if asked.near is None else (asked.near[0], asked.near[1])
     map_path, description = describe_place(
-        asked.source, site=asked.site, near=near, junction=asked.junction, radius=asked.radius, level=asked.level
+        asked.source,
+        site=asked.site,
+        near=near,
+        junction=asked.junction,
+        radius=asked.radius,
+        approaches=asked.approaches,
     )
+    if asked.level:
+        description = replace(description, level=tuple(asked.level))
     check_name(asked.output)
     with session.progress_bar() as report:
         model = finish(site_model(read_map(map_path), description), report)
@@ -55,7 +63,14 @@ def _parser() -> argparse.ArgumentParser:
         "--near", type=float, nargs=2, metavar=("X", "Y"), help="middle of the place, map coordinates in metres"
     )
     place.add_argument("--junction", metavar="ID", help="id or name of the junction in the middle of the place")
-    parser.add_argument("--radius", type=float, help="radius of the region of interest in metres (80)")
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--radius", type=float, help="radius of the region of interest in metres (80 with --near)")
+    size.add_argument(
+        "--approaches",
+        type=float,
+        metavar="M",
+        help="how far the region follows the approaches of the junction in metres (80 with --junction)",
+    )
     parser.add_argument(
         "--level",
         nargs="+",

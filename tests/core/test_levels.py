@@ -10,7 +10,7 @@ from opendrive_text import document, geometry, lane, read_text, road, section
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.streetscape.description import SiteDescription, describe_place, read_site_description
+from seip_addon.core.streetscape.description import SiteDescription, read_site_description
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
 
@@ -130,7 +130,6 @@ def test_the_level_is_an_option_and_a_key(tmp_path):
     for written, roads in (('"5"', ("5",)), ('["5", "4"]', ("5", "4"))):
         path.write_text(f'map = "map.xodr"\nnear = [0, 0]\nlevel = {written}\n', encoding="utf-8")
         assert read_site_description(path).level == roads
-    assert describe_place(path, level=["2"])[1].level == ("2",)
     path.write_text("level = 5", encoding="utf-8")
     with pytest.raises(SeipError, match="level must be a text in quotes, or a list"):
         read_site_description(path)

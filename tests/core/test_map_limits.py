@@ -38,6 +38,14 @@ def test_a_map_without_the_area_of_a_lane_is_refused(tmp_path, sections, junctio
         finish(site_model(read_text(tmp_path, text), place))
 
 
+@pytest.mark.parametrize("kind", ["none", "sidewalk"])
+@pytest.mark.parametrize("place", [{"junction": "7"}, {"junction": "7", "radius": 30.0}, {"near": (50, 0)}])
+def test_a_junction_without_driving_lanes_is_named(tmp_path, kind, place):
+    text = document(road(sections=section(lane(-1, 3.0, kind)), junction="7"), rest='<junction id="7"/>')
+    with pytest.raises(SeipError, match=r"there is no driving lane .*; the nearest junctions are 7 at"):
+        finish(site_model(read_text(tmp_path, text), SiteDescription(**place)))
+
+
 @pytest.mark.parametrize(
     ("furniture", "complaint"),
     [

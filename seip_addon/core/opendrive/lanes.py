@@ -37,6 +37,8 @@ class LaneSurface:
         As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
     keeps_left : bool
         Whether traffic on the road keeps to the left.
+    s : (n,) float64, metres
+        Where along the road the points of the edges are.
     left, right : (n, 3) float64, metres
         Edges in map coordinates, as seen along the reference line.
     """
@@ -47,6 +49,7 @@ class LaneSurface:
     lane_id: int
     lane_type: str
     keeps_left: bool
+    s: Float
     left: Float
     right: Float
 
@@ -105,16 +108,19 @@ def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
         lanes = (*section.left[::-1], *section.right)
         if not lanes:
             continue
-        points = sample(
+        s, points = sample(
             partial(_edges, road, section),
             _knots(road, section),
             tolerance,
             f"road {road.id}, lane section at s={section.start:g}",
-        ).reshape(-1, len(lanes), 2, 3)
+        )
+        points = points.reshape(-1, len(lanes), 2, 3)
         _check_size(points, f"road {road.id}, lane section at s={section.start:g}")
         for index, lane in enumerate(lanes):
             left, right = points[:, index, 0], points[:, index, 1]
-            surface = LaneSurface(road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, left, right)
+            surface = LaneSurface(
+                road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, s, left, right
+            )
             if len(surface.triangles):
                 yield surface
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -117,10 +117,14 @@ class SiteDescription:
         Middle of the place, map coordinates.
     junction : str or None
         Id or name of the junction that is the middle of the place.
-    radius : float, metres
+    radius : float or None, metres
         The region of interest is the driving surface this near to the middle.
+    approaches : float or None, metres
+        Instead of the radius: the driving surface of the junction, and of its
+        approaches this far along the roads. Without either a junction has
+        approaches of `DEFAULT_RADIUS`, and another place that radius.
     region : shapely geometry or None
-        Instead of the radius: the driving surface within this area.
+        Instead of both: the driving surface within this area.
     level : tuple of str
         Ids of roads that lie on the level to study, where roads lie above each other.
     weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
@@ -131,7 +135,8 @@ class SiteDescription:
     map: Path | None = None
     near: tuple[float, float] | None = None
     junction: str | None = None
-    radius: float = DEFAULT_RADIUS
+    radius: float | None = None
+    approaches: float | None = None
     region: MultiPolygon | None = None
     level: tuple[str, ...] = ()
     weighted_regions: tuple[WeightedRegion, ...] = ()
@@ -142,6 +147,13 @@ class SiteDescription:
     signal_poles: tuple[Poles, ...] = ()
     forbidden_areas: tuple[Area, ...] = ()
     mandatory_areas: tuple[Area, ...] = ()
+
+    @property
+    def along(self) -> float | None:
+        """How far the region follows the approaches of the junction, metres; None where it is a circle or an area."""
+        if self.junction is None or self.region is not None or self.radius is not None:
+            return None
+        return DEFAULT_RADIUS if self.approaches is None else self.approaches
 
 
 def read_site_description(path: Path) -> SiteDescription:
@@ -172,7 +184,8 @@ def read_site_description(path: Path) -> SiteDescription:
         map=None if map_name is None else path.parent / map_name,
         near=table.point("near"),
         junction=table.text("junction", None),
-        radius=table.number("radius", DEFAULT_RADIUS, above=0.0, most=LARGEST_RADIUS),
+        radius=table.optional("radius", most=LARGEST_RADIUS),
+        approaches=table.optional("approaches", most=LARGEST_RADIUS),
         region=table.region("region"),
         level=table.texts("level"),
         weighted_regions=tuple(_weighted_region(row) for row in table.rows("weighted_region")),
@@ -187,6 +200,8 @@ def read_site_description(path: Path) -> SiteDescription:
     table.finish()
     if description.near is not None and description.junction is not None:
         raise SeipError(f"{path}: give either near or junction, not both")
+    if description.radius is not None and description.approaches is not None:
+        raise SeipError(f"{path}: give either radius or approaches, not both")
     return description
 
 
@@ -197,7 +212,7 @@ def describe_place(
     near: tuple[float, float] | None = None,
     junction: str | None = None,
     radius: float | None = None,
-    level: Sequence[str] = (),
+    approaches: float | None = None,
 ) -> tuple[Path, SiteDescription]:
     """Return a place's map and description, what is given here in place of what a file says.
 
@@ -213,8 +228,8 @@ def describe_place(
         Id or name of the junction in the middle of the place.
     radius : float, metres, optional
         Of the region of interest.
-    level : sequence of str
-        Ids of roads on the level to study.
+    approaches : float, metres, optional
+        How far the region follows the approaches of the junction.
 
     Raises
     ------
@@ -228,12 +243,16 @@ def describe_place(
     if near is not None or junction is not None:
         if near is not None and not all(map(math.isfinite, near)):
             raise SeipError("the middle of the place must be two finite numbers, x and y in metres")
-        described = replace(described, near=near, junction=junction, region=None)
-    if radius is not None:
-        if not 0 < radius <= LARGEST_RADIUS:
-            raise SeipError(f"the radius must be above 0 m and at most {LARGEST_RADIUS:g} m, not {radius:g}")
-        described = replace(described, radius=radius, region=None)
-    return map_path, replace(described, level=tuple(level)) if level else described
+        along = None if junction is None else described.approaches
+        described = replace(described, near=near, junction=junction, region=None, approaches=along)
+    for name, length in (("radius", radius), ("length of the approaches", approaches)):
+        if length is not None and not 0 < length <= LARGEST_RADIUS:
+            raise SeipError(f"the {name} must be above 0 m and at most {LARGEST_RADIUS:g} m, not {length:g}")
+    if radius is not None or approaches is not None:
+        described = replace(described, radius=radius, approaches=approaches, region=None)
+    if described.approaches is not None and described.junction is None:
+        raise SeipError("the approaches are those of a junction: name one, or give a radius")
+    return map_path, described
 
 
 def _described(source: Path, site: Path | None) -> SiteDescription:
@@ -322,6 +341,10 @@ class _Table:
         if not isinstance(value, str) or not value:
             raise self._wrong(key, "a text in quotes")
         return value
+
+    def optional(self, key: str, *, most: float) -> float | None:
+        value = self.number(key, math.nan, above=0.0, most=most)
+        return None if math.isnan(value) else value
 
     def texts(self, key: str) -> tuple[str, ...]:
         value = self._take(key)

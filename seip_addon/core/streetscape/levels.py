@@ -94,7 +94,7 @@ def split_levels(
     near = [lane for lane in surfaces if lane.lane_type in GROUPS and _is_near(lane, around)]
     roads = _roads(near, around)
     _check_level(level, roads)
-    crossings = _crossings(roads)
+    crossings = _crossings(roads) if roads else ()
     if not crossings:
         return Levels(tuple(surfaces), (), ())
     joined = _joined(roads)

@@ -27,8 +27,9 @@ from ..plan_geometry import outline, signed_area
 from ..progress import Progress
 from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
+from .approaches import approach_lanes
 from .degrees import in_metres, looks_like_degrees
-from .description import Poles, SiteDescription, WeightedRegion
+from .description import DEFAULT_RADIUS, Poles, SiteDescription, WeightedRegion
 from .levels import APART, Levels, split_levels
 from .map_furniture import (
     CROWN_SHARE,
@@ -160,9 +161,10 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
     centre = _centre(road_map, surfaces, description)
-    levels = _levels(road_map, surfaces, description, centre)
+    within = _within(road_map, surfaces, description, centre)
+    levels = _levels(road_map, surfaces, description, centre, within)
     surfaces = levels.studied
-    region = _region(road_map, surfaces, description, centre)
+    region = _region(road_map, surfaces, description, centre, within)
     origin = _origin(surfaces, centre)
     yield next(stages)
     street = _street(surfaces, origin, _shifted(region, -origin))
@@ -239,7 +241,7 @@ def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface
 def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription) -> Float:
     """Return the middle (x, y) of the place in map coordinates."""
     if description.near is not None:
-        return np.array(description.near)
+        return np.array(description.near, dtype=np.float64)
     if description.junction is not None:
         junction = find_junction(road_map, surfaces, description.junction)
         centre = _junction_driving_area(surfaces, junction.id).centroid
@@ -252,24 +254,48 @@ def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: Sit
     return np.array([centre.x, centre.y])
 
 
-def _region(
+def _within(
     road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
 ) -> BaseGeometry:
+    """Return the area in map coordinates in which the region of interest lies."""
+    if description.region is not None:
+        return description.region
+    if description.along is None:
+        return shapely.Point(centre).buffer(description.radius or DEFAULT_RADIUS, quad_segs=32)
+    lanes = _approach_lanes(road_map, surfaces, description)
+    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
+
+
+def _approach_lanes(
+    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription
+) -> tuple[LaneSurface, ...]:
+    assert description.junction is not None  # noqa: S101  # for the type checker: approaches are a junction's
+    junction = find_junction(road_map, surfaces, description.junction)
+    return approach_lanes(surfaces, junction.id, description.along or 0.0)
+
+
+def _region(
+    road_map: RoadMap,
+    surfaces: Sequence[LaneSurface],
+    description: SiteDescription,
+    centre: Float,
+    within: BaseGeometry,
+) -> BaseGeometry:
     """Return the region of interest in map coordinates."""
-    within = description.region or shapely.Point(centre).buffer(description.radius, quad_segs=32)
     shapely.prepare(within)
-    driving = road_surface.in_groups((lane for lane in surfaces if lane.lane_type in road_surface.GROUPS), ["driving"])
+    lanes = surfaces if description.along is None else _approach_lanes(road_map, surfaces, description)
+    driving = road_surface.in_groups((lane for lane in lanes if lane.lane_type in road_surface.GROUPS), ["driving"])
     shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
     near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
     if near:
         region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(_shifted(within, -shift)))
         if not region.is_empty:
             return _shifted(region, shift)
-    where = (
-        "within the region"
-        if description.region
-        else f"within {description.radius:g} m of ({centre[0]:g}, {centre[1]:g})"
-    )
+    where = f"within {description.radius or DEFAULT_RADIUS:g} m of ({centre[0]:g}, {centre[1]:g})"
+    if description.along is not None:
+        where = f"in junction {description.junction!r}"
+    elif description.region is not None:
+        where = "within the region"
     x, y = centre.tolist()
     given = description.near is not None and not (x.is_integer() and y.is_integer())
     degrees = given and looks_like_degrees((x, y))
@@ -290,9 +316,14 @@ def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) 
     return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
 
 
-def _levels(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float) -> Levels:
+def _levels(
+    road_map: RoadMap,
+    surfaces: Sequence[LaneSurface],
+    description: SiteDescription,
+    centre: Float,
+    within: BaseGeometry,
+) -> Levels:
     """Return the lanes on the level of the place, and those that cross above or below."""
-    within = description.region or shapely.Point(centre).buffer(description.radius, quad_segs=32)
     around = within.convex_hull.buffer(MARGIN, quad_segs=16)
     if description.near is None and description.junction is not None:
         junction = find_junction(road_map, surfaces, description.junction).id

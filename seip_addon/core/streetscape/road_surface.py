@@ -149,6 +149,18 @@ def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeome
     return tuple(surface for surface in trimmed if len(surface.left) > 1)
 
 
+def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | None:
+    """Return the part of a lane between two places along the road, metres; None where there is none."""
+    if high <= low:
+        return None
+    known = np.arange(len(surface.s))
+    inside = known[(surface.s > low) & (surface.s < high)]
+    ends = np.interp([low, high], surface.s, known)
+    rows = np.concatenate([ends[:1], inside, ends[1:]])
+    s = np.interp(rows, known, surface.s)
+    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+
+
 def group(surface: LaneSurface) -> str:
     """Return the group of a lane's type."""
     return GROUPS[surface.lane_type]
@@ -317,7 +329,8 @@ def _densified(surface: LaneSurface) -> LaneSurface:
     steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
     pieces = np.maximum(1, np.ceil(steps / LONGEST_STEP).astype(int))
     rows = np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))])
-    return dataclasses.replace(surface, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+    s = np.interp(rows, np.arange(len(surface.s)), surface.s)
+    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
 
 
 def _at_rows(points: Float, rows: Float) -> Float:
@@ -330,7 +343,7 @@ def _trimmed(surface: LaneSurface, area: BaseGeometry) -> LaneSurface:
     corners = np.stack([left[:-1], left[1:], right[1:], right[:-1]], axis=1)
     hit = np.flatnonzero(shapely.intersects(area, shapely.convex_hull(shapely.multipoints(corners))))
     rows = slice(hit[0], hit[-1] + 2) if len(hit) else slice(0, 0)
-    return dataclasses.replace(surface, left=surface.left[rows], right=surface.right[rows])
+    return dataclasses.replace(surface, s=surface.s[rows], left=surface.left[rows], right=surface.right[rows])
 
 
 def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:
