@@ -60,7 +60,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("source", type=Path, help="the map (.xodr), or a site description (.toml) that names it")
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
-        "--near", type=float, nargs=2, metavar=("X", "Y"), help="middle of the place, map coordinates in metres"
+        "--near",
+        type=float,
+        nargs=2,
+        metavar=("X", "Y"),
+        help="middle of the place, map coordinates in metres (or latitude and longitude)",
     )
     place.add_argument("--junction", metavar="ID", help="id or name of the junction in the middle of the place")
     size = parser.add_mutually_exclusive_group()

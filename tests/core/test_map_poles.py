@@ -85,7 +85,7 @@ def test_a_signal_that_is_named_a_post_is_one(tmp_path):
 
 def test_posts_without_an_object_are_assumed_and_counted(tmp_path):
     built = model(tmp_path, signals=signal() + signal(s=20))
-    assert [pole.source for pole in poles(built)] == [ASSUMED]
+    assert [(pole.name, pole.source) for pole in poles(built)] == [("Assumed signal pole 1", ASSUMED)]
     assert any(note.startswith("1 post of traffic lights") for note in built.notes)
 
 

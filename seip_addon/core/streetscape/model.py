@@ -23,7 +23,7 @@ from ..opendrive import (
     placed_objects,
     placed_signals,
 )
-from ..plan_geometry import outline, signed_area
+from ..plan_geometry import outline, signed_area, without
 from ..progress import Progress
 from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
@@ -433,8 +433,8 @@ def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> P
     There is none where the map ends and the road goes on, nor beside a bridge.
     """
     inner, outer = VERGE_STRIP
-    strip = sides.buffer(outer, cap_style="flat").difference(street.roadside.filled.buffer(inner))
-    strip = strip.difference(below.buffer(outer))
+    strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
+    strip = without(strip, below.buffer(outer))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
@@ -447,7 +447,7 @@ def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry)
     ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     lanes = covered.buffer(-road_surface.SEAM, join_style="mitre").union(below)
-    beside = road_surface.without_crumbs(ground.difference(lanes))
+    beside = road_surface.without_crumbs(without(ground, lanes))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 

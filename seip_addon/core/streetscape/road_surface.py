@@ -13,7 +13,7 @@ from shapely.geometry.polygon import orient
 
 from ..arrays import Float
 from ..opendrive import LaneSurface
-from ..plan_geometry import closed, outline
+from ..plan_geometry import closed, outline, without
 from .terrain import Terrain, cut
 
 GROUPS = {
@@ -82,7 +82,7 @@ class Roadside:
 
     def sides(self) -> BaseGeometry:
         """Return the edges of the filled carriageway, as lines, without its mouths."""
-        edges = shapely.boundary(self.filled).difference(self.mouths.buffer(2 * SEAM))
+        edges = without(shapely.boundary(self.filled), self.mouths.buffer(2 * SEAM))
         return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
 
 
@@ -202,7 +202,7 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
         area = lane_outline(own)
         if name != "driving":
             driving = in_groups(surfaces, ["driving"])
-            area = without_crumbs(area.difference(_plan([lane for lane in driving if lane.junction_id == junction])))
+            area = without_crumbs(without(area, _plan([lane for lane in driving if lane.junction_id == junction])))
         terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
         pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
@@ -233,7 +233,7 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
     walked = outline(pavement, GRID)
     own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
     street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
-    notches = closed(street, CORNER_NOTCH).difference(street)
+    notches = without(closed(street, CORNER_NOTCH), street)
     corners = [
         notch
         for notch in shapely.get_parts(notches)

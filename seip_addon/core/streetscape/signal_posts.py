@@ -104,7 +104,8 @@ def _parts(poles: Sequence[_SignalPost], terrain: Terrain) -> Iterator[Part]:
         x, y = pole.foot.tolist()
         z = float(terrain.height(pole.foot[None])[0])
         role = Role.POLES if pole.carries else Role.OCCLUDERS
-        yield Part(f"Signal pole {number}", shape, (role,), (x, y, z), pole.heading, source=pole.source)
+        name = f"{'Assumed signal' if pole.source == ASSUMED else 'Signal'} pole {number}"
+        yield Part(name, shape, (role,), (x, y, z), pole.heading, source=pole.source)
 
 
 def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside: Roadside) -> tuple[int, Post | None]:
