@@ -117,3 +117,20 @@ def test_what_is_added_round_corners_is_told_and_nothing_is_where_the_map_has_pa
     assert "9 m² are added to its" in note  # four squares of 1.5 m
     assert area(closed, "Pavements").area - area(own, "Pavements").area == pytest.approx(4 * (1.5**2 - 1), abs=0.05)
     assert not any("closed round" in note for note in own.notes)
+
+
+def test_a_verge_between_a_street_and_a_footway_of_its_own_is_no_corner(tmp_path):
+    """The footway runs along the street 3 m beside it and round the corner: closing would fill all of the verge."""
+    street = section(lane(1), lane(-1))
+    footway = [
+        road(geometry(length=80.0, x=8.5, y=6.5), section(lane(1, 2.0, "sidewalk")), number="5"),
+        road(geometry(length=80.0, x=8.5, y=6.5, hdg=np.pi / 2), section(lane(-1, 2.0, "sidewalk")), number="6"),
+    ]
+    arms = [
+        road(geometry(length=85.0, x=3.5), street, number="1"),
+        road(geometry(length=85.0, y=3.5, hdg=np.pi / 2), street, number="2"),
+        road(geometry(length=7.0, x=-3.5), street, number="3", junction="7"),
+    ]
+    place = SiteDescription(near=(0.0, 0.0), radius=40.0)
+    model = built(tmp_path, *arms, *footway, place=place, rest='<junction id="7" name="corner"/>')
+    assert not any("closed round" in note for note in model.notes)

@@ -401,7 +401,7 @@ def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], t
     if len(own) == 0:
         verge = _verge_strip(street, street.roadside.sides(), below)
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
-    corners = road_surface.corner_pavements(own, street.lanes)
+    corners = road_surface.corner_pavements(own, street.lanes, street.carriageway)
     triangles = np.concatenate([own, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN

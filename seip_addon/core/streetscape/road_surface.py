@@ -35,6 +35,8 @@ CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
 LONGEST_STEP = 10.0
 CORNER_NOTCH = 3.0
 """Notches up to twice this (metres) at the corners of a junction are pavement."""
+LONGEST_CORNER, WIDEST_ENDS = 40.0, 20.0
+"""A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
@@ -117,6 +119,12 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     is_bare = ~shapely.intersects(pavement, beside)
     bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= LEAST_SIDE])
+
+
+def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
+    """Return whether a notch lies round a corner between the ends of pavements, and along neither for long."""
+    along = notch.buffer(2 * SEAM)
+    return bool(kerb.intersection(along).length <= LONGEST_CORNER and walked.intersection(along).length <= WIDEST_ENDS)
 
 
 def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
@@ -220,18 +228,20 @@ def kerb_faces(pavement: Float) -> Float:
     return np.concatenate([_skirt(ring, terrain) for ring in rings])
 
 
-def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
+def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriageway: BaseGeometry) -> Float:
     """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
 
     Many maps end the pavements where the junction begins. A notch between the
     ends of two pavements and the carriageway is filled at the pavements' height,
-    unless the map has a pavement of its own there, within the junction.
+    unless the map has a pavement of its own there: within the junction, or
+    beside the carriageway, beyond a verge. A median is no corner either.
     """
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
         return np.empty((0, 3, 3))
     walked = outline(pavement, GRID)
     own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
+    kerb = shapely.boundary(carriageway)
     street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
     notches = without(closed(street, CORNER_NOTCH), street)
     corners = [
@@ -241,6 +251,7 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
         and notch.distance(inside) < SEAM
         and notch.distance(walked) < SEAM
         and not notch.distance(own) < CORNER_NOTCH
+        and _is_corner(notch, kerb, shapely.boundary(walked))
     ]
     return Terrain(pavement).drape(shapely.union_all(corners), spacing=LONGEST_STEP)
 
