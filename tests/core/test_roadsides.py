@@ -134,3 +134,13 @@ def test_a_verge_between_a_street_and_a_footway_of_its_own_is_no_corner(tmp_path
     place = SiteDescription(near=(0.0, 0.0), radius=40.0)
     model = built(tmp_path, *arms, *footway, place=place, rest='<junction id="7" name="corner"/>')
     assert not any("closed round" in note for note in model.notes)
+
+
+@pytest.mark.parametrize(("gap", "has_verge"), [(4.0, False), (15.0, True)])
+def test_a_narrow_median_is_no_roadside(tmp_path, gap, has_verge):
+    """Two carriageways that no junction joins: no post stands between them unless there is room."""
+    roads = [road(geometry(y=y), section(lane(1), lane(-1)), number=str(n)) for n, y in enumerate((0.0, 7.0 + gap))]
+    verge = area(built(tmp_path, *roads), "Verge strip")
+    between = shapely.box(10, 3.5, 90, 3.5 + gap)
+    assert verge.intersects(between) == has_verge
+    assert verge.intersects(shapely.box(10, -9, 90, -3.5))

@@ -56,6 +56,8 @@ ISLAND = 400.0
 """Holes of the carriageway smaller than this (m²) are islands, on which no post is assumed."""
 MEDIAN = 12.0
 """Holes narrower than this (metres) are medians: likewise."""
+OPEN_MEDIAN = 6.0
+"""Gaps between carriageways narrower than this (metres) are medians though no junction closes them."""
 
 BESIDE = 6.0
 """A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
@@ -73,7 +75,7 @@ class Roadside:
         In plan.
     filled : shapely geometry
         The carriageway with its islands and medians: holes between the lanes of
-        a junction, small ones and narrow ones.
+        a junction, small ones and narrow ones, and narrow gaps.
     mouths : shapely geometry
         Lines across the carriageway where lanes end and the road goes on.
     """
@@ -95,7 +97,8 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
-    filled = _without_holes(whole, least=ISLAND, narrow=MEDIAN)
+    medians = without(closed(whole, OPEN_MEDIAN / 2), whole)
+    filled = _without_holes(closed(whole.union(medians), SEAM), least=ISLAND, narrow=MEDIAN)
     ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
     across = shapely.linestrings(np.array(ends).reshape(-1, 2, 2))
     at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * SEAM)))
