@@ -121,6 +121,7 @@ def test_far_coordinates_change_nothing(tmp_path):
     assert near.area == pytest.approx(far.area, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MAPS.is_dir(), reason="the maps of other projects are not here; set SEIP_MAPS to their folder")
 @pytest.mark.parametrize(("name", "junction", "lenses"), [("Town01", "194", 2), ("Town05", "224", 3)])
 def test_at_real_junctions_it_is_in_one_piece(name, junction, lenses):

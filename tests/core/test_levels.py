@@ -135,6 +135,7 @@ def test_the_level_is_an_option_and_a_key(tmp_path):
         read_site_description(path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MAPS.is_dir(), reason="the maps of other projects are not here; set SEIP_MAPS to their folder")
 @pytest.mark.parametrize(("near", "roads", "z"), [((-190, -1), (), 0), ((-236, 40), (), 10), ((-236, -1), ("3",), 0)])
 def test_the_bridge_of_a_real_town_makes_no_curtain(near, roads, z):
