@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -29,8 +30,15 @@ def main(argv: list[str]) -> None:
     asked = _parser().parse_args(argv)
     near = None if asked.near is None else (asked.near[0], asked.near[1])
     map_path, description = describe_place(
-        asked.source, site=asked.site, near=near, junction=asked.junction, radius=asked.radius
+        asked.source,
+        site=asked.site,
+        near=near,
+        junction=asked.junction,
+        radius=asked.radius,
+        approaches=asked.approaches,
     )
+    if asked.level:
+        description = replace(description, level=tuple(asked.level))
     check_name(asked.output)
     with session.progress_bar() as report:
         model = finish(site_model(read_map(map_path), description), report)
@@ -38,6 +46,8 @@ def main(argv: list[str]) -> None:
     save_blend(asked.output)
     for note in model.notes:
         sys.stdout.write(f"note: {note}\n")
+    for warning in model.warnings:
+        sys.stdout.write(f"warning: {warning}\n")
     x, y, z = model.origin + 0.0  # no negative zero
     sys.stdout.write(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
@@ -50,10 +60,28 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("source", type=Path, help="the map (.xodr), or a site description (.toml) that names it")
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
-        "--near", type=float, nargs=2, metavar=("X", "Y"), help="middle of the place, map coordinates in metres"
+        "--near",
+        type=float,
+        nargs=2,
+        metavar=("X", "Y"),
+        help="middle of the place, map coordinates in metres (or latitude and longitude)",
     )
     place.add_argument("--junction", metavar="ID", help="id or name of the junction in the middle of the place")
-    parser.add_argument("--radius", type=float, help="radius of the region of interest in metres (80)")
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--radius", type=float, help="radius of the region of interest in metres (80 with --near)")
+    size.add_argument(
+        "--approaches",
+        type=float,
+        metavar="M",
+        help="how far the region follows the approaches of the junction in metres (80 with --junction)",
+    )
+    parser.add_argument(
+        "--level",
+        nargs="+",
+        default=[],
+        metavar="ROAD",
+        help="id of a road on the level to study, where roads cross above",
+    )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="BLEND", help="the .blend to write")
     return parser

@@ -100,6 +100,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     metres.add_argument("--spacing", type=float, default=layout.spacing, help="between posts on the pavement")
     metres.add_argument("--setback", type=float, default=layout.setback, help="of posts from the kerb")
     metres.add_argument("--clearance", type=float, default=layout.clearance, help="of posts from walls")
+    sensors.add_argument(
+        "--assumed-poles",
+        action="store_true",
+        help="let poles carry sensors that are assumed, since the map has none for its traffic lights",
+    )
     metres.add_argument("--bracket", type=float, default=layout.bracket, help="of sensors from the axis of a pole")
     work = parser.add_argument_group("work")
     work.add_argument(
@@ -187,6 +192,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
             setback=options.setback,
             clearance=options.clearance,
             bracket=options.bracket,
+            assumed_poles=options.assumed_poles,
         ),
         visibility=VisibilitySettings(options.delta, options.min_intensity),
         grid_spacing=options.grid,

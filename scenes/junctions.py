@@ -31,6 +31,7 @@ STRAIGHT_ON = math.radians(45.0)
 CROSSWALK = (1.0, 5.0)  # metres from the end of the road: where pedestrians cross
 STOP_LINE = 6.5  # metres from the end of the road
 POST_SETBACK = 0.6  # metres from kerb to the axis of the traffic light's post
+POST_HEIGHT, POST_RADIUS = 6.0, 0.11  # metres
 
 End = Literal["start", "end"]
 
@@ -93,7 +94,7 @@ class Arm:
 
 
 def equip(road: Road, contact: End) -> Road:
-    """Return the road with crosswalk, stop line and traffic light at one of its ends."""
+    """Return the road with crosswalk, stop line and traffic light on its post at one of its ends."""
     arm = Arm(road, contact)
     into, out = driving(arm.incoming), driving(arm.outgoing)
     kerb, far_kerb = into[-1].edge + into[-1].width, out[-1].edge + out[-1].width
@@ -119,7 +120,16 @@ def equip(road: Road, contact: End) -> Road:
         with_s=contact == "end",
         lanes=(into[0].id, into[-1].id),
     )
-    return replace(road, objects=(*road.objects, crosswalk, stop_line), signals=(*road.signals, light))
+    post = RoadObject(
+        "pole",
+        f"{road.name} traffic light post at {contact}",
+        light.s,
+        light.t,
+        POST_HEIGHT,
+        z_offset=arm.incoming[-1].height,
+        size={"radius": POST_RADIUS},
+    )
+    return replace(road, objects=(*road.objects, crosswalk, stop_line, post), signals=(*road.signals, light))
 
 
 def _painted(kind: str, name: str, place: tuple[float, float], size: tuple[float, float]) -> RoadObject:

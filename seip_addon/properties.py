@@ -83,9 +83,17 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         name="Junction",
         description="In the middle of the site; empty for the middle of the map, or the description's own place",
     )
+    region_shape: EnumProperty(
+        name="Region",
+        description="Which part of the road about the junction is to be seen",
+        items=(
+            ("APPROACHES", "Approaches", "The junction, and the streets that lead to it up to a distance along them"),
+            ("CIRCLE", "Circle", "All road within a circle about the middle of the junction"),
+        ),
+    )
     radius: FloatProperty(
         name="Radius",
-        description="Of the region of interest",
+        description="Of the region of interest; or how far it follows the approaches of the junction",
         unit="LENGTH",
         default=DEFAULT_RADIUS,
         min=1.0,
@@ -105,6 +113,10 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
     def is_described(self) -> bool:
         """Return whether a site description says where the place is, and how large."""
         return self.source.lower().endswith(DESCRIPTION_SUFFIX) and not self.junction
+
+    def follows_approaches(self) -> bool:
+        """Return whether the region follows the approaches of a chosen junction."""
+        return bool(self.junction) and self.region_shape == "APPROACHES"
 
     def junction_id(self) -> str | None:
         """Return the id of the chosen junction, what was typed where the map has no such, None where none is chosen."""
@@ -209,6 +221,11 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         soft_max=5.0,
         step=10,
     )
+    assumed_poles: BoolProperty(
+        name="Assumed Poles",
+        description="Let poles carry sensors that are assumed, since the map has none for its traffic lights",
+        default=_LAYOUT.assumed_poles,
+    )
     engine: EnumProperty(
         name="Ray Caster",
         description="What casts the rays",
@@ -258,6 +275,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 setback=_written(self.setback),
                 clearance=_written(self.clearance),
                 bracket=_written(self.bracket),
+                assumed_poles=self.assumed_poles,
             ),
             visibility=VisibilitySettings(_written(self.delta), _written(self.min_intensity)),
             grid_spacing=_written(self.grid),

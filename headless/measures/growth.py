@@ -162,7 +162,7 @@ def _shifted(xyz: Float, shift: Float) -> Float:
 def _repeated_candidates(candidates: Candidates, shift: Float) -> Candidates:
     copies, positions = len(shift), len(candidates.position)
     moved: dict[str, Any] = {name: _shifted(getattr(candidates, name), shift) for name in ("position", "xyz")}
-    for name in ("position_name", "on_pole", "sensor", "height", "yaw", "tilt"):
+    for name in ("position_name", "on_pole", "pole_source", "sensor", "height", "yaw", "tilt"):
         moved[name] = np.tile(getattr(candidates, name), copies)
     moved["position_of"] = np.concatenate([candidates.position_of + k * positions for k in range(copies)])
     moved["mandatory"] = np.tile(candidates.mandatory, (1, copies))

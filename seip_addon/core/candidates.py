@@ -16,13 +16,16 @@ from .obstruction import inside_any, post_blocked
 from .orientation import orientation
 from .pavement_sampling import spread
 from .plan_geometry import outline, surface_height
-from .scene_geometry import NamedArea, Pole, SceneGeometry, joined
+from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
 
 _ABOVE_POLE = 0.5
 """Metres that a sensor may hang above the top of its pole, on a short mast."""
 
 HIGHEST = 100.0
 """Metres: a sensor higher than this is a slip of the keyboard."""
+
+ASSUMED_POLES = "assumed poles"
+"""Why poles that stand in no map are dropped."""
 
 STEEPEST = 90.0
 """Degrees: tilts are less than this, up or down."""
@@ -49,6 +52,8 @@ class CandidateSettings:
         Distance of a new post and its sensor from walls and other objects.
     bracket : float, metres
         How far from an existing pole's axis the sensor hangs, towards the region.
+    assumed_poles : bool
+        Whether poles that are assumed, and stand in no map, may carry sensors.
     """
 
     sensors: tuple[str, ...] = ("type1", "type2", "type3")
@@ -58,6 +63,7 @@ class CandidateSettings:
     setback: float = 0.5
     clearance: float = 0.3
     bracket: float = 0.4
+    assumed_poles: bool = False
 
     def __post_init__(self) -> None:
         if not self.sensors:
@@ -160,6 +166,8 @@ class Candidates:
         Name of the pole, or ``sidewalk 12``.
     on_pole : (p,) bool
         Whether the position is an existing pole.
+    pole_source : (p,) str
+        Who says that the pole stands there, as in `Pole`; empty for new posts.
     position_of : (c,) int64
         Position of each pose.
     sensor : (c,) str
@@ -185,6 +193,7 @@ class Candidates:
     position: Float
     position_name: Text
     on_pole: Boolean
+    pole_source: Text
     position_of: Integer
     sensor: Text
     height: Float
@@ -225,7 +234,7 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
         them), or a mandatory place holds none.
     """
     dropped: dict[str, int] = {}
-    foot, axis_offset, top, name, on_pole = _positions(geometry, settings, dropped)
+    foot, axis_offset, top, name, source, on_pole = _positions(geometry, settings, dropped)
     heights = np.array(sorted(set(settings.heights)), dtype=np.float64)
     position_of = np.repeat(np.arange(len(foot)), len(heights))
     height = np.tile(heights, len(foot))
@@ -256,6 +265,7 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
         position=foot[used],
         position_name=name[used],
         on_pole=on_pole[used],
+        pole_source=source[used],
         position_of=position_of,
         sensor=np.tile(sensors, int(kept.sum()) * len(tilts)),
         height=np.repeat(height[kept], repeat),
@@ -270,9 +280,9 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
 
 def _positions(
     geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]
-) -> tuple[Float, Float, Float, Text, Boolean]:
-    """Foot, offset of the optical axis from it, top, name and kind of each position, in order of x, y, z."""
-    poles = _free_poles(geometry, dropped)
+) -> tuple[Float, Float, Float, Text, Text, Boolean]:
+    """Foot, offset of the optical axis from it, top, name, source and kind of each position, in order of x, y, z."""
+    poles = _free_poles(geometry, settings, dropped)
     pole_feet = np.array([pole.base for pole in poles], dtype=np.float64).reshape(-1, 3)
     pavement = _pavement_feet(geometry, settings, pole_feet, dropped)
     foot = np.round(np.concatenate((pavement, pole_feet)), 6)
@@ -286,10 +296,12 @@ def _positions(
     numbers = iter(range(1, len(pavement) + 1))
     pole_names = [pole.name for pole in poles]
     names = [pole_names[i - len(pavement)] if on_pole[i] else f"sidewalk {next(numbers)}" for i in order]
-    return foot[order], np.round(offset[order], 6), top[order], np.array(names, dtype=np.str_), on_pole[order]
+    sources = np.array(["" for _ in pavement] + [pole.source for pole in poles], dtype=np.str_)[order]
+    text = np.array(names, dtype=np.str_)
+    return foot[order], np.round(offset[order], 6), top[order], text, sources, on_pole[order]
 
 
-def _free_poles(geometry: SceneGeometry, dropped: dict[str, int]) -> list[Pole]:
+def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]) -> list[Pole]:
     for pole in geometry.poles:
         if pole.forbidden and pole.mandatory:
             raise SeipError(f"pole {pole.name!r} is both forbidden and mandatory: take one of the two marks off")
@@ -299,7 +311,9 @@ def _free_poles(geometry: SceneGeometry, dropped: dict[str, int]) -> list[Pole]:
         if pole.mandatory and pole not in free:
             raise SeipError(f"mandatory pole {pole.name!r} stands in a forbidden area: take one of the two back")
     dropped["forbidden poles"] = len(geometry.poles) - len(free)
-    return free
+    usable = [pole for pole in free if settings.assumed_poles or pole.mandatory or pole.source != ASSUMED]
+    dropped[ASSUMED_POLES] = len(free) - len(usable)
+    return usable
 
 
 def _pavement_feet(
@@ -359,6 +373,17 @@ def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[
                 "enlarge it, free it of forbidden areas and obstacles, or ask for lower heights"
             )
     return groups
+
+
+def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tuple[str, ...]:
+    """Say how many poles of a scene are assumed, and whether they may carry sensors."""
+    assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
+    if not assumed:
+        return ()
+    poles = f"{assumed} poles are" if assumed > 1 else "1 pole is"
+    if (candidates.pole_source == ASSUMED).any():
+        return (f"{poles} assumed, not from the map, and may carry sensors: make sure that they exist",)
+    return (f"{poles} assumed, not from the map, and carry no sensors: ask for assumed poles to use them",)
 
 
 def _union(areas: Sequence[NamedArea]) -> BaseGeometry:

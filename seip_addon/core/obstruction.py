@@ -8,11 +8,34 @@ import numpy as np
 import shapely
 
 from .arrays import Boolean, Float
-from .scene_geometry import Mesh, joined
+from .scene_geometry import Mesh, SceneGeometry, joined
 from .winding import enclosed
 
 _POST_FOOT = 0.3
 """Metres above the ground from which a post must keep clear: kerbs and plinths are no walls."""
+
+_LOW, _SLIM = 1.0, 0.5
+"""Metres of height and of width up to which an object hides next to nothing from a sensor on a post."""
+
+BARE = (
+    "nothing in this scene can hide anything: it has no building, tree or wall, so that coverage says where the rings "
+    "of the sensors fall, not what they can see; describe or model what stands there"
+)
+
+
+def bareness_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
+    """Say that nothing stands in the way, where no occluder but poles is large enough to hide anything."""
+    poles = {pole.name for pole in geometry.poles}
+    others = (mesh.triangles.reshape(-1, 3) for mesh in geometry.occluders if mesh.name not in poles)
+    return () if any(map(can_hide, others)) else (BARE,)
+
+
+def can_hide(corners: Float) -> bool:
+    """Return whether an object with corners (n, 3) is large enough to hide a place from a sensor on a post."""
+    if not len(corners):
+        return False
+    x, y, z = np.ptp(corners, axis=0)
+    return bool(z > _LOW and max(x, y) > _SLIM)
 
 
 def inside_any(points: Float, meshes: Sequence[Mesh]) -> Boolean:

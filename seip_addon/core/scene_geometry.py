@@ -17,6 +17,9 @@ DEFAULT_WEIGHT = 2.0
 DEFAULT_REFLECTIVITY = 0.3
 """Of a surface that is not known to reflect otherwise."""
 
+FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
+"""Who says that a pole stands there: the map, the site description, or nobody."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -56,6 +59,8 @@ class Pole:
         Top of the post above its foot; None where that is not known, and any height will do.
     forbidden, mandatory : bool
         No sensor may hang here; at least one sensor must.
+    source : str
+        `FROM_MAP`, `DESCRIBED` or `ASSUMED`; empty where the user put it into the scene.
     """
 
     name: str
@@ -63,6 +68,7 @@ class Pole:
     height: float | None = None
     forbidden: bool = False
     mandatory: bool = False
+    source: str = ""
 
 
 @dataclass(frozen=True, eq=False)

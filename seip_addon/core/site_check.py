@@ -15,7 +15,7 @@ from .arrays import Float
 from .errors import SeipError
 from .plan_geometry import heights_over, outline, signed_area, surface_height
 from .progress import Progress
-from .scene_geometry import Pole, SceneGeometry
+from .scene_geometry import ASSUMED, Pole, SceneGeometry
 from .site import Site
 from .storage import digest
 from .targets import lay_targets
@@ -211,6 +211,8 @@ def _counts(contents: SceneContents, plans: dict[str, BaseGeometry]) -> dict[str
     for mark in ("forbidden", "mandatory"):
         marked = sum(getattr(pole, mark) for pole in contents.poles)
         counts["Poles"] += f", {marked} {mark}" * (marked > 0)
+    assumed = sum(pole.source == ASSUMED for pole in contents.poles)
+    counts["Poles"] += f", {assumed} assumed" * (assumed > 0)
     region, road = plans["region"], plans["roads"]
     counts["Area of the region"] = f"{region.area:,.0f} m²"
     counts["Road in the region"] = f"{region.intersection(road).area:,.0f} m²"

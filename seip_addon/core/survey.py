@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from .candidates import CandidateSettings
+from .candidates import CandidateSettings, assumed_pole_warnings
 from .deployment import deploy
 from .errors import SeipError
 from .far_objects import without_far_objects
 from .goal import Goal, Plan, make_plan, placement_problem, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
+from .obstruction import bareness_warnings
 from .placement import Placement
 from .placement.integer_program import check_solver
 from .placement.near_best import near_best
@@ -145,7 +146,13 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach())
     near, far = without_far_objects(geometry, geometry.region, settings.reach())
-    limits = (*far, *rounding_warnings(near), *resolution_warnings(site, models, settings.visibility))
+    limits = (
+        *far,
+        *bareness_warnings(near),
+        *assumed_pole_warnings(geometry, site.candidates),
+        *rounding_warnings(near),
+        *resolution_warnings(site, models, settings.visibility),
+    )
     return Layout(geometry, site, models, settings, (*warnings, *limits))
 
 

@@ -16,7 +16,7 @@ from ..core.progress import Progress, finish
 from ..core.scene_geometry import SceneGeometry
 from ..core.site import Site
 from ..core.site_check import Problem, SiteCheck, check_site
-from ..core.streetscape.description import DESCRIPTION_SUFFIX, describe_place
+from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX, describe_place
 from ..core.streetscape.model import SiteModel, site_model
 from ..core.streetscape.parts import Role
 from ..core.survey import SurveySettings, lay_out
@@ -55,7 +55,7 @@ class SEIP_OT_choose_map(bpy.types.Operator):
         map_path, description = describe_place(path)
         road_map = read_map(map_path)
         site.source = self.filepath
-        site.radius = description.radius
+        site.radius = description.radius or DEFAULT_RADIUS
         list_junctions(site, road_map)
         self.report({"INFO"}, f"{len(road_map.roads):,} roads, {len(site.junctions):,} junctions")
 
@@ -98,6 +98,7 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
             Path(bpy.path.abspath(site.source)),
             site.junction_id(),
             None if site.is_described() else float(f"{site.radius:.7g}"),
+            along=site.follows_approaches(),
         )
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
@@ -106,7 +107,7 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
         built = scene
         if has_site(scene):
             built = bpy.data.scenes.new(result.model.name)
-            for name in ("source", "radius"):
+            for name in ("source", "region_shape", "radius"):
                 setattr(built.seip.site, name, getattr(chosen, name))
             for junction in chosen.junctions:
                 one = built.seip.site.junctions.add()
@@ -118,17 +119,25 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
             bpy.context.window.scene = built
         for note in result.model.notes:
             self.report({"INFO"}, note)
+        for warning in result.model.warnings:
+            self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{len(result.model.parts)} objects, region {result.model.region.area:,.0f} m²")
 
 
-def _model(source: Path, junction: str | None, radius: float | None) -> Generator[Progress, None, BuiltSite]:
-    """Model a place; without a junction the one that is described, or the middle of the map."""
+def _model(
+    source: Path, junction: str | None, size: float | None, *, along: bool
+) -> Generator[Progress, None, BuiltSite]:
+    """Model a place; without a junction the one that is described, or the middle of the map.
+
+    Its ``size`` (metres) is how far it goes ``along`` the approaches of the junction, or its radius.
+    """
     yield Progress(0, 0, "map")
     map_path, described = describe_place(source)
     road_map = read_map(map_path)
     placed = described.near is not None or described.junction is not None or described.region is not None
     near = None if junction is not None or placed else road_map.middle()
-    _, description = describe_place(source, near=near, junction=junction, radius=radius)
+    radius, approaches = (None, size) if along else (size, None)
+    _, description = describe_place(source, near=near, junction=junction, radius=radius, approaches=approaches)
     return BuiltSite(map_path.name, (yield from site_model(road_map, description)))
 
 

@@ -62,7 +62,9 @@ class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
         if site.is_described():
             draw_sentence(layout, "The place is the one that the description names.")
         else:
-            column.prop(site, "radius")
+            if site.junction:
+                column.prop(site, "region_shape")
+            column.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
             if not site.junction:
                 draw_sentence(layout, "No junction: the middle of the map.")
         if has_site(context.scene):

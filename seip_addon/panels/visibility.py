@@ -48,7 +48,7 @@ class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column(heading="Positions")
-        for name in ("spacing", "setback", "clearance", "bracket"):
+        for name in ("spacing", "setback", "clearance", "bracket", "assumed_poles"):
             column.prop(survey, name)
         column = layout.column()
         for name in ("min_intensity", "engine"):

@@ -93,6 +93,8 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     thing.rotation_euler = (0.0, 0.0, part.yaw)
     if part.weight is not None:
         thing[contract.WEIGHT] = part.weight
+    if part.source:
+        thing[contract.SOURCE] = part.source
     thing.hide_render = VEILS.keys() >= set(part.roles)  # the viewport shows what only means an area
     for role in part.roles:
         contract.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)

@@ -27,6 +27,7 @@ INPUTS = (*AREAS, ROADS, GROUND, OCCLUDERS, POLES)
 WEIGHT = "seip_weight"
 FORBIDDEN = "seip_forbidden"
 MANDATORY = "seip_mandatory"
+SOURCE = "seip_source"
 TITLE = "seip_title"
 ORIGIN = "seip_origin"
 MAP = "seip_map"

@@ -298,6 +298,7 @@ def poles_of(parts: list[Shown]) -> tuple[Pole, ...]:
             _height(part, pieces),
             forbidden=bool(part.source.get(contract.FORBIDDEN, False)),
             mandatory=bool(part.source.get(contract.MANDATORY, False)),
+            source=str(part.source.get(contract.SOURCE, "")),
         )
         for part in (*whole, *scattered)
     )

@@ -1,5 +1,9 @@
 """The list of sensor types, catalogues of one's own, presets, the beams in the viewport, and the cache."""
 
+import argparse
+
+from headless.survey import add_options
+
 import bpy
 import numpy as np
 import pytest
@@ -55,6 +59,15 @@ def test_the_list_is_the_catalogue_and_the_choice_the_default(survey):
     assert [one.name for one in survey.types] == list(load_catalogue())
     assert used(survey) == CandidateSettings().sensors
     assert survey.settings().candidates == CandidateSettings()
+
+
+def test_assumed_poles_are_asked_for_in_the_panel_as_on_the_command_line(survey):
+    survey.assumed_poles = True
+    assert survey.settings().candidates.assumed_poles
+    for options, wanted in (([], False), (["--assumed-poles"], True)):
+        parser = argparse.ArgumentParser()
+        add_options(parser)
+        assert parser.parse_args(["-o", "out", *options]).assumed_poles is wanted
 
 
 def test_the_choice_is_kept_when_a_file_is_reopened(survey, tmp_path):

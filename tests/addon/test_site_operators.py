@@ -36,12 +36,14 @@ def test_a_map_s_junctions_are_listed(scene):
     assert scene.seip.site.radius == 30.0
 
 
-def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path):
+@pytest.mark.parametrize(("shape", "option"), [("APPROACHES", "--approaches"), ("CIRCLE", "--radius")])
+def test_the_panel_builds_what_the_batch_command_builds(scene, tmp_path, shape, option):
     site = choose(scene)
     site.junction = site.junctions[0].name
+    site.region_shape = shape
     assert bpy.ops.seip.build_site() == {"FINISHED"}
     by_panel = shapes(scene), read_scene(scene).geometry
-    build_scene.main([str(MAP), "--junction", "100", "--radius", "30", "-o", str(tmp_path / "site.blend")])
+    build_scene.main([str(MAP), "--junction", "100", option, "30", "-o", str(tmp_path / "site.blend")])
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     by_batch = shapes(bpy.context.scene), read_scene(bpy.context.scene).geometry
     assert by_panel[0] == by_batch[0]

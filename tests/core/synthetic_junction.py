@@ -122,6 +122,7 @@ def make_candidates(
         position=xyz - np.column_stack([np.zeros(count), np.zeros(count), height]),
         position_name=np.array([f"sidewalk {i}" for i in range(count)]),
         on_pole=np.zeros(count, dtype=bool),
+        pole_source=np.full(count, ""),
         position_of=np.arange(count),
         sensor=np.asarray(sensor, dtype=np.str_),
         height=np.asarray(height, dtype=np.float64),

@@ -37,6 +37,7 @@ def test_rows_say_what_each_pose_sees_and_where_it_is(example, rows):
         assert there == pytest.approx((candidates.xyz[pose] + example.site.origin).tolist(), abs=6e-4)
         assert row["sensor"] == candidates.sensor[pose]
         assert row["position"] == candidates.position_name[candidates.position_of[pose]]
+        assert row["pole_source"] == candidates.pole_source[candidates.position_of[pose]]
 
 
 def test_ranks_are_a_permutation_that_falls_with_weighted_coverage(rows):

@@ -76,7 +76,8 @@ def only_positions(example, count) -> tuple[Site, np.ndarray]:
     per_pose = {
         name: getattr(candidates, name)[kept] for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt")
     }
-    per_position = {name: getattr(candidates, name)[:count] for name in ("position", "position_name", "on_pole")}
+    names = ("position", "position_name", "on_pole", "pole_source")
+    per_position = {name: getattr(candidates, name)[:count] for name in names}
     fewer = replace(candidates, **per_pose, **per_position, mandatory=np.zeros((0, count), bool))
     return replace(example.site, candidates=fewer), example.visible[kept]
 

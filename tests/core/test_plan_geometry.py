@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.plan_geometry import closed, outline, plane_height, signed_area, surface_height
+from seip_addon.core.plan_geometry import closed, outline, plane_height, signed_area, surface_height, without
 
 corner = st.tuples(st.integers(-50, 50), st.integers(-50, 50), st.integers(-5, 5))
 triangles = st.lists(st.tuples(corner, corner, corner), min_size=1, max_size=6).map(lambda t: np.array(t, dtype=float))
@@ -55,3 +55,14 @@ def test_the_shared_edge_of_two_triangles_has_a_height():
     square = np.array([[[0, 0, 1], [3, 0, 1], [3, 1, 1]], [[0, 0, 1], [3, 1, 1], [0, 1, 1]]], dtype=float)
     along = np.linspace(0, 3, 1001)
     assert surface_height(np.column_stack([along, along / 3]), square) == pytest.approx(1.0)
+
+
+def test_an_outline_that_crosses_itself_can_be_taken_away():
+    """Buffers with mitred corners now and then return one."""
+    bow_tie = shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])
+    with pytest.raises(shapely.errors.GEOSException):
+        shapely.box(-1, 1, 5, 3).difference(bow_tie)
+    rest = without(shapely.box(-1, 1, 5, 3), bow_tie)
+    assert rest.is_valid
+    assert 0 < rest.area < 12
+    assert without(shapely.box(0, 0, 4, 4), shapely.box(0, 0, 1, 4)).area == 12

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from seip_addon.core.deployment import deploy
 from seip_addon.core.pictures.drawing import markers_of, percent, summary
 from seip_addon.core.pictures.palette import SEEN_COLOURS
 from seip_addon.core.pictures.plan_view import draw_plan, save_plan_view
+from seip_addon.core.scene_geometry import ASSUMED, Pole
 from tests.small_junction import make_example
 
 
@@ -111,3 +114,16 @@ def test_the_summary_says_what_was_placed(example):
     words = summary(example.deployment)
     assert words.startswith("3 sensors see ")
     assert f"${sum(sensor.model.price for sensor in example.deployment.sensors):,.0f}" in words
+
+
+def test_assumed_poles_have_a_mark_of_their_own(example):
+    """Those that carry nothing are drawn as well: they are in the way, and are not to be taken for the map's."""
+    pole = Pole("guess", np.array((-12.0, 9.0, 0.1)), source=ASSUMED)
+    geometry = replace(example.geometry, poles=(*example.geometry.poles, pole))
+    words = [text.get_text() for text in draw_plan(geometry, example.site, example.deployment).axes[1].texts]
+    assert "1 assumed pole, not used" in words
+    assert any(text.endswith("poles from the map") for text in words)
+    plain = draw_plan(example.geometry, example.site, example.deployment)
+    assert not any("assumed" in text.get_text() for text in plain.axes[1].texts)
+    marked = pixel_at(draw_plan(geometry, example.site, example.deployment), (-12.0, 9.0))
+    assert np.abs(marked - pixel_at(plain, (-12.0, 9.0))).max() > 0.05

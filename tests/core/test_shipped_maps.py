@@ -442,3 +442,11 @@ def test_corridor_site_names_junctions_and_a_region_around_them(corridor: Shippe
     assert names == [item.id for item in corridor.road_map.junctions]
     for name in names:
         assert region.contains(junction_area(corridor.surfaces, name))
+
+
+def test_every_traffic_light_has_its_post(shipped: Shipped) -> None:
+    posts = np.array([placed.position[:2] for placed in shipped.objects if placed.kind == "pole"])
+    lights = np.array([signal.position[:2] for signal in placed_signals(shipped.road_map) if signal.dynamic])
+    assert len(posts) == len(lights)
+    for light in lights:
+        assert np.hypot(*(posts - light).T).min() < 1e-6

@@ -11,7 +11,7 @@ from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
 from seip_addon.core.plan_geometry import outline
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
+from seip_addon.core.scene_geometry import ASSUMED, Mesh, Pole, SceneGeometry
 from seip_addon.core.site import make_site
 from seip_addon.core.site_check import Problem, SceneContents, Surface, check_site
 
@@ -60,12 +60,12 @@ def test_a_sound_site_has_no_problem():
 
 
 def test_everything_is_counted():
-    counts = checked(*SOUND.surfaces, poles=[Pole("post", np.zeros(3), mandatory=True)]).counts
+    counts = checked(*SOUND.surfaces, poles=[Pole("post", np.zeros(3), mandatory=True, source=ASSUMED)]).counts
     assert counts["Roads"] == "1 object, 2 triangles"
     assert counts["Area of the region"] == "600 m²"
     assert counts["Road in the region"] == "480 m²"
     assert counts["Candidate area"] == "300 m²"
-    assert counts["Poles"] == "1 pole, 1 mandatory"
+    assert counts["Poles"] == "1 pole, 1 mandatory, 1 assumed"
     assert counts["Targets"] == f"{len(SITE.targets)}, 0 in weighted regions"
     assert counts["Poses"] == f"{len(SITE.candidates)}"
 

@@ -138,7 +138,7 @@ def test_a_missing_or_binary_file_is_named(tmp_path):
     ("lines", "sentence"),
     [
         ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheigth = 3", "height is missing .is 'heigth' a slip?"),
-        ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheight = 2e6", "height must be at most 100000"),
+        ("[[building]]\noutline = [[0, 0], [9, 0], [9, 9]]\nheight = 2e6", "height must be at most 1000"),
         ("[[building]]\noutline = [[0, 0], [1e8, 0], [9, 9]]\nheight = 9", "an outline of at most 100000 m"),
         ("[[tree]]\nfrom = [0, 0]\nto = [1e6, 0]\nspacing = 0.001", "this row has 1e.09 places"),
         ("near = [1e300, 0]", "near must be a point"),

@@ -94,10 +94,12 @@ def test_kerbs_hang_below_the_pavement_and_face_outwards(tmp_path):
             assert np.sign(normal[1]) == np.sign(-middle[1] if at_carriageway else middle[1])
 
 
-def test_pavements_near_the_region_are_candidate_areas_and_no_others(tmp_path):
+def test_pavements_near_the_region_are_candidate_areas_and_others_are_not(tmp_path):
     built = model(tmp_path)
-    (near,) = with_role(built, Role.CANDIDATE_AREAS)
+    near, verge = with_role(built, Role.CANDIDATE_AREAS)
     assert Role.GROUND in near.roles
+    assert verge.name == "Verge strip"
+    assert np.abs(verge.solid.vertices[:, 0]).max() < 10.1  # beside the junction alone, where no pavement is
     low, high = near.solid.vertices[:, 0].min(), near.solid.vertices[:, 0].max()
     assert -60 < low < -40
     assert 40 < high < 60

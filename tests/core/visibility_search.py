@@ -205,6 +205,7 @@ def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: 
         position=xyz[both],
         position_name=np.array([f"place {i}" for i in both]),
         on_pole=np.zeros(len(both), dtype=bool),
+        pole_source=np.full(len(both), ""),
         position_of=both,
         sensor=np.array(["one", "two"] * places),
         height=xyz[both, 2],

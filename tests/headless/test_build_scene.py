@@ -54,6 +54,7 @@ def test_the_command_runs_as_a_module_and_as_a_file(road, tmp_path, form):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "region of interest" in done.stdout
+    assert done.stdout.count("warning: nothing in this scene can hide anything") == 1
     assert list(opened(output)[contract.ORIGIN]) == [1100, 2000, 0]
 
 
@@ -90,6 +91,8 @@ def test_the_command_line_goes_before_the_site_file(site, road, tmp_path):
         (["{road}", "--junction", "7", "-o", "{out}.blend"], "no junction '7'"),
         (["{road}", "--near", "1100", "2000", "--radius", "-3", "-o", "{out}.blend"], "the radius must be above 0"),
         (["{road}", "--near", "1100", "2000", "--radius", "nan", "-o", "{out}.blend"], "the radius must be above 0"),
+        (["{road}", "--near", "1100", "2000", "--approaches", "50", "-o", "{out}.blend"], "those of a junction"),
+        (["{road}", "--near", "1100", "2000", "--level", "9", "-o", "{out}.blend"], "no road '9' at this place"),
         (["{road}", "--near", "nan", "2000", "-o", "{out}.blend"], "two finite numbers"),
         (["{road}", "--near", "1100", "2000", "-o", "{out}.obj"], r"let it end in \.blend"),
         (["{out}.xodr", "--near", "0", "0", "-o", "{out}.blend"], r"out\.xodr"),

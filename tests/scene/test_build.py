@@ -7,6 +7,7 @@ import shapely
 from mathutils import Vector
 
 from seip_addon.core.progress import finish
+from seip_addon.core.scene_geometry import ASSUMED
 from seip_addon.core.streetscape.model import SiteModel
 from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree
@@ -31,6 +32,7 @@ def model():
         Part("Tree 1", tree(8, 5, 0), (Role.OCCLUDERS,), (3.0, 4.0, 0.5), 0.7),
         Part("Tree 2", tree(8, 5, 0), (Role.OCCLUDERS,), (6.0, 4.0, 0.5), 0.9),
         Part("Panes", slab, (Role.DRESSING,)),
+        Part("Signal pole 1", slab, (Role.POLES,), (11.0, 5.0, 0.0), source=ASSUMED),
     )
     return SiteModel(
         "A crossing with quite a long name, längs der Straße " * 3,
@@ -129,3 +131,9 @@ def test_the_camera_sees_the_whole_region(model):
 
 def test_every_material_has_a_colour_that_light_can_have():
     assert all(0 <= value <= 1 for colour in COLOURS.values() for value in colour)
+
+
+def test_the_source_of_a_pole_is_kept_in_the_scene(model):
+    scene = built(model)
+    assert scene.objects["Signal pole 1"][contract.SOURCE] == ASSUMED
+    assert [pole.source for pole in read_scene(scene).geometry.poles] == [ASSUMED]

@@ -62,8 +62,16 @@ class Node:
             raise SeipError(f"{self.place}: <{self.tag}> has no {name!r}; OpenDRIVE asks for it, export the map again")
         return value.strip()
 
-    def number(self, name: str, default: float | None = None) -> float:
-        """Return an attribute as a number of earthly size; without a default it must be there."""
+    def number(self, name: str, default: float | None = None, *, most: float = _GREATEST) -> float:
+        """Return an attribute as a number of earthly size; without a default it must be there.
+
+        Parameters
+        ----------
+        name : str
+        default : float, optional
+        most : float
+            What its amount may be at most, where that is known better.
+        """
         if default is not None and name not in self.element.attrib:
             return default
         text = self.text(name)
@@ -73,6 +81,10 @@ class Node:
             value = math.nan
         if not abs(value) <= _GREATEST:
             raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no sensible number; correct the map")
+        if abs(value) > most:
+            raise SeipError(
+                f"{self.place}: {name}={value:g} of <{self.tag}> is beyond {most:g} m; correct it in the map"
+            )
         return value
 
     def length(self, name: str) -> float:
@@ -94,6 +106,27 @@ class Node:
         return self.text(name, str(default)).lower() in ("true", "yes", "1")
 
 
+_STARTS = {
+    b"\x1f\x8b": "is compressed with gzip; unpack it (gunzip)",
+    b"PK\x03\x04": "is a zip archive; unpack it",
+    b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
+    b"\xfd7zXZ": "is compressed with xz; unpack it (unxz)",
+    b"BLENDER": "is a .blend, no map; open it in Blender",
+}
+"""How files begin that are given in place of a map."""
+
+
+def _refuse_other_formats(path: str | os.PathLike[str], name: str) -> None:
+    with open(path, "rb") as file:  # noqa: PTH123 - as above
+        start = file.read(1000)
+    for mark, cure in _STARTS.items():
+        if start.startswith(mark):
+            raise SeipError(f"{name} {cure}")
+    if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["):
+        kind = "CityJSON, a model of buildings" if b'"CityJSON"' in start else "JSON"
+        raise SeipError(f"{name} is {kind}, not OpenDRIVE; choose an .xodr file")
+
+
 def read_document(path: str | os.PathLike[str]) -> Node:
     """Parse an XML file and return its root.
 
@@ -106,6 +139,7 @@ def read_document(path: str | os.PathLike[str]) -> Node:
     """
     name = os.path.basename(os.fspath(path))  # noqa: PTH119 - works for any path-like, existing or not
     try:
+        _refuse_other_formats(path, name)
         tree = parse(path, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     except FileNotFoundError as error:
         raise SeipError(f"no such file: {path}; check the path of the map") from error

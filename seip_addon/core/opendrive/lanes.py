@@ -17,6 +17,7 @@ from .road_map import Frame, Lane, LaneSection, Road
 from .sampling import sample
 
 _SMALLEST_TRIANGLE = 1e-9  # square metres
+_HIGHEST, _WIDEST = 10_000.0, 1_000.0  # metres; beyond them a number of the map has slipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class LaneSurface:
         As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
     keeps_left : bool
         Whether traffic on the road keeps to the left.
+    s : (n,) float64, metres
+        Where along the road the points of the edges are.
     left, right : (n, 3) float64, metres
         Edges in map coordinates, as seen along the reference line.
     """
@@ -46,6 +49,7 @@ class LaneSurface:
     lane_id: int
     lane_type: str
     keeps_left: bool
+    s: Float
     left: Float
     right: Float
 
@@ -104,17 +108,31 @@ def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
         lanes = (*section.left[::-1], *section.right)
         if not lanes:
             continue
-        points = sample(
+        s, points = sample(
             partial(_edges, road, section),
             _knots(road, section),
             tolerance,
             f"road {road.id}, lane section at s={section.start:g}",
-        ).reshape(-1, len(lanes), 2, 3)
+        )
+        points = points.reshape(-1, len(lanes), 2, 3)
+        _check_size(points, f"road {road.id}, lane section at s={section.start:g}")
         for index, lane in enumerate(lanes):
             left, right = points[:, index, 0], points[:, index, 1]
-            surface = LaneSurface(road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, left, right)
+            surface = LaneSurface(
+                road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, s, left, right
+            )
             if len(surface.triangles):
                 yield surface
+
+
+def _check_size(points: Float, place: str) -> None:
+    """Raise an error where edges of lanes, (k, lanes, 2, 3), are where no road is."""
+    highest = float(np.abs(points[..., 2]).max(initial=0.0))
+    if highest > _HIGHEST:
+        raise SeipError(f"{place}: it lies at {highest:,.0f} m above or below zero; correct the elevation in the map")
+    widest = float(np.linalg.norm(points[:, :, 0] - points[:, :, 1], axis=-1).max(initial=0.0))
+    if widest > _WIDEST:
+        raise SeipError(f"{place}: a lane is {widest:,.0f} m wide; correct its width in the map")
 
 
 def _knots(road: Road, section: LaneSection) -> list[float]:

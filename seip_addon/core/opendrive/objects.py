@@ -196,7 +196,7 @@ def _strip(road: Road, thing: RoadObject, repeat: Repeat) -> PlacedObject:
 
     starts = np.concatenate([road.reference_line.s, road.elevation.start, road.superelevation.start])
     knots = [begin, *starts[(starts > begin) & (starts < end)].tolist(), end]
-    points = sample(lines, knots, _STRIP_TOLERANCE, f"road {road.id}, object {thing.id}")
+    _, points = sample(lines, knots, _STRIP_TOLERANCE, f"road {road.id}, object {thing.id}")
     left, right, height = points[:, 0], points[:, 1], points[:, 2, 2]
     closed = bool(width.any())
     outline = Outline(

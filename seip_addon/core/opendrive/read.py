@@ -33,7 +33,16 @@ from .road_map import (
     RoadSignal,
 )
 
+_OTHER_FORMATS = {
+    "osm": " as OpenStreetMap does",
+    "net": " as networks of SUMO do (netconvert --opendrive-output makes a map of them)",
+    "CityModel": " as CityGML does",
+    "OpenSCENARIO": " as OpenSCENARIO does",
+    "kml": " as KML does",
+}
 _LONGEST_ROAD = 1e6  # metres; beyond it a number has slipped
+_FARTHEST = 5_000.0  # metres that an object reaches, and stands from its road; beyond it a number has slipped
+_HIGHEST = 1_000.0  # metres; no building is higher
 _MOST_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 
 
@@ -58,7 +67,8 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     """
     root = read_document(path)
     if root.tag != "OpenDRIVE":
-        raise SeipError(f"{root.place} is not OpenDRIVE: it begins with <{root.tag}>; choose an .xodr file")
+        other = _OTHER_FORMATS.get(root.tag, "")
+        raise SeipError(f"{root.place} is not OpenDRIVE: it begins with <{root.tag}>{other}; choose an .xodr file")
     roads = tuple(_road(node.within(f"road {node.text('id')}")) for node in root.children("road"))
     if not roads:
         raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")
@@ -242,15 +252,15 @@ def _object(node: Node) -> RoadObject:
         name=node.text("name", ""),
         kind=node.text("type", "none").lower(),
         s=node.number("s"),
-        t=node.number("t"),
-        z_offset=node.number("zOffset", 0.0),
+        t=node.number("t", most=_FARTHEST),
+        z_offset=node.number("zOffset", 0.0, most=_HIGHEST),
         heading=node.number("hdg", 0.0),
         pitch=node.number("pitch", 0.0),
         roll=node.number("roll", 0.0),
-        length=node.number("length", 0.0),
-        width=node.number("width", 0.0),
-        height=node.number("height", 0.0),
-        radius=node.number("radius", 0.0),
+        length=node.number("length", 0.0, most=_FARTHEST),
+        width=node.number("width", 0.0, most=_FARTHEST),
+        height=node.number("height", 0.0, most=_HIGHEST),
+        radius=node.number("radius", 0.0, most=_FARTHEST),
         outlines=tuple(filter(lambda outline: outline.corners, map(_outline, outlines))),
         repeats=(),
     )
@@ -270,10 +280,10 @@ def _corner(node: Node) -> Corner:
     along, aside, up = ("s", "t", "dz") if on_road else ("u", "v", "z")
     return Corner(
         on_road,
-        node.number(along),
-        node.number(aside),
-        node.number(up, 0.0),
-        node.number("height") if "height" in node.element.attrib else None,
+        node.number(along) if on_road else node.number(along, most=_FARTHEST),
+        node.number(aside, most=_FARTHEST),
+        node.number(up, 0.0, most=_HIGHEST),
+        node.number("height", most=_HIGHEST) if "height" in node.element.attrib else None,
     )
 
 
@@ -282,17 +292,17 @@ def _repeat(node: Node, thing: RoadObject) -> Repeat:
     if distance < 0.0:
         raise SeipError(f"{node.place}: distance={distance:g} of <repeat> is below zero; correct it in the map")
 
-    def pair(name: str, own: float) -> tuple[float, float]:
-        start = node.number(f"{name}Start", own)
-        return start, node.number(f"{name}End", start)
+    def pair(name: str, own: float, most: float = _FARTHEST) -> tuple[float, float]:
+        start = node.number(f"{name}Start", own, most=most)
+        return start, node.number(f"{name}End", start, most=most)
 
     return Repeat(
         s=node.number("s", thing.s),
         length=node.number("length", 0.0),
         distance=distance,
         t=pair("t", thing.t),
-        z_offset=pair("zOffset", thing.z_offset),
-        height=pair("height", thing.height),
+        z_offset=pair("zOffset", thing.z_offset, _HIGHEST),
+        height=pair("height", thing.height, _HIGHEST),
         width=pair("width", thing.width),
         object_length=pair("length", thing.length),
         radius=pair("radius", thing.radius),

@@ -22,7 +22,7 @@ _QUARTERS = np.linspace(0.0, 1.0, 5)
 _MARGIN = 0.9
 
 
-def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str) -> Float:
+def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str) -> tuple[Float, Float]:
     """Return points along curves, such that straight lines between them stay within a tolerance.
 
     Between two knots the curves are smooth; at a knot they may jump, and then
@@ -41,18 +41,21 @@ def sample(curves: Curves, knots: Iterable[float], tolerance: float, place: str)
 
     Returns
     -------
-    (n, m, 3) float64, metres
-        Empty if the range is shorter than a micrometre.
+    s : (n,) float64, metres
+        Along the road.
+    points : (n, m, 3) float64, metres
+        Both are empty if the range is shorter than a micrometre.
     """
     bounds = np.unique(np.fromiter(knots, dtype=np.float64))
     begin, end = bounds[:-1], bounds[1:]
     long_enough = end - begin > _SHORTEST
     begin, end = begin[long_enough], end[long_enough] - _BEFORE
     if not begin.size:
-        return curves(begin)
+        return begin, curves(begin)
     s = np.unique(np.concatenate([_refined(curves, begin, end, tolerance, place), end]))
     points = curves(s)
-    return points[_distinct(s, points)]
+    kept = _distinct(s, points)
+    return s[kept], points[kept]
 
 
 def _refined(curves: Curves, begin: Float, end: Float, tolerance: float, place: str) -> Float:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Rectangle
 
+from ..scene_geometry import ASSUMED, FROM_MAP
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .plan_style import FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
+from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.colors import Normalize
@@ -67,7 +68,10 @@ class PlanLegend:
         """
         weights = sorted({area.weight for area in geometry.weighted_regions})
         lines = [line for note in notes for line in wrap(note, LETTERS)]
-        below = 3.72 + LINE * (3 + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas))
+        assumed = any(pole.source == ASSUMED for pole in geometry.poles)
+        below = 3.72 + LINE * (
+            3 + assumed + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas)
+        )
         below += 0.5 + SMALL_LINE * len(lines) if lines else 0.0
         self._sensors(deployment, self.height - below)
         self._targets(site, deployment)
@@ -123,14 +127,10 @@ class PlanLegend:
             if areas:
                 self._swatch(facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9)
                 self._line(words)
-        on_pole = site.candidates.on_pole
-        for these, mark, words in (
-            (~on_pole, SIDEWALK_MARK, "possible new posts"),
-            (on_pole, POLE_MARK, "existing poles"),
-        ):
-            if these.any():
+        for count, mark, words in _positions(geometry, site):
+            if count:
                 self._mark(**mark | {"markersize": mark["markersize"] * 1.4})
-                self._line(f"{np.count_nonzero(these)} {words}")
+                self._line(f"{count} {words}")
         self.y += 0.14
 
     def _heights(self, norm: Normalize) -> None:
@@ -171,6 +171,17 @@ class PlanLegend:
 
     def _mark(self, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
         self.axes.plot(0.12, self.y, clip_on=False, **style)
+
+
+def _positions(geometry: SceneGeometry, site: Site) -> Iterator[tuple[int, Style, str]]:
+    """Yield number, mark and words of each kind of place for a sensor; assumed poles count that carry none, too."""
+    candidates = site.candidates
+    existing = candidates.pole_source[candidates.on_pole & (candidates.pole_source != ASSUMED)]
+    assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
+    used = (candidates.pole_source == ASSUMED).any()
+    yield np.count_nonzero(~candidates.on_pole), SIDEWALK_MARK, "possible new posts"
+    yield len(existing), POLE_MARK, "poles from the map" if (existing == FROM_MAP).all() else "existing poles"
+    yield assumed, ASSUMED_MARK, f"assumed pole{'s' * (assumed > 1)}{'' if used else ', not used'}"
 
 
 def _short(words: str, length: int) -> str:

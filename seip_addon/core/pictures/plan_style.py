@@ -13,4 +13,12 @@ Style = dict[str, Any]
 HEIGHTS = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
 WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
 SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
+ASSUMED_MARK: Style = {
+    "linestyle": "none",
+    "marker": "D",
+    "markersize": 3.8,
+    "mfc": PAPER,
+    "mec": "#a3333d",
+    "mew": 0.9,
+}
 POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}

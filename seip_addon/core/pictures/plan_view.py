@@ -16,11 +16,12 @@ from matplotlib.path import Path
 
 from ..arrays import Float
 from ..plan_geometry import closed, outline
+from ..scene_geometry import ASSUMED
 from ..target_squares import target_squares
 from .drawing import draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
 from .plan_legend import LEGEND_WIDTH, PlanLegend
-from .plan_style import FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED
+from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED
 
 if TYPE_CHECKING:
     import os
@@ -88,7 +89,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
     _draw_targets(plan, site, deployment)
     norm = _draw_obstacles(plan, geometry.occluders, site, shown)
     _draw_areas(plan, geometry, site.region)
-    _draw_candidates(plan, site)
+    _draw_candidates(plan, geometry, site)
     sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
     draw_sensors(plan, deployment, sensors, site.targets.xyz[:, :2], zorder=SENSOR)
     inch = (window[2] - window[0]) / map_width
@@ -211,10 +212,17 @@ def draw_area(plan: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: AN
         plan.add_patch(PathPatch(path, **style))
 
 
-def _draw_candidates(plan: Axes, site: Site) -> None:
+def _draw_candidates(plan: Axes, geometry: SceneGeometry, site: Site) -> None:
+    """Draw candidate positions, and assumed poles whether they are candidates or not."""
     position, on_pole = site.candidates.position, site.candidates.on_pole
-    for these, style in ((~on_pole, SIDEWALK_MARK), (on_pole, POLE_MARK)):
-        plan.plot(position[these, 0], position[these, 1], zorder=CANDIDATE, **style)
+    existing = on_pole & (site.candidates.pole_source != ASSUMED)
+    assumed = np.array([pole.base[:2] for pole in geometry.poles if pole.source == ASSUMED]).reshape(-1, 2)
+    for places, style in (
+        (position[~on_pole], SIDEWALK_MARK),
+        (position[existing], POLE_MARK),
+        (assumed, ASSUMED_MARK),
+    ):
+        plan.plot(places[:, 0], places[:, 1], zorder=CANDIDATE, **style)
 
 
 def draw_scale(plan: Axes, inch: float) -> None:

@@ -276,6 +276,7 @@ def _site(scene: HardScene) -> Site:
             position=pose,
             position_name=np.array(["probe"]),
             on_pole=np.zeros(1, dtype=bool),
+            pole_source=np.full(1, ""),
             position_of=np.zeros(1, dtype=np.int64),
             sensor=np.array([SENSOR.key]),
             height=pose[:, 2],

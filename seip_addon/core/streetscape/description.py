@@ -28,6 +28,12 @@ DESCRIPTION_SUFFIX = ".toml"
 LARGEST = 100_000.0
 """Metres (or degrees, or a weight) that nothing described may exceed."""
 
+HIGHEST = 1_000.0
+"""Metres that nothing described is high."""
+
+LARGEST_RADIUS = 5_000.0
+"""Metres from the middle of the place to the end of its region at most."""
+
 LONGEST_ROW = 10_000
 """Trees or lights of a row beyond which its spacing is a slip."""
 
@@ -111,10 +117,16 @@ class SiteDescription:
         Middle of the place, map coordinates.
     junction : str or None
         Id or name of the junction that is the middle of the place.
-    radius : float, metres
+    radius : float or None, metres
         The region of interest is the driving surface this near to the middle.
+    approaches : float or None, metres
+        Instead of the radius: the driving surface of the junction, and of its
+        approaches this far along the roads. Without either a junction has
+        approaches of `DEFAULT_RADIUS`, and another place that radius.
     region : shapely geometry or None
-        Instead of the radius: the driving surface within this area.
+        Instead of both: the driving surface within this area.
+    level : tuple of str
+        Ids of roads that lie on the level to study, where roads lie above each other.
     weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
         What the file lists.
     """
@@ -123,8 +135,10 @@ class SiteDescription:
     map: Path | None = None
     near: tuple[float, float] | None = None
     junction: str | None = None
-    radius: float = DEFAULT_RADIUS
+    radius: float | None = None
+    approaches: float | None = None
     region: MultiPolygon | None = None
+    level: tuple[str, ...] = ()
     weighted_regions: tuple[WeightedRegion, ...] = ()
     buildings: tuple[Building, ...] = ()
     trees: tuple[Trees, ...] = ()
@@ -133,6 +147,13 @@ class SiteDescription:
     signal_poles: tuple[Poles, ...] = ()
     forbidden_areas: tuple[Area, ...] = ()
     mandatory_areas: tuple[Area, ...] = ()
+
+    @property
+    def along(self) -> float | None:
+        """How far the region follows the approaches of the junction, metres; None where it is a circle or an area."""
+        if self.junction is None or self.region is not None or self.radius is not None:
+            return None
+        return DEFAULT_RADIUS if self.approaches is None else self.approaches
 
 
 def read_site_description(path: Path) -> SiteDescription:
@@ -163,8 +184,10 @@ def read_site_description(path: Path) -> SiteDescription:
         map=None if map_name is None else path.parent / map_name,
         near=table.point("near"),
         junction=table.text("junction", None),
-        radius=table.number("radius", DEFAULT_RADIUS, above=0.0),
+        radius=table.optional("radius", most=LARGEST_RADIUS),
+        approaches=table.optional("approaches", most=LARGEST_RADIUS),
         region=table.region("region"),
+        level=table.texts("level"),
         weighted_regions=tuple(_weighted_region(row) for row in table.rows("weighted_region")),
         buildings=tuple(_building(row) for row in table.rows("building")),
         trees=tuple(_trees(row) for row in table.rows("tree")),
@@ -177,6 +200,8 @@ def read_site_description(path: Path) -> SiteDescription:
     table.finish()
     if description.near is not None and description.junction is not None:
         raise SeipError(f"{path}: give either near or junction, not both")
+    if description.radius is not None and description.approaches is not None:
+        raise SeipError(f"{path}: give either radius or approaches, not both")
     return description
 
 
@@ -187,6 +212,7 @@ def describe_place(
     near: tuple[float, float] | None = None,
     junction: str | None = None,
     radius: float | None = None,
+    approaches: float | None = None,
 ) -> tuple[Path, SiteDescription]:
     """Return a place's map and description, what is given here in place of what a file says.
 
@@ -202,6 +228,8 @@ def describe_place(
         Id or name of the junction in the middle of the place.
     radius : float, metres, optional
         Of the region of interest.
+    approaches : float, metres, optional
+        How far the region follows the approaches of the junction.
 
     Raises
     ------
@@ -215,11 +243,15 @@ def describe_place(
     if near is not None or junction is not None:
         if near is not None and not all(map(math.isfinite, near)):
             raise SeipError("the middle of the place must be two finite numbers, x and y in metres")
-        described = replace(described, near=near, junction=junction, region=None)
-    if radius is not None:
-        if not 0 < radius < math.inf:
-            raise SeipError(f"the radius must be above 0 m, not {radius:g}")
-        described = replace(described, radius=radius, region=None)
+        along = None if junction is None else described.approaches
+        described = replace(described, near=near, junction=junction, region=None, approaches=along)
+    for name, length in (("radius", radius), ("length of the approaches", approaches)):
+        if length is not None and not 0 < length <= LARGEST_RADIUS:
+            raise SeipError(f"the {name} must be above 0 m and at most {LARGEST_RADIUS:g} m, not {length:g}")
+    if radius is not None or approaches is not None:
+        described = replace(described, radius=radius, approaches=approaches, region=None)
+    if described.approaches is not None and described.junction is None:
+        raise SeipError("the approaches are those of a junction: name one, or give a radius")
     return map_path, described
 
 
@@ -246,13 +278,15 @@ def _weighted_region(table: _Table) -> WeightedRegion:
 def _building(table: _Table) -> Building:
     outline = table.polygon("outline")
     assert outline is not None  # noqa: S101  # for the type checker: a needed polygon is there
-    building = Building(outline, table.number("height", None, above=0.0), table.number("base", 0.0))
+    building = Building(
+        outline, table.number("height", None, above=0.0, most=HIGHEST), table.number("base", 0.0, most=HIGHEST)
+    )
     table.finish()
     return building
 
 
 def _trees(table: _Table) -> Trees:
-    height = table.number("height", 8.0, above=0.0)
+    height = table.number("height", 8.0, above=0.0, most=HIGHEST)
     trees = Trees(table.positions(), height, table.number("crown_diameter", 0.6 * height, above=0.0))
     table.finish()
     return trees
@@ -260,7 +294,7 @@ def _trees(table: _Table) -> Trees:
 
 def _wall(table: _Table) -> Wall:
     line = table.line("line")
-    wall = Wall(line, table.number("height", 2.0, above=0.0), table.number("thickness", 0.25, above=0.0))
+    wall = Wall(line, table.number("height", 2.0, above=0.0, most=HIGHEST), table.number("thickness", 0.25, above=0.0))
     table.finish()
     return wall
 
@@ -269,7 +303,7 @@ def _poles(table: _Table, *, height: float, arm: float) -> Poles:
     degrees = table.number("heading", math.nan)
     poles = Poles(
         table.positions(),
-        table.number("height", height, above=0.0),
+        table.number("height", height, above=0.0, most=HIGHEST),
         table.number("arm", arm, least=0.0),
         None if math.isnan(degrees) else math.radians(degrees),
     )
@@ -308,7 +342,26 @@ class _Table:
             raise self._wrong(key, "a text in quotes")
         return value
 
-    def number(self, key: str, default: float | None, *, above: float = -math.inf, least: float = -math.inf) -> float:
+    def optional(self, key: str, *, most: float) -> float | None:
+        value = self.number(key, math.nan, above=0.0, most=most)
+        return None if math.isnan(value) else value
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self._take(key)
+        values = value if isinstance(value, list) else [] if value is None else [value]
+        if not all(isinstance(one, str) and one for one in values):
+            raise self._wrong(key, "a text in quotes, or a list of them")
+        return tuple(values)
+
+    def number(
+        self,
+        key: str,
+        default: float | None,
+        *,
+        above: float = -math.inf,
+        least: float = -math.inf,
+        most: float = LARGEST,
+    ) -> float:
         value = self._take(key)
         if value is None:
             if default is None:
@@ -317,8 +370,8 @@ class _Table:
             return default
         if not _is_number(value):
             raise self._wrong(key, "a number below 1e9")
-        if abs(value) > LARGEST:
-            raise self._wrong(key, f"at most {LARGEST:g}, not {value:g}")
+        if abs(value) > most:
+            raise self._wrong(key, f"at most {most:g}, not {value:g}")
         if not (value > above and value >= least):
             raise self._wrong(
                 key, f"{'above' if above > -math.inf else 'at least'} {max(above, least):g}, not {value:g}"
@@ -351,8 +404,11 @@ class _Table:
             return None
         several = isinstance(value, list) and bool(value) and not _is_point(value[0])
         rings = value if several else [value]
-        polygons = [self._ring(key, ring) for ring in rings]
-        return MultiPolygon(polygons)
+        region = MultiPolygon([self._ring(key, ring) for ring in rings])
+        low_x, low_y, high_x, high_y = region.bounds
+        if max(high_x - low_x, high_y - low_y) > 2 * LARGEST_RADIUS:
+            raise self._wrong(key, f"at most {2 * LARGEST_RADIUS:g} m across")
+        return region
 
     def positions(self) -> Float:
         """Return (n, 2) positions: one, or a row from one point to another at a spacing."""

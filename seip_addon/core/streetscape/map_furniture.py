@@ -1,4 +1,4 @@
-"""Objects and signals of a map as parts of the site: buildings, trees, walls, lights and signal poles."""
+"""Objects of a map as parts of the site: buildings, trees, walls, posts and street lights."""
 
 from __future__ import annotations
 
@@ -11,31 +11,27 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..opendrive import Outline, PlacedObject, PlacedSignal
+from ..opendrive import Outline, PlacedObject
+from ..scene_geometry import FROM_MAP
 from . import street_furniture
+from .object_kinds import SIGN_WORDS, THIN, VAGUE, Kind, Post, height_of, kind_of, post_of, size_of
 from .parts import Part, Role
 from .street_furniture import Solid
-from .terrain import Terrain
 
-FLAT_KINDS = {"crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
-PLANT_KINDS = {"tree", "vegetation"}
-POST_KINDS = {"pole", "streetlamp"}
 LEAST_HEIGHT = 0.2
 """Outlines lower than this (metres) hide nothing that matters."""
-POLE_HEIGHT = 3.0
-"""Posts from this height up can carry a sensor."""
+POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
+"""Posts from this height and thickness up (metres) can carry a sensor: a traffic sign's of 5 to 6 cm cannot."""
 
 TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
+LEAST_CROWN_SHARE = 0.15
+"""A tree that is more slender than this is given by its trunk: its crown follows from its height."""
 LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
 POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
 """Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
 
-SIGNAL_POLE_HEIGHT = 6.0
-MAST_ARM = 4.5
-KERB_CLEARANCE = 0.6
-SAME_POLE = 3.0
-"""Signals whose poles would stand nearer than this (metres) share one."""
-
+LARGEST_FACADE = 200_000.0
+"""Square metres of walls beyond which a building has no windows: there would be too many."""
 FACADES = ("facade brick", "facade plaster", "facade sand", "facade grey")
 
 
@@ -58,75 +54,46 @@ def building_parts(name: str, base: Float, height: Float, number: int) -> tuple[
     walls = street_furniture.block(base, height, side=FACADES[number % len(FACADES)], cap="roof")
     block = Part(name, walls, (Role.OCCLUDERS,))
     level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1
-    if not level or height[0] < street_furniture.STOREY:
+    facade = float(np.hypot(*np.diff(base[:, :2], axis=0, append=base[:1, :2]).T).sum()) * float(height[0])
+    if not level or height[0] < street_furniture.STOREY or facade > LARGEST_FACADE:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
     return (block, Part(f"{name} windows", panes, (Role.DRESSING,))) if panes.faces else (block,)
 
 
-def object_parts(objects: Iterable[PlacedObject], origin: Float, carriageway: BaseGeometry) -> tuple[Part, ...]:
+def object_parts(objects: Iterable[PlacedObject], carriageway: BaseGeometry) -> tuple[Part, ...]:
     """Return the parts for a map's objects; flat ones (crossings, parking spaces) have none.
 
     Parameters
     ----------
     objects : iterable of PlacedObject
-        In map coordinates.
-    origin : (3,) float64, metres
-        Map coordinates of the local origin.
+        In local axes.
     carriageway : shapely geometry
-        In local axes, for the arms of street lights.
+        For the arms of street lights.
     """
-    return tuple(
-        part for number, placed in enumerate(objects) for part in _object(_local(placed, origin), number, carriageway)
-    )
+    return tuple(part for number, placed in enumerate(objects) for part in _object(placed, number, carriageway))
 
 
-def signal_parts(
-    signals: Iterable[PlacedSignal], origin: Float, carriageway: BaseGeometry, terrain: Terrain
-) -> tuple[Part, ...]:
-    """Return signal poles for a map's traffic lights.
-
-    A signal beside the carriageway is its pole; one over it hangs on a mast
-    arm from the nearest place beside. Its height in the map is not used, as
-    maps give posts below the road and lamps above it.
-    """
-    poles: list[tuple[Float, float, float, bool]] = []
-    for signal in signals:
-        if not signal.dynamic:
-            continue
-        foot, heading, arm = _pole_for(signal.position[:2] - origin[:2], signal.yaw, carriageway)
-        if all(np.hypot(*(foot - other[0])) > SAME_POLE for other in poles):
-            faces_left = math.sin(signal.yaw + math.pi - heading) >= 0  # the lamps look against the traffic
-            poles.append((foot, heading, arm, faces_left))
-    return tuple(
-        pole_part(
-            f"Signal pole {number}",
-            street_furniture.signal_pole(SIGNAL_POLE_HEIGHT, arm, faces_left=faces_left),
-            _on(foot, terrain),
-            heading,
-        )
-        for number, (foot, heading, arm, faces_left) in enumerate(poles, start=1)
-    )
+def local_objects(objects: Iterable[PlacedObject], origin: Float) -> tuple[PlacedObject, ...]:
+    """Return objects in local axes, whose origin (3,) is given in map coordinates."""
+    return tuple(_local(placed, origin) for placed in objects)
 
 
-def pole_part(name: str, shape: Solid, foot: Float, heading: float) -> Part:
-    """Return a post that can carry a sensor, its arm turned to a heading."""
-    return Part(name, shape, (Role.POLES,), _xyz(foot), heading)
+def is_trunk(placed: PlacedObject) -> bool:
+    """Return whether what a map gives as the size of a tree can be no more than its trunk."""
+    height, size = height_of(placed) or TREE_HEIGHT, size_of(placed)
+    return kind_of(placed) is Kind.TREE and 0 < size < LEAST_CROWN_SHARE * height
 
 
-def _pole_for(xy: Float, travel: float, carriageway: BaseGeometry) -> tuple[Float, float, float]:
-    """Return foot, heading and length of the arm of the pole of a signal."""
-    point = shapely.Point(xy)
-    if carriageway.contains(point):
-        edge = shapely.get_coordinates(shapely.shortest_line(point, shapely.boundary(carriageway)))[1]
-        reach = float(np.hypot(*(edge - xy)))
-        outwards = (edge - xy) / max(reach, 1e-9)
-        foot = edge + KERB_CLEARANCE * outwards
-        return foot, math.atan2(*-outwards[::-1]), round(max(reach + KERB_CLEARANCE, 1.0), 1)
-    towards = arm_heading(xy, carriageway)
-    across = travel + math.pi / 2  # the arm is square to the traffic
-    heading = across if math.cos(across - towards) >= 0 else across + math.pi
-    return xy, heading, MAST_ARM
+def can_carry(post: Post) -> bool:
+    """Return whether a post is high and thick enough for a sensor, as far as the map says."""
+    thick_enough = post.thickness == 0 or post.thickness >= POLE_THICKNESS
+    return thick_enough and not post.words & SIGN_WORDS and (post.height or LIGHT_HEIGHT) >= POLE_HEIGHT
+
+
+def pole_part(name: str, shape: Solid, foot: Float, heading: float, source: str) -> Part:
+    """Return a post that can carry a sensor, its arm turned to a heading; ``source`` is as in `Part`."""
+    return Part(name, shape, (Role.POLES,), _xyz(foot), heading, source=source)
 
 
 def _local(placed: PlacedObject, origin: Float) -> PlacedObject:
@@ -136,19 +103,30 @@ def _local(placed: PlacedObject, origin: Float) -> PlacedObject:
 
 def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tuple[Part, ...]:
     """Return the parts of one object in local axes; ``number`` varies the looks of equal ones."""
-    name = placed.name or f"{placed.kind} {placed.id}"
-    size = max(placed.length, placed.width, 2 * placed.radius)
-    if placed.kind in FLAT_KINDS:
+    kind, name = kind_of(placed), placed.name or f"{placed.kind} {placed.id}"
+    height, size = height_of(placed), size_of(placed)
+    if kind is Kind.FLAT:
         return ()
+    if _is_single_tree(kind, height, size):
+        height = height or TREE_HEIGHT
+        crown = size if size and not is_trunk(placed) else CROWN_SHARE * height
+        return (tree_part(name, _middle(placed), height, crown, number),)
+    post = post_of(placed)
+    if post is not None and (size <= THIN or not placed.outlines):
+        return _post(name, placed, post, carriageway)
     if placed.outlines:
         return tuple(part for outline in placed.outlines for part in _outlined(placed, outline, name, number))
-    if placed.kind in PLANT_KINDS and size <= max(placed.height, 1.0):
-        height = placed.height or TREE_HEIGHT
-        return (tree_part(name, placed.position, height, size or CROWN_SHARE * height, number),)
-    if placed.kind in POST_KINDS or "lamp" in name.lower():
-        return (_post(name, placed, carriageway),)
-    if size == 0 or placed.height < LEAST_HEIGHT:
-        return ()
+    return _boxed(placed, name, number) if size > 0 and placed.height >= LEAST_HEIGHT else ()
+
+
+def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
+    """Return whether an object is one tree, and no row or wood of which the map gives the whole extent."""
+    if kind is Kind.TREE:
+        return size <= (height or TREE_HEIGHT)
+    return kind is Kind.PLANTS and size <= max(height, 1.0)
+
+
+def _boxed(placed: PlacedObject, name: str, number: int) -> tuple[Part, ...]:
     base = _footprint(placed) + placed.position
     return _block(placed, name, number, base, np.full(len(base), placed.height))
 
@@ -164,20 +142,28 @@ def _outlined(placed: PlacedObject, outline: Outline, name: str, number: int) ->
 
 
 def _block(placed: PlacedObject, name: str, number: int, base: Float, height: Float) -> tuple[Part, ...]:
-    if placed.kind == "building" or "building" in name.lower():
+    if kind_of(placed) is Kind.BUILDING:
         return building_parts(name, base, height, number)
     return (Part(name, street_furniture.block(base, height, side=_material(placed)), (Role.OCCLUDERS,)),)
 
 
-def _post(name: str, placed: PlacedObject, carriageway: BaseGeometry) -> Part:
-    height = round(placed.height or LIGHT_HEIGHT, 2)
-    lit = placed.kind == "streetlamp" or "lamp" in name.lower() or "light" in name.lower()
+def _post(name: str, placed: PlacedObject, post: Post, carriageway: BaseGeometry) -> tuple[Part, ...]:
+    if post.height == 0 and not post.is_lamp and placed.kind in VAGUE:
+        return ()  # nothing but a name
+    height = round(post.height or LIGHT_HEIGHT, 2)
+    lit = post.is_lamp or "light" in name.lower()
     if lit and height >= POLE_HEIGHT:
         shape = street_furniture.street_light(height, LIGHT_ARM)
     else:
-        shape = street_furniture.post(height, placed.radius or POST_RADIUS)
-    role = Role.POLES if height >= POLE_HEIGHT else Role.OCCLUDERS
-    return Part(name, shape, (role,), _xyz(placed.position), arm_heading(placed.position[:2], carriageway))
+        shape = street_furniture.post(height, post.thickness / 2 or POST_RADIUS)
+    role = Role.POLES if can_carry(post) else Role.OCCLUDERS
+    heading = arm_heading(post.xy, carriageway)
+    return (Part(name, shape, (role,), _xyz(_middle(placed)), heading, source=FROM_MAP if role is Role.POLES else ""),)
+
+
+def _middle(placed: PlacedObject) -> Float:
+    """Return the foot (3,) of what stands in the middle of an object."""
+    return placed.outlines[0].base.mean(axis=0) if placed.outlines else placed.position
 
 
 def _footprint(placed: PlacedObject) -> Float:
@@ -192,11 +178,7 @@ def _footprint(placed: PlacedObject) -> Float:
 
 
 def _material(placed: PlacedObject) -> str:
-    return "leaves" if placed.kind in PLANT_KINDS else "wall"
-
-
-def _on(xy: Float, terrain: Terrain) -> Float:
-    return np.array([*xy, *terrain.height(xy[None])])
+    return "leaves" if kind_of(placed) in (Kind.TREE, Kind.PLANTS) else "wall"
 
 
 def _xyz(point: Float) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -11,8 +11,10 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..obstruction import BARE, can_hide
 from ..opendrive import (
     LaneSurface,
+    PlacedObject,
     RoadMap,
     find_junction,
     junction_area,
@@ -21,12 +23,27 @@ from ..opendrive import (
     placed_objects,
     placed_signals,
 )
+from ..plan_geometry import outline, signed_area, without
 from ..progress import Progress
-from ..scene_geometry import DEFAULT_WEIGHT
+from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
-from .description import Poles, SiteDescription, WeightedRegion
-from .map_furniture import arm_heading, building_parts, object_parts, pole_part, signal_parts, tree_part
+from .approaches import approach_lanes
+from .degrees import in_metres, looks_like_degrees
+from .description import DEFAULT_RADIUS, Poles, SiteDescription, WeightedRegion
+from .levels import APART, Levels, split_levels
+from .map_furniture import (
+    CROWN_SHARE,
+    arm_heading,
+    building_parts,
+    is_trunk,
+    local_objects,
+    object_parts,
+    pole_part,
+    tree_part,
+)
 from .parts import Part, Role
+from .road_surface import Roadside
+from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
 
 STAGES = 6
@@ -39,8 +56,12 @@ CANDIDATE_MARGIN = 15.0
 VERGE_STRIP = (0.8, 2.3)
 """Where new posts may stand beside a road without pavements: metres from the carriageway."""
 VERGE_BELOW = 0.03
+NEAR_CROSSING = 10.0
+"""Roads this near to the middle of the place (metres) may each be the one that is meant."""
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
+FARTHEST_GARDEN = 300.0
+"""How far from the extent (metres) it goes on at most: a wall may run on along the whole map."""
 VERGE_SPACING = 12.0
 VEIL_SPACING = 4.0
 """As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
@@ -83,6 +104,8 @@ class SiteModel:
         Region of interest in plan, local axes.
     notes : tuple of str
         What was assumed because the map does not say it, a sentence each.
+    warnings : tuple of str
+        What makes results of the scene worth little, a sentence each.
     """
 
     name: str
@@ -92,6 +115,7 @@ class SiteModel:
     parts: tuple[Part, ...]
     region: BaseGeometry
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +127,7 @@ class _Street:
     region: BaseGeometry
     extent: BaseGeometry
     carriageway: BaseGeometry
+    roadside: Roadside
     terrain: Terrain
 
 
@@ -130,20 +155,35 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         No such junction, no road at the place, or an empty region of interest.
     """
     surfaces = yield from _all_lanes(road_map)
+    if not surfaces:
+        raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
+    description, place_notes = in_metres(description, road_map, surfaces)
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
     centre = _centre(road_map, surfaces, description)
-    region = _region(road_map, surfaces, description, centre)
+    within = _within(road_map, surfaces, description, centre)
+    levels = _levels(road_map, surfaces, description, centre, within)
+    surfaces = levels.studied
+    region = _region(road_map, surfaces, description, centre, within)
     origin = _origin(surfaces, centre)
     yield next(stages)
     street = _street(surfaces, origin, _shifted(region, -origin))
     yield next(stages)
     around = _shifted(street.extent, origin)
-    objects = object_parts(placed_objects(road_map, area=around), origin, street.carriageway)
-    signals = signal_parts(placed_signals(road_map, area=around), origin, street.carriageway, street.terrain)
-    furniture = [*objects, *signals, *_described_parts(description, street)]
+    placed = local_objects(placed_objects(road_map, area=around), origin)
+    away = levels.other_roads()
+    hung = [
+        replace(one, position=one.position - origin)
+        for one in placed_signals(road_map, area=around)
+        if one.road_id not in away
+    ]
+    others, lights = split_posts(placed, hung, street.roadside)
+    signals = signal_parts(lights, street.roadside, street.terrain)
+    things = [_on_level(part, street) for part in object_parts(others, street.carriageway)]
+    other_levels, below = _other_level_parts(levels.others, street)
+    furniture = [*things, *signals, *_described_parts(description, street)]
     yield next(stages)
-    pavement, notes = _pavement_parts(street)
+    pavement, notes = _pavement_parts(street, below)
     yield next(stages)
     carriageway = _surface_parts(street)
     yield next(stages)
@@ -151,7 +191,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     parts = [
         *carriageway,
         *pavement,
-        _verge_part(street, furniture),
+        _verge_part(street, furniture, below),
+        *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
         _region_part(street),
@@ -166,8 +207,25 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
-        notes=notes,
+        notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
+        warnings=() if any(_hides(part) for part in (*furniture, *other_levels)) else (BARE,),
     )
+
+
+def _hides(part: Part) -> bool:
+    return Role.OCCLUDERS in part.roles and can_hide(part.solid.vertices)
+
+
+def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
+    """Say what was made up of furniture that the map does not describe."""
+    assumed = sum(part.source == ASSUMED for part in signals)
+    if assumed:
+        posts = f"{assumed} posts of traffic lights are" if assumed > 1 else "1 post of traffic lights is"
+        yield f"{posts} assumed, since the map has none there: no sensor hangs there unless assumed poles are asked for"
+    trunks = sum(map(is_trunk, placed))
+    if trunks:
+        trees = f"{trunks} tree{'s' * (trunks > 1)}"
+        yield f"the map gives {trees} the width of a trunk: the crown is taken as {CROWN_SHARE:g} times the height"
 
 
 def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface, ...]]:
@@ -183,7 +241,7 @@ def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface
 def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription) -> Float:
     """Return the middle (x, y) of the place in map coordinates."""
     if description.near is not None:
-        return np.array(description.near)
+        return np.array(description.near, dtype=np.float64)
     if description.junction is not None:
         junction = find_junction(road_map, surfaces, description.junction)
         centre = _junction_driving_area(surfaces, junction.id).centroid
@@ -196,25 +254,53 @@ def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: Sit
     return np.array([centre.x, centre.y])
 
 
-def _region(
+def _within(
     road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
 ) -> BaseGeometry:
+    """Return the area in map coordinates in which the region of interest lies."""
+    if description.region is not None:
+        return description.region
+    if description.along is None:
+        return shapely.Point(centre).buffer(description.radius or DEFAULT_RADIUS, quad_segs=32)
+    lanes = _approach_lanes(road_map, surfaces, description)
+    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
+
+
+def _approach_lanes(
+    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription
+) -> tuple[LaneSurface, ...]:
+    assert description.junction is not None  # noqa: S101  # for the type checker: approaches are a junction's
+    junction = find_junction(road_map, surfaces, description.junction)
+    return approach_lanes(surfaces, junction.id, description.along or 0.0)
+
+
+def _region(
+    road_map: RoadMap,
+    surfaces: Sequence[LaneSurface],
+    description: SiteDescription,
+    centre: Float,
+    within: BaseGeometry,
+) -> BaseGeometry:
     """Return the region of interest in map coordinates."""
-    within = description.region or shapely.Point(centre).buffer(description.radius, quad_segs=32)
     shapely.prepare(within)
-    driving = road_surface.in_groups((lane for lane in surfaces if lane.lane_type in road_surface.GROUPS), ["driving"])
+    lanes = surfaces if description.along is None else _approach_lanes(road_map, surfaces, description)
+    driving = road_surface.in_groups((lane for lane in lanes if lane.lane_type in road_surface.GROUPS), ["driving"])
     shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
     near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
     if near:
         region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(_shifted(within, -shift)))
         if not region.is_empty:
             return _shifted(region, shift)
-    where = (
-        "within the region"
-        if description.region
-        else f"within {description.radius:g} m of ({centre[0]:g}, {centre[1]:g})"
-    )
-    raise SeipError(f"there is no driving lane {where}{_nearest(road_map, surfaces, centre)}")
+    where = f"within {description.radius or DEFAULT_RADIUS:g} m of ({centre[0]:g}, {centre[1]:g})"
+    if description.along is not None:
+        where = f"in junction {description.junction!r}"
+    elif description.region is not None:
+        where = "within the region"
+    x, y = centre.tolist()
+    given = description.near is not None and not (x.is_integer() and y.is_integer())
+    degrees = given and looks_like_degrees((x, y))
+    hint = " (give metres of the map, not latitude and longitude)" if degrees else ""
+    raise SeipError(f"there is no driving lane {where}{hint}{_nearest(road_map, surfaces, centre)}")
 
 
 def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) -> str:
@@ -230,6 +316,56 @@ def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) 
     return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
 
 
+def _levels(
+    road_map: RoadMap,
+    surfaces: Sequence[LaneSurface],
+    description: SiteDescription,
+    centre: Float,
+    within: BaseGeometry,
+) -> Levels:
+    """Return the lanes on the level of the place, and those that cross above or below."""
+    around = within.convex_hull.buffer(MARGIN, quad_segs=16)
+    if description.near is None and description.junction is not None:
+        junction = find_junction(road_map, surfaces, description.junction).id
+        anchors = {lane.road_id for lane in surfaces if lane.junction_id == junction}
+    else:
+        driving = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
+        away = shapely.distance([lane.polygon for lane in driving], shapely.Point(centre))
+        least = max(away.min(initial=np.inf), NEAR_CROSSING)
+        anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
+    return split_levels(surfaces, around, anchors, description.level)
+
+
+def _level_notes(levels: Levels) -> Iterator[str]:
+    roads = levels.other_roads()
+    for crossing in levels.crossings:
+        away = crossing.above if crossing.above in roads else crossing.below
+        yield f"{crossing}: road {away} is on another level, in the way but not studied"
+
+
+def _other_level_parts(others: Sequence[LaneSurface], street: _Street) -> tuple[list[Part], BaseGeometry]:
+    """Return the roads of other levels, above and below, and the area in plan of those below."""
+    lanes = road_surface.local_strips(others, street.origin, street.extent)
+    if not lanes:
+        return [], shapely.Polygon()
+    triangles = np.concatenate([lane.triangles for lane in lanes])
+    middles = triangles.mean(axis=1)
+    above = middles[:, 2] > street.terrain.height(middles[:, :2])
+    parts = [
+        Part("Roads above", _solid(triangles[above], "asphalt"), (Role.OCCLUDERS,)),
+        Part("Roads below", _solid(triangles[~above], "asphalt"), (Role.GROUND,)),
+    ]
+    return parts, outline(triangles[~above], road_surface.GRID)
+
+
+def _on_level(part: Part, street: _Street) -> Part:
+    """Return a part of the map; a pole that stands on another level carries no sensor."""
+    x, y, z = part.foot
+    if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > APART:
+        return replace(part, roles=(Role.OCCLUDERS,), source="")
+    return part
+
+
 def _origin(surfaces: Sequence[LaneSurface], centre: Float) -> Float:
     """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
     points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in surfaces])
@@ -241,9 +377,9 @@ def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
-    carriageway = road_surface.lane_outline(road_surface.in_groups(lanes, road_surface.CARRIAGEWAY))
-    shapely.prepare(carriageway)
-    return _Street(origin, lanes, region, extent, carriageway, Terrain(triangles))
+    roadside = road_surface.roadside(lanes)
+    shapely.prepare(roadside.carriageway)
+    return _Street(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
 
 
 def _surface_parts(street: _Street) -> list[Part]:
@@ -259,13 +395,14 @@ def _surface_parts(street: _Street) -> list[Part]:
     ]
 
 
-def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
-    """Return pavements near the region (where posts may stand), those beyond, their kerbs, and notes."""
-    triangles = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
-    if len(triangles) == 0:
-        return [_verge_strip(street)], ("the map has no pavements: new posts may stand on a strip of verge",)
-    corners = road_surface.corner_pavements(triangles, street.lanes)
-    triangles = np.concatenate([triangles, corners])
+def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
+    """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
+    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
+    if len(own) == 0:
+        verge = _verge_strip(street, street.roadside.sides(), below)
+        return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
+    corners = road_surface.corner_pavements(own, street.lanes, street.carriageway)
+    triangles = np.concatenate([own, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
     kerbs = road_surface.kerb_faces(triangles)
@@ -274,26 +411,43 @@ def _pavement_parts(street: _Street) -> tuple[list[Part], tuple[str, ...]]:
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
         Part("Kerbs", _solid(kerbs, "kerb"), (Role.GROUND,)),
     ]
-    notes = (
-        ("the pavements are closed round the corners of junctions, where the map leaves gaps",) if len(corners) else ()
-    )
-    return parts, notes
+    notes = []
+    if len(corners):
+        added, had = (float(np.abs(signed_area(faces)).sum()) for faces in (corners, own))
+        notes.append(
+            f"the pavements are closed round the corners of junctions, where the map leaves gaps: {added:,.0f} m² are "
+            f"added to its {had:,.0f} m²"
+        )
+    bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.GRID))
+    verge = _verge_strip(street, bare, below)
+    if verge.solid.faces:
+        parts.append(verge)
+        length = bare.intersection(street.region.buffer(CANDIDATE_MARGIN)).length
+        notes.append(f"{length:,.0f} m of roadside have no pavement: new posts may stand on a strip of verge there")
+    return parts, tuple(notes)
 
 
-def _verge_strip(street: _Street) -> Part:
+def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> Part:
+    """Return the verge along sides of the carriageway.
+
+    There is none where the map ends and the road goes on, nor beside a bridge.
+    """
     inner, outer = VERGE_STRIP
-    strip = street.carriageway.buffer(outer).difference(street.carriageway.buffer(inner))
+    strip = without(sides.buffer(outer, cap_style="flat"), street.roadside.filled.buffer(inner))
+    strip = without(strip, below.buffer(outer))
     near = strip.intersection(street.region.buffer(CANDIDATE_MARGIN))
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(street: _Street, furniture: Sequence[Part]) -> Part:
+def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry) -> Part:
     """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
-    ground = street.extent if built_up.is_empty else street.extent.union(built_up.buffer(GARDEN)).convex_hull
+    gardens = built_up.buffer(GARDEN).intersection(street.extent.buffer(FARTHEST_GARDEN))
+    ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
-    beside = road_surface.without_crumbs(ground.difference(covered.buffer(-road_surface.SEAM, join_style="mitre")))
+    lanes = covered.buffer(-road_surface.SEAM, join_style="mitre").union(below)
+    beside = road_surface.without_crumbs(without(ground, lanes))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
@@ -393,11 +547,11 @@ def _described_parts(description: SiteDescription, street: _Street) -> list[Part
 def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]:
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
-        yield pole_part(f"Street light {number}", shape, foot, heading)
+        yield pole_part(f"Street light {number}", shape, foot, heading, DESCRIBED)
     keeps_left = any(lane.keeps_left for lane in street.lanes)
     for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
         shape = street_furniture.signal_pole(row.height, row.arm, faces_left=not keeps_left)
-        yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading)
+        yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading, DESCRIBED)
 
 
 def _pole_places(rows: Sequence[Poles], street: _Street) -> Iterator[tuple[Float, float, Poles]]:

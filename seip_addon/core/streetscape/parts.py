@@ -40,6 +40,8 @@ class Part:
         How the shape is turned about the vertical, counter-clockwise.
     weight : float or None
         Of a weighted region.
+    source : str
+        Of a pole: who says that it stands there, as in `scene_geometry.Pole`.
     """
 
     name: str
@@ -48,3 +50,4 @@ class Part:
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
     yaw: float = 0.0
     weight: float | None = None
+    source: str = ""

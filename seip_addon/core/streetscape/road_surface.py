@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -12,7 +13,7 @@ from shapely.geometry.polygon import orient
 
 from ..arrays import Float
 from ..opendrive import LaneSurface
-from ..plan_geometry import closed, outline
+from ..plan_geometry import closed, outline, without
 from .terrain import Terrain, cut
 
 GROUPS = {
@@ -34,6 +35,8 @@ CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
 LONGEST_STEP = 10.0
 CORNER_NOTCH = 3.0
 """Notches up to twice this (metres) at the corners of a junction are pavement."""
+LONGEST_CORNER, WIDEST_ENDS = 40.0, 20.0
+"""A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
@@ -48,6 +51,94 @@ NARROW = 1.0
 """Lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them."""
 SEAM = 0.05
 """Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
+
+ISLAND = 400.0
+"""Holes of the carriageway smaller than this (m²) are islands, on which no post is assumed."""
+MEDIAN = 12.0
+"""Holes narrower than this (metres) are medians: likewise."""
+OPEN_MEDIAN = 6.0
+"""Gaps between carriageways narrower than this (metres) are medians though no junction closes them."""
+
+BESIDE = 6.0
+"""A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
+SIDE_STEP, LEAST_SIDE = 2.0, 10.0
+"""Sides of roads are looked at in steps (metres), and count as bare where they are so from this length on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Roadside:
+    """The carriageway and where it ends at its sides, in local axes.
+
+    Parameters
+    ----------
+    carriageway : shapely geometry
+        In plan.
+    filled : shapely geometry
+        The carriageway with its islands and medians: holes between the lanes of
+        a junction, small ones and narrow ones, and narrow gaps.
+    mouths : shapely geometry
+        Lines across the carriageway where lanes end and the road goes on.
+    """
+
+    carriageway: BaseGeometry
+    filled: BaseGeometry
+    mouths: BaseGeometry
+
+    def sides(self) -> BaseGeometry:
+        """Return the edges of the filled carriageway, as lines, without its mouths."""
+        edges = without(shapely.boundary(self.filled), self.mouths.buffer(2 * SEAM))
+        return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
+
+
+def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
+    """Return the carriageway of lanes and its sides."""
+    paved = in_groups(surfaces, CARRIAGEWAY)
+    carriageway = lane_outline(paved)
+    junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
+    inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
+    whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
+    medians = without(closed(whole, OPEN_MEDIAN / 2), whole)
+    filled = _without_holes(closed(whole.union(medians), SEAM), least=ISLAND, narrow=MEDIAN)
+    ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
+    across = shapely.linestrings(np.array(ends).reshape(-1, 2, 2))
+    at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * SEAM)))
+    length = shapely.length(across)
+    return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * SEAM) & (at_edge > length / 2)]))
+
+
+def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
+    """Return the sides of the carriageway, as lines, along which no pavement lies."""
+    sides = roadside.sides()
+    if pavement.is_empty or sides.is_empty:
+        return sides
+    lines = [shapely.get_coordinates(line) for line in shapely.get_parts(shapely.segmentize(sides, SIDE_STEP))]
+    start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
+    along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
+    aside = np.column_stack([-along[:, 1], along[:, 0]])
+    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * SEAM * aside)
+    outwards = BESIDE * np.where(inner[:, None], -aside, aside)
+    beside = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
+    shapely.prepare(pavement)
+    is_bare = ~shapely.intersects(pavement, beside)
+    bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
+    return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= LEAST_SIDE])
+
+
+def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
+    """Return whether a notch lies round a corner between the ends of pavements, and along neither for long."""
+    along = notch.buffer(2 * SEAM)
+    return bool(kerb.intersection(along).length <= LONGEST_CORNER and walked.intersection(along).length <= WIDEST_ENDS)
+
+
+def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
+    """Return the area without its holes: all, or those smaller than ``least`` m² or narrower than ``narrow`` metres."""
+
+    def kept(hole: shapely.LinearRing) -> bool:
+        inside = shapely.Polygon(hole)
+        return bool(inside.area >= least and not inside.buffer(-narrow / 2).is_empty)
+
+    parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+    return shapely.union_all([shapely.Polygon(part.exterior, list(filter(kept, part.interiors))) for part in parts])
 
 
 def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeometry) -> tuple[LaneSurface, ...]:
@@ -67,6 +158,18 @@ def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeome
     near = _with_kerbs([surface for surface in moved if _near(surface, area)])
     trimmed = (_trimmed(_densified(surface), area) for surface in near)
     return tuple(surface for surface in trimmed if len(surface.left) > 1)
+
+
+def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | None:
+    """Return the part of a lane between two places along the road, metres; None where there is none."""
+    if high <= low:
+        return None
+    known = np.arange(len(surface.s))
+    inside = known[(surface.s > low) & (surface.s < high)]
+    ends = np.interp([low, high], surface.s, known)
+    rows = np.concatenate([ends[:1], inside, ends[1:]])
+    s = np.interp(rows, known, surface.s)
+    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
 
 
 def group(surface: LaneSurface) -> str:
@@ -110,7 +213,7 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
         area = lane_outline(own)
         if name != "driving":
             driving = in_groups(surfaces, ["driving"])
-            area = without_crumbs(area.difference(_plan([lane for lane in driving if lane.junction_id == junction])))
+            area = without_crumbs(without(area, _plan([lane for lane in driving if lane.junction_id == junction])))
         terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
         pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
@@ -128,22 +231,30 @@ def kerb_faces(pavement: Float) -> Float:
     return np.concatenate([_skirt(ring, terrain) for ring in rings])
 
 
-def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface]) -> Float:
+def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriageway: BaseGeometry) -> Float:
     """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
 
     Many maps end the pavements where the junction begins. A notch between the
-    ends of two pavements and the carriageway is filled at the pavements' height.
+    ends of two pavements and the carriageway is filled at the pavements' height,
+    unless the map has a pavement of its own there: within the junction, or
+    beside the carriageway, beyond a verge. A median is no corner either.
     """
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
         return np.empty((0, 3, 3))
     walked = outline(pavement, GRID)
+    own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
+    kerb = shapely.boundary(carriageway)
     street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
-    notches = closed(street, CORNER_NOTCH).difference(street)
+    notches = without(closed(street, CORNER_NOTCH), street)
     corners = [
         notch
         for notch in shapely.get_parts(notches)
-        if notch.area > 1.0 and notch.distance(inside) < SEAM and notch.distance(walked) < SEAM
+        if notch.area > 1.0
+        and notch.distance(inside) < SEAM
+        and notch.distance(walked) < SEAM
+        and not notch.distance(own) < CORNER_NOTCH
+        and _is_corner(notch, kerb, shapely.boundary(walked))
     ]
     return Terrain(pavement).drape(shapely.union_all(corners), spacing=LONGEST_STEP)
 
@@ -232,7 +343,8 @@ def _densified(surface: LaneSurface) -> LaneSurface:
     steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
     pieces = np.maximum(1, np.ceil(steps / LONGEST_STEP).astype(int))
     rows = np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))])
-    return dataclasses.replace(surface, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+    s = np.interp(rows, np.arange(len(surface.s)), surface.s)
+    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
 
 
 def _at_rows(points: Float, rows: Float) -> Float:
@@ -245,7 +357,7 @@ def _trimmed(surface: LaneSurface, area: BaseGeometry) -> LaneSurface:
     corners = np.stack([left[:-1], left[1:], right[1:], right[:-1]], axis=1)
     hit = np.flatnonzero(shapely.intersects(area, shapely.convex_hull(shapely.multipoints(corners))))
     rows = slice(hit[0], hit[-1] + 2) if len(hit) else slice(0, 0)
-    return dataclasses.replace(surface, left=surface.left[rows], right=surface.right[rows])
+    return dataclasses.replace(surface, s=surface.s[rows], left=surface.left[rows], right=surface.right[rows])
 
 
 def _skirt(ring: shapely.LinearRing, terrain: Terrain) -> Float:

@@ -1,0 +1,143 @@
+"""The approaches of a junction: its streets, as far as a distance along the road."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..opendrive import LaneSurface
+from .road_surface import GROUPS, cut_along
+
+JOINT, LEAST_JOINT = 0.3, 0.5
+"""Ends of roads within so many metres, along so many metres of their width, lead into each other."""
+STEP = 1.0
+"""Metres of height between ends that do not."""
+STRAIGHT_ON = math.radians(35.0)
+"""An approach goes on through other junctions on lanes that turn by less than this."""
+
+Key = tuple[str, int]
+"""A road and one of its ends: 0 where it starts, 1 where it stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """Where the driving lanes of a road end: lines across them, their height, and the way along the road (2,)."""
+
+    across: BaseGeometry
+    height: float
+    along: Float
+
+
+@dataclass(frozen=True, eq=False)
+class _Street:
+    """A road by its driving lanes: the range of s, its two ends, and whether an approach goes along it."""
+
+    start: float
+    stop: float
+    ends: tuple[_End, _End]
+    leads_on: bool
+
+
+def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: float) -> tuple[LaneSurface, ...]:
+    """Return the driving lanes of a junction, and of its approaches up to a distance.
+
+    An approach goes on over the roads that join on to it, and straight on
+    through other junctions.
+
+    Parameters
+    ----------
+    surfaces : sequence of LaneSurface
+        All lanes of a map.
+    junction_id : str
+    distance : float, metres
+        Along the roads, from where the junction ends.
+
+    Returns
+    -------
+    tuple of LaneSurface
+        Cut at the distance.
+    """
+    driving = [lane for lane in surfaces if GROUPS.get(lane.lane_type) == "driving"]
+    by_road: dict[str, list[LaneSurface]] = {}
+    for lane in driving:
+        by_road.setdefault(lane.road_id, []).append(lane)
+    inside = {lane.road_id for lane in driving if lane.junction_id == junction_id}
+    if not inside:
+        return ()
+    streets = {road: _street(lanes) for road, lanes in by_road.items()}
+    away = _distances(streets, inside, distance)
+    return tuple(
+        piece
+        for road, street in streets.items()
+        if road in inside or street.leads_on
+        for lane in by_road[road]
+        for piece in _pieces(lane, street, [away[road, 0], away[road, 1]], distance)
+    )
+
+
+def _street(lanes: Sequence[LaneSurface]) -> _Street:
+    start, stop = min(lane.s[0] for lane in lanes), max(lane.s[-1] for lane in lanes)
+    first = _end([(lane, 0) for lane in lanes if lane.s[0] == start])
+    last = _end([(lane, -1) for lane in lanes if lane.s[-1] == stop])
+    turn = math.acos(float(np.clip(first.along @ last.along, -1.0, 1.0)))
+    return _Street(start, stop, (first, last), lanes[0].junction_id is None or turn < STRAIGHT_ON)
+
+
+def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
+    across = np.array([(lane.left[row], lane.right[row]) for lane, row in rows])
+    lane, row = rows[0]
+    way = (lane.left[1] - lane.left[0] if row == 0 else lane.left[-1] - lane.left[-2])[:2]
+    length = float(np.hypot(*way))
+    along = way / length if length > 0 else np.array([1.0, 0.0])
+    return _End(shapely.multilinestrings(across[:, :, :2]), float(across[:, :, 2].mean()), along)
+
+
+def _joints(streets: Mapping[str, _Street]) -> dict[Key, list[Key]]:
+    """Return for each end those that it leads into."""
+    keys = [(road, which) for road in streets for which in (0, 1)]
+    ends = [streets[road].ends[which] for road, which in keys]
+    lines = [end.across for end in ends]
+    joints: dict[Key, list[Key]] = {key: [] for key in keys}
+    for a, b in shapely.STRtree(lines).query(lines, predicate="dwithin", distance=JOINT).T.tolist():
+        level = abs(ends[a].height - ends[b].height) < STEP
+        if a != b and level and lines[a].buffer(JOINT, cap_style="flat").intersection(lines[b]).length > LEAST_JOINT:
+            joints[keys[a]].append(keys[b])
+    return joints
+
+
+def _distances(streets: Mapping[str, _Street], inside: set[str], most: float) -> dict[Key, float]:
+    """Return how far each end of a road is from a junction, metres along the roads; infinity beyond ``most``."""
+    away = {(road, which): math.inf for road in streets for which in (0, 1)}
+    joints = _joints(streets)
+    waiting = [(0.0, (road, which)) for road in inside for which in (0, 1)]
+    away.update({key: 0.0 for _, key in waiting})
+    while waiting:
+        travelled, key = heapq.heappop(waiting)
+        road, which = key
+        if travelled > away[key]:
+            continue
+        steps = [(travelled, other) for other in joints[key]]
+        if road not in inside and streets[road].leads_on:
+            steps.append((travelled + streets[road].stop - streets[road].start, (road, 1 - which)))
+        for total, other in steps:
+            if total < away[other] and total <= most:
+                away[other] = total
+                heapq.heappush(waiting, (total, other))
+    return away
+
+
+def _pieces(lane: LaneSurface, street: _Street, away: Sequence[float], distance: float) -> Iterator[LaneSurface]:
+    """Yield what of a lane lies within the distance of the junction, from either end of its road."""
+    from_start, from_stop = street.start + distance - away[0], street.stop - distance + away[1]
+    ranges = [(-math.inf, math.inf)] if from_start >= from_stop else [(-math.inf, from_start), (from_stop, math.inf)]
+    for low, high in ranges:
+        piece = cut_along(lane, max(low, lane.s[0]), min(high, lane.s[-1]))
+        if piece is not None:
+            yield piece
