@@ -25,7 +25,7 @@ from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
 from .stability.disturbed_views import Surroundings
-from .stability.pose_study import StudySettings, pose_study, pose_warnings
+from .stability.pose_study import StudySettings, pose_sentence, pose_study
 from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
@@ -34,7 +34,7 @@ from .visibility.rounding import rounding_warnings
 from .visibility.store import stored_visibility
 
 POSES_TRIED = StudySettings(draws=100, draws_of_kind=0)
-"""What every placement is tried with."""
+"""What a placement is tried with where that is asked for."""
 
 
 @dataclass(frozen=True)
@@ -174,11 +174,14 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
     return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
-def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
+def place(
+    layout: Layout, grid: VisibilityGrid, goal: Goal, *, pose_errors: bool = False
+) -> Generator[Progress, None, Plan]:
     """Answer a goal on a survey, and note how far the answer can be trusted.
 
-    The notes of the placement say how many others are as good (`near_best`) and what it loses where its sensors do
-    not hang quite as planned (`pose_warnings`).
+    The notes of the placement say how many others are as good (`near_best`). With ``pose_errors`` they also say what
+    it loses where its sensors do not hang quite as planned (`pose_sentence`): rays are cast for that, and for nothing
+    else.
     """
     site, models, settings = layout.site, layout.models, layout.settings
     steps = make_plan(site, grid.visible, models, goal, solver=settings.solver, time_limit=settings.time_limit)
@@ -187,9 +190,9 @@ def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progres
     if plan.placement.status == "optimal" and not goal.cheapest:
         top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
         notes += [] if top is None else [top.sentence]
-    if plan.deployment.sensors:
+    if pose_errors and plan.deployment.sensors:
         study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
-        notes += pose_warnings(study)
+        notes.append(pose_sentence(study))
     return replace(plan, placement=replace(plan.placement, notes=tuple(notes)))
 
 
@@ -218,12 +221,31 @@ class Circumstances:
     versions: Mapping[str, str]
 
 
-def record_of(
-    layout: Layout, grid: VisibilityGrid, plan: Plan, circumstances: Circumstances, *, render: bool
+def record_of(  # what was asked for stands in the record
+    layout: Layout,
+    grid: VisibilityGrid,
+    plan: Plan,
+    circumstances: Circumstances,
+    *,
+    render: bool,
+    pose_errors: bool = False,
 ) -> Record:
-    """Return what ``placement.json`` holds of a plan; ``render`` is whether a rendered view goes with it."""
+    """Return what ``placement.json`` holds of a plan.
+
+    Parameters
+    ----------
+    layout : Layout
+    grid : VisibilityGrid
+    plan : Plan
+    circumstances : Circumstances
+    render : bool
+        Whether a rendered view goes with it.
+    pose_errors : bool
+        Whether the plan was tried with pose errors; see `place`.
+    """
+    asked = {"goal": asdict(plan.goal), "pose_errors": pose_errors, "render": render}
     run = Run(
-        settings=layout.settings.as_record() | {"goal": asdict(plan.goal), "render": render},
+        settings=layout.settings.as_record() | asked,
         created=circumstances.created,
         durations=circumstances.durations,
         versions=circumstances.versions,

@@ -80,6 +80,7 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
         layout.use_property_decorate = False
         layout.prop(goal, "objective")
         if goal.objective == "PLANNED":
+            layout.prop(goal, "pose_errors")
             return
         for name in ("position_error", "tilt_error", "seen_by", "failure"):
             layout.prop(goal, name)
