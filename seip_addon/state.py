@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -68,9 +68,9 @@ class Means:
             raise SeipError(f"{error} as Cache in the add-on's preferences") from error
 
 
-@dataclass
+@dataclass(frozen=True)
 class Held:
-    """What is known of a scene.
+    """What is known of a scene; `hold` has one take the place of another.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Held:
         Of that grid: the one that the scene's result tells of.
     record : str
         The result that the plan was taken from.
-    durations : dict of str to float, seconds
+    durations : mapping of str to float, seconds
         How long each step took.
     """
 
@@ -105,7 +105,11 @@ class Held:
     estimate: Estimate | None = None
     plan: Plan | None = None
     record: str = ""
-    durations: dict[str, float] = field(default_factory=dict)
+    durations: Mapping[str, float] = field(default_factory=dict)
+
+    def timed(self, step: str, began: float) -> dict[str, float]:
+        """Return the durations with that of a step that began at a reading of `time.perf_counter`."""
+        return {**self.durations, step: time.perf_counter() - began}
 
 
 @dataclass
@@ -141,6 +145,11 @@ running: Running | None = None
 def find(scene: bpy.types.Scene) -> Held | None:
     """Return what is known of a scene, or None."""
     return held.get(scene.session_uid)
+
+
+def hold(scene: bpy.types.Scene, known: Held) -> None:
+    """Hold what some work has found of a scene, in place of what was known: for the main thread, once it has ended."""
+    held[scene.session_uid] = known
 
 
 def scene_of(number: int) -> bpy.types.Scene:
@@ -211,10 +220,9 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
     means = Means(preferences.cache_folder(), preferences.cores())
     known = find(scene)
     if known is not None and not known.watch.look(scene) and known.catalogues == catalogues:
-        known.means = means
         if _same_grid(settings, known.layout.settings):
-            known.layout = replace(known.layout, settings=settings)
-            return _nothing_to_do(known)
+            layout = replace(known.layout, settings=settings)
+            return _nothing_to_do(replace(known, layout=layout, means=means))
         reading = SceneReading(known.layout.geometry, known.said)
         return _laid_out(reading, settings, known.watch, means, catalogues)
     began = time.perf_counter()
@@ -223,15 +231,15 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
     return _laid_out(reading, settings, watching, means, catalogues, time.perf_counter() - began)
 
 
-def seen(known: Held) -> Generator[Progress, None, VisibilityGrid]:
-    """Find who sees what in a scene that was laid out, or take it from the cache, and hold it."""
+def seen(known: Held) -> Generator[Progress, None, tuple[Held, VisibilityGrid]]:
+    """Find who sees what in a scene that was laid out, or take it from the cache; return all, and that alone."""
+    if known.grid is not None:
+        return known, known.grid
     began = time.perf_counter()
-    key = grid_key(known.layout)
-    if known.grid is None or known.grid.key != key:
-        known.means.check()
-        known.grid = yield from see(known.layout, known.means.grid_file(key), threads=known.means.cores)
-        known.durations["visibility"] = time.perf_counter() - began
-    return known.grid
+    known.means.check()
+    file = known.means.grid_file(grid_key(known.layout))
+    grid = yield from see(known.layout, file, threads=known.means.cores)
+    return replace(known, grid=grid, durations=known.timed("visibility", began)), grid
 
 
 def answered(scene: bpy.types.Scene) -> Generator[Progress, None, Held]:
@@ -300,9 +308,8 @@ def _answered(surveying: Generator[Progress, None, Held], text: str) -> Generato
         raise SeipError("the scene or its settings have changed since the placement: place again")
     if known.grid is None and not known.means.grid_file(key).exists():
         raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
-    grid = yield from seen(known)
-    known.plan, known.record = restored_plan(known.layout, grid, record), text
-    return known
+    known, grid = yield from seen(known)
+    return replace(known, plan=restored_plan(known.layout, grid, record), record=text)
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]

@@ -102,8 +102,9 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Rank
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, list[Ranked]]) -> None:
         """Fill the list."""
-        state.held[scene.session_uid], lines = result
-        candidates = state.held[scene.session_uid].layout.site.candidates
+        known, lines = result
+        state.hold(scene, known)
+        candidates = known.layout.site.candidates
         ranking = scene.seip.result.ranking
         ranking.clear()
         for one in lines:
@@ -240,8 +241,9 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[state.Held, Onlooker]]
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, Onlooker]) -> None:
         """Begin to follow."""
-        state.held[scene.session_uid], looker = result
-        live.start(scene, state.held[scene.session_uid], looker)
+        known, looker = result
+        state.hold(scene, known)
+        live.start(scene, known, looker)
 
 
 def _set_up(
@@ -277,7 +279,7 @@ class SEIP_OT_export_result(ForPlacement, LongWork[state.Held], bpy.types.Operat
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Write the files."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
         live.stop()
         plan, grid = _plan_and_grid(result)
         record = {**state.record_of(result.record)}

@@ -152,11 +152,11 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[state.Held, str]], bpy.types.Operato
         kept = scene.seip.result
         record = json.loads(kept.record)
         record["notes"] = [*(note for note in record["notes"] if not note.startswith(IN_TRAFFIC)), sentence]
-        if known.plan is not None:
-            placement = replace(known.plan.placement, notes=tuple(record["notes"]))
-            known.plan = replace(known.plan, placement=placement)
-        kept.record = known.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
-        state.held[scene.session_uid] = known
+        plan = known.plan
+        if plan is not None:
+            plan = replace(plan, placement=replace(plan.placement, notes=tuple(record["notes"])))
+        kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+        state.hold(scene, replace(known, plan=plan, record=kept.record))
         self.report({"INFO"}, sentence)
 
 

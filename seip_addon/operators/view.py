@@ -127,7 +127,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[state.Held], bpy.types.Ope
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Draw them."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
         thing = placed_sensors(scene).get(self.sensor)
         if result.grid is None or thing is None:
             raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
@@ -171,7 +171,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operato
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Take it."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
         settings = scene.seip.view
         path = _free(_named(settings.picture))
         if settings.picture_of == "VIEW":

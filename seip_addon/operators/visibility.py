@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 import bpy
 
@@ -25,7 +26,7 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[state.Held], bpy.types.
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Hold the grid."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
         site = result.layout.site
         self.report(
             {"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known"
@@ -45,19 +46,19 @@ class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[state.Held], bpy.types
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Hold the estimate."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
 
 
 def _seen(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
     known = yield from surveying
-    yield from state.seen(known)
+    known, _ = yield from state.seen(known)
     return known
 
 
 def _estimated(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
     known = yield from surveying
-    known.estimate = yield from estimate(known.layout, known.means.cores)
-    return known
+    found = yield from estimate(known.layout, known.means.cores)
+    return replace(known, estimate=found)
 
 
 CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility)

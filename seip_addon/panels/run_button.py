@@ -31,6 +31,4 @@ def in_words(seconds: float) -> str:
 
 
 def _times(passed: float, left: float | None) -> str:
-    return (
-        f"{in_words(passed)} · Esc stops" if left is None else f"{in_words(passed)}, {in_words(left)} left · Esc stops"
-    )
+    return in_words(passed) if left is None else f"{in_words(passed)}, {in_words(left)} left"
