@@ -3,7 +3,9 @@
 import csv
 import json
 import math
+from collections.abc import Generator
 from pathlib import Path
+from types import SimpleNamespace
 
 from headless import place, robust
 
@@ -11,7 +13,7 @@ import bpy
 import pytest
 
 from seip_addon import pointing, state
-from seip_addon.core.progress import finish
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
@@ -68,38 +70,29 @@ def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
 
 
-def test_work_that_nobody_takes_over_leaves_no_trace(junction):
-    """A button's work ends just before it is stopped: what was known stays, to the last figure."""
-    from seip_addon.operators import placement, results, visibility  # noqa: PLC0415  # registered
+def work_of(operator: str, scene: bpy.types.Scene) -> Generator[Progress, None, object]:
+    """Return the work of a button, which a thread would do."""
+    return getattr(bpy.types, operator).prepare(SimpleNamespace(), scene)
 
+
+def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
     junction.seip.survey.time_limit = 30.0
     before = state.find(junction)
     seen = dict(vars(before))
-    goal = junction.seip.goal.goal()
-    placed = finish(placement._placed(state.survey(junction), goal, None))
+    placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.plan.deployment.sensors) == 3
-    assert state.find(junction) is before
-    assert vars(before) == seen
-    for work in (
-        visibility._seen(state.survey(junction)),
-        visibility._estimated(state.survey(junction)),
-        results._ranked(state.answered(junction), "ADDED"),
-        results._set_up(state.answered(junction)),
-        state.answered(junction),
-    ):
-        finish(work)
+    for name in ("compute_visibility", "estimate_visibility", "rank_candidates", "follow_sensors", "save_picture"):
+        finish(work_of(f"SEIP_OT_{name}", junction))
         assert state.find(junction) is before
         assert vars(before) == seen
 
 
 def test_a_stopped_placement_does_not_reach_the_export(junction, tmp_path):
-    from seip_addon.operators import placement  # noqa: PLC0415  # registered with the add-on
-
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
-    finish(placement._placed(state.survey(junction), junction.seip.goal.goal(), None))  # and stopped
+    finish(work_of("SEIP_OT_solve_placement", junction))  # and stopped
     junction.seip.result.folder = str(tmp_path)
     bpy.ops.seip.export_result()
     record = load_placement_record(tmp_path / "placement.json")
