@@ -26,6 +26,7 @@ from .scene_geometry import SceneGeometry
 from .site import Site, make_site
 from .stability.disturbed_views import Surroundings
 from .stability.pose_study import StudySettings, pose_sentence, pose_study
+from .storage import digest
 from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
@@ -149,6 +150,20 @@ def grid_key(layout: Layout) -> str:
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
+def inputs_of(layout: Layout) -> dict[str, str]:
+    """Return digests of what a placement follows from: of the visibility grid, and of all else about the site.
+
+    Two layouts with the same digests have the same answers to the same goal.
+    """
+    targets, candidates = layout.site.targets, layout.site.candidates
+    prices = np.array([layout.models[key].price for key in candidates.sensor])
+    site = digest(
+        *(targets.weight, targets.central, candidates.position_name, candidates.position_of),
+        *(candidates.mandatory, candidates.mandatory_name, prices),
+    )
+    return {"visibility": grid_key(layout), "site": site}
+
+
 def see(
     layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
 ) -> Generator[Progress, None, VisibilityGrid]:
@@ -249,10 +264,17 @@ def record_of(  # what was asked for stands in the record
         created=circumstances.created,
         durations=circumstances.durations,
         versions=circumstances.versions,
-        inputs={"visibility": grid.key},
+        inputs=inputs_of(layout) | {"visibility": grid.key},
         warnings=layout.warnings,
     )
     return placement_record(layout.site, plan, run)
+
+
+def recorded_goal(record: Record) -> Goal:
+    """Return the goal that a record's placement answers."""
+    asked = record["settings"]["goal"]
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
+    return Goal(**named)
 
 
 def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
@@ -274,9 +296,7 @@ def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
     """
     if record.get("inputs", {}).get("visibility") != grid.key:
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
-    asked, objective = record["settings"]["goal"], record["objective"]
-    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
-    goal = Goal(**named)
+    goal, objective = recorded_goal(record), record["objective"]
     chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
     value = objective["value"]
     placement = Placement(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Generator
 from dataclasses import replace
@@ -12,15 +11,14 @@ from typing import Literal
 import bpy
 
 from .. import pointing, state
-from ..core.comparison import packed_counts
 from ..core.errors import SeipError
 from ..core.goal import Goal, check_goal
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
 from ..core.robust_plan import Precaution, check_precaution, place_robustly
-from ..core.storage import digest
 from ..core.survey import Circumstances, place, record_of
 from ..scene.write import write_result
+from .results import keep_result
 from .work import ForReadyScene, LongWork, Outcome, attempt
 
 
@@ -47,15 +45,7 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
             result.layout, result.grid, result.plan, circumstances, render=False, pose_errors=self._pose_errors
         )
         write_result(scene, result.layout.site, deployment)
-        kept = scene.seip.result
-        kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
-        kept.targets = digest(result.layout.site.targets.xyz)
-        kept.seen = packed_counts(deployment.seen_by)
-        kept.sensors.clear()
-        for sensor in deployment.sensors:
-            kept.sensors.add().name = sensor.label
-        kept.ranking.clear()
-        state.hold(scene, replace(result, record=kept.record))
+        keep_result(scene, result, record)
         self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
 

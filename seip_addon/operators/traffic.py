@@ -15,6 +15,7 @@ from ..core.errors import SeipError
 from ..core.goal import target_weights
 from ..core.progress import Progress, finish
 from ..core.recording import RecordingSettings, make_run, record, simulation_of
+from ..core.results.placement_record import Record as PlacementRecord
 from ..core.results.placement_record import versions
 from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
@@ -36,6 +37,7 @@ INSTANTS = 60
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_LOADED = "There is no loaded traffic: load a traffic file first."
+NOT_AT_CANDIDATES = "Sensors hang where hands have put them: a placement in traffic is tried at candidate poses alone."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 NO_SENSORS = "There is no sensor to scan with: place sensors first."
 
@@ -58,7 +60,13 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
 
 def why_no_trial(scene: bpy.types.Scene) -> str:
     """Return why the placement cannot be tried in traffic; nothing where it can."""
-    return no_placement(scene) or ("" if scene.session_uid in scans.traffic else NO_LOADED)
+    if no_placement(scene) or scene.session_uid not in scans.traffic:
+        return no_placement(scene) or NO_LOADED
+    return NOT_AT_CANDIDATES if None in (line["pose"] for line in _record(scene)["sensors"]) else ""
+
+
+def _record(scene: bpy.types.Scene) -> PlacementRecord:
+    return state.record_of(scene.seip.result.record)
 
 
 class _Scanning(LongWork[Result]):

@@ -49,6 +49,22 @@ class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[state.Held], bpy.types
         state.hold(scene, result)
 
 
+class SEIP_OT_compare_scene(ForReadyScene, LongWork[state.Held], bpy.types.Operator):
+    """Find out whether the placement is of the scene as it is now"""
+
+    bl_idname = "seip.compare_scene"
+    bl_label = "Compare with Scene"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Read the scene where it has changed."""
+        return state.survey(scene)
+
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+        """Hold what was read: the panel compares."""
+        state.hold(scene, result)
+
+
 def _seen(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
     known = yield from surveying
     known, _ = yield from state.seen(known)
@@ -61,4 +77,4 @@ def _estimated(surveying: Generator[Progress, None, state.Held]) -> Generator[Pr
     return replace(known, estimate=found)
 
 
-CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility)
+CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility, SEIP_OT_compare_scene)

@@ -34,6 +34,12 @@ def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
     return {"FINISHED"}
 
 
+def begun(steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+    """Do work up to its first report at once, and return the rest of it: what touches Blender's data comes first."""
+    next(steps)
+    return steps
+
+
 class ForReadyScene:
     """A mixin: a button that works where the scene has what any computation needs."""
 

@@ -38,19 +38,30 @@ def read_sensors(scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel]) ->
     SeipError
         There is no sensor, or one names no type, an unknown one, or has no proper transform.
     """
-    layer = scene.view_layers[0]
-    layer.update()
-    collection = contract.find(scene, contract.SENSORS)
-    members = [] if collection is None else [thing for thing in collection.all_objects if thing.type == "EMPTY"]
-    empties = [thing for thing in members if thing.name in layer.objects and thing.visible_get(view_layer=layer)]
-    if not empties:
-        hidden = f"; {len(members)} hidden ones do not count" * bool(members)
+    scene.view_layers[0].update()
+    sensors = labelled_sensors(scene)
+    if not sensors:
+        hidden = len(_empties(scene))
         raise SeipError(
-            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{hidden}: place some first"
+            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}"
+            f"{f'; {hidden} hidden ones do not count' * bool(hidden)}: place some first"
         )
+    return tuple(_mounted(thing, label, catalogue) for label, thing in sensors.items())
+
+
+def labelled_sensors(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Return the empties of sensors that the viewport shows by their labels, S2 before S10; see `read_sensors`."""
+    layer = scene.view_layers[0]
+    empties = [
+        thing for thing in _empties(scene) if thing.name in layer.objects and thing.visible_get(view_layer=layer)
+    ]
     labels = _labels(empties)
-    sensors = [_mounted(thing, labels[thing.name], catalogue) for thing in empties]
-    return tuple(sorted(sensors, key=lambda sensor: _natural(sensor.label)))
+    return {labels[thing.name]: thing for thing in sorted(empties, key=lambda thing: _natural(labels[thing.name]))}
+
+
+def _empties(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    collection = contract.find(scene, contract.SENSORS)
+    return [] if collection is None else [thing for thing in collection.all_objects if thing.type == "EMPTY"]
 
 
 def placed_sensors(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:

@@ -146,7 +146,7 @@ def pose_study(
     PoseStudy
     """
     site = around.site
-    poses = np.array([sensor.pose for sensor in deployment.sensors], dtype=np.int64)
+    poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
 
     def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[Views, Boolean]]:
         drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
