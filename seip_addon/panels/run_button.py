@@ -20,7 +20,7 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> N
     row = column.row(align=True)
     row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=progress.what)
     row.operator("seip.stop", text="", icon="X")
-    column.label(text=_times(time.monotonic() - running.began, running.work.seconds_left))
+    column.label(text=times_in_words(time.monotonic() - running.began, running.work.seconds_left))
 
 
 def in_words(seconds: float) -> str:
@@ -30,5 +30,6 @@ def in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def _times(passed: float, left: float | None) -> str:
+def times_in_words(passed: float, left: float | None) -> str:
+    """Return how long work has taken, and how long it will take still where that is known."""
     return in_words(passed) if left is None else f"{in_words(passed)}, {in_words(left)} left"
