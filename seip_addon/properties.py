@@ -494,7 +494,7 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
             (
                 "RENDER",
                 "Rendered",
-                "The rendered view that the batch command makes; Blender does not answer for up to half a minute",
+                "The rendered view that the batch command makes, which takes up to half a minute",
             ),
         ),
     )

@@ -15,7 +15,6 @@ from ..core.errors import SeipError
 from ..core.goal import target_weights
 from ..core.progress import Progress, finish
 from ..core.recording import RecordingSettings, make_run, record, simulation_of
-from ..core.results.placement_record import Record as PlacementRecord
 from ..core.results.placement_record import versions
 from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
@@ -29,7 +28,7 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from .results import no_placement
+from .results import no_placement, not_judged
 from .work import LongWork, Outcome, Result
 
 INSTANTS = 60
@@ -62,11 +61,9 @@ def why_no_trial(scene: bpy.types.Scene) -> str:
     """Return why the placement cannot be tried in traffic; nothing where it can."""
     if no_placement(scene) or scene.session_uid not in scans.traffic:
         return no_placement(scene) or NO_LOADED
-    return NOT_AT_CANDIDATES if None in (line["pose"] for line in _record(scene)["sensors"]) else ""
-
-
-def _record(scene: bpy.types.Scene) -> PlacementRecord:
-    return state.record_of(scene.seip.result.record)
+    record = state.record_of(scene.seip.result.record)
+    elsewhere = any(line["pose"] is None for line in record["sensors"])
+    return NOT_AT_CANDIDATES if elsewhere else not_judged(scene)
 
 
 class _Scanning(LongWork[Result]):

@@ -148,8 +148,10 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if column.active:
         proven = record["objective"]["status"] == "optimal"
         draw_sentence(box, certificate(record), icon="CHECKMARK" if proven else "INFO")
+    notes = box.column()
+    notes.active = column.active
     for note in (*record["notes"], *warnings_of_chosen(record)):
-        draw_sentence(box, note, icon="INFO")
+        draw_sentence(notes, note, icon="INFO")
 
 
 def figures(record: Record) -> list[tuple[str, str]]:

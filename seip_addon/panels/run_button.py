@@ -12,7 +12,7 @@ from .. import state
 def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> None:
     """Draw an operator's button, or how far its work is with a button to stop it."""
     running = state.running
-    if running is None or running.operator != operator:
+    if running is None or not is_running(operator):
         layout.operator(operator, icon=icon)
         return
     progress = running.work.progress
@@ -21,6 +21,11 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> N
     row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=progress.what)
     row.operator("seip.stop", text="", icon="X")
     column.label(text=times_in_words(time.monotonic() - running.began, running.work.seconds_left))
+
+
+def is_running(operator: str) -> bool:
+    """Return whether an operator's work is under way."""
+    return state.running is not None and state.running.operator == operator
 
 
 def in_words(seconds: float) -> str:
