@@ -219,7 +219,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             f"mean {mean_of(study.together.whole).in_words()}",
             f"{settings.draws} draws, all sensors erring; half of them "
             f"{'say the same' if study.is_converged() else 'say something else: take more'}",
-            "placement over pose scenarios; a warning where the 5 % quantile loses 1 % or more",
+            "placement over pose scenarios; `--pose-errors` says what the 5 % quantile loses",
         ),
         Row(
             "a sensor's own error",
