@@ -41,16 +41,16 @@ class Changes:
     @property
     def in_words(self) -> str:
         """What was done, in a sentence; empty where nothing was."""
-        done = (("moved", self.moved), ("deleted or hidden", self.gone), ("added", self.added))
+        done = (("moved", self.moved), ("deleted", self.gone), ("added", self.added))
         parts = [f"{', '.join(labels)} {what}" for what, labels in done if labels]
         return f"By hand: {'; '.join(parts)}." if parts else ""
 
 
 def changes(scene: bpy.types.Scene) -> Changes:
-    """Compare the sensors that the viewport shows with the scene's placement."""
+    """Compare the sensors in a scene, hidden or not, with its placement."""
     text = scene.seip.result.record
     placed = {line["id"]: line for line in state.record_of(text)["sensors"]} if text else {}
-    there = labelled_sensors(scene)
+    there = labelled_sensors(scene, hidden=True)
     return Changes(
         tuple(label for label, thing in there.items() if label in placed and not _is_there(thing, placed[label])),
         tuple(label for label in placed if label not in there),
@@ -60,7 +60,9 @@ def changes(scene: bpy.types.Scene) -> Changes:
 
 def places(scene: bpy.types.Scene) -> dict[str, str]:
     """Return names for where the scene's sensors hang, by their labels, for those at no candidate pose."""
-    named = {label: str(thing.get(contract.POSITION, "")) for label, thing in labelled_sensors(scene).items()}
+    named = {
+        label: str(thing.get(contract.POSITION, "")) for label, thing in labelled_sensors(scene, hidden=True).items()
+    }
     return {label: _moved_from(name) for label, name in named.items()}
 
 

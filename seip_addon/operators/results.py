@@ -285,14 +285,14 @@ class SEIP_OT_judge_sensors(ForPlacement, LongWork[state.Held], bpy.types.Operat
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
         """Read where the sensors hang."""
-        hung = read_sensors(scene, preferences.catalogue())
+        hung = read_sensors(scene, preferences.catalogue(), hidden=True)
         return _judged(state.seen_again(scene), state.record_of(scene.seip.result.record), hung, hand.places(scene))
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Make them the placement, where they hang."""
         plan, grid = _plan_and_grid(result)
         live.stop()
-        take_over(scene, result.layout.site, plan.deployment, labelled_sensors(scene))
+        take_over(scene, result.layout.site, plan.deployment, labelled_sensors(scene, hidden=True))
         circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         keep_result(scene, result, record_of(result.layout, grid, plan, circumstances, render=False))
         self.report({"INFO"}, f"coverage {plan.deployment.coverage:.2%} where the sensors hang")
@@ -361,6 +361,8 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     """Write a result: the scene before the first report, which is the part that needs Blender's data."""
     render, name = scene.seip.result.render, scene.name
     finding = state.answered(scene)
+    if coverage_of(scene) is not None:
+        show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
     with result_files(folder) as part:
         save_blend(part["placed.blend"])
         yield Progress(0, 0, "reading the scene")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import bpy
@@ -15,12 +16,13 @@ import bpy
 def main(job: Path) -> None:
     """Render what a job asks for, and write beside the picture which sensors are hidden."""
     asked = json.loads(job.read_text())
-    sys.path[:] = [str(Path(__file__).resolve().parents[2]), *asked["path"]]
-    from seip_addon.scene.render import Shot, take  # noqa: PLC0415  # found there alone
+    package = Path(__file__).resolve().parents[1]
+    sys.path[:] = [str(package.parent), *asked["path"]]
+    render = import_module(f"{package.name}.scene.render")  # no extension is installed here
 
     bpy.ops.wm.open_mainfile(filepath=asked["blend"], load_ui=False, use_scripts=False)
     raw = Path(asked["raw"])
-    hidden = take(Shot.from_json(asked["shot"]), bpy.data.scenes[asked["scene"]], raw)
+    hidden = render.take(render.Shot.from_json(asked["shot"]), bpy.data.scenes[asked["scene"]], raw)
     raw.with_suffix(".json").write_text(json.dumps(hidden.tolist()))
 
 

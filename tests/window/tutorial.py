@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import state
+from bl_ext.user_default.seip.seip_addon import preferences, state
 from bl_ext.user_default.seip.seip_addon.panels import run_button
 from driver import Steps, Window, play
 
@@ -50,6 +50,9 @@ def scenario(window: Window) -> Steps:
 
 
 def _begin(window: Window) -> Steps:
+    cache = OUT / "visibility"
+    shutil.rmtree(cache, ignore_errors=True)
+    preferences.own().cache = str(cache)
     copy = OUT / "junction.blend"
     shutil.copy(bpy.data.filepath, copy)
     bpy.ops.wm.open_mainfile(filepath=str(copy))
