@@ -119,8 +119,8 @@ def _escape_is_for_the_animation(window: Window) -> Steps:
         yield from window.press("ESC")
         yield 0.5
     assert not window.window.screen.is_animation_playing
-    assert not work.ended, "the work ended before Esc was pressed"
     assert state.running is not None, "Esc stopped the computation"
+    assert not work.ended, "the work ended before Esc was pressed"
     bpy.ops.seip.stop()
     yield from window.until(lambda: state.running is None, 1)
 
