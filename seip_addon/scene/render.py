@@ -146,7 +146,8 @@ def _command(job: Path) -> list[str]:
     """Return what starts a Blender without a window, or the bpy module, on a job of `render_job`."""
     script = str(Path(__file__).with_name("render_job.py"))
     if bpy.app.binary_path:
-        return [bpy.app.binary_path, "-b", "--factory-startup", "-P", script, "--", str(job)]
+        tell = ["--log", "*render*", "--log-level", "info"] if bpy.app.version >= (5, 0) else []  # others tell unasked
+        return [bpy.app.binary_path, "-b", "--factory-startup", *tell, "-P", script, "--", str(job)]
     return [sys.executable, script, "--", str(job)]
 
 

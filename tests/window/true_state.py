@@ -207,6 +207,7 @@ def _exports_leave_the_window_alone(window: Window) -> Steps:
     before = {path.name: path.read_bytes() for path in FOLDER.iterdir()}
     yield from window.click("seip.export_result(")
     yield from window.until(lambda: state.running.work.progress.what == "rendering", 60)
+    yield from window.until(lambda: state.running.work.progress.done > 0, 60)
     yield from window.picture("export")
     bpy.ops.seip.stop()
     yield from window.until(lambda: state.running is None, 1)
