@@ -33,10 +33,11 @@ def main(argv: list[str]) -> None:
     goal = goal_of(options, options.coverage)
     refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal), refine)
-    plan = surveyed.stopwatch.run("placement", place(surveyed.layout, surveyed.grid, goal))
+    steps = place(surveyed.layout, surveyed.grid, goal, pose_errors=options.pose_errors)
+    plan = surveyed.stopwatch.run("placement", steps)
     session.say(_in_words(plan))
     with session.writing(options.output):
-        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
+        survey.save_plan(surveyed, plan, options.output, render=not options.no_render, pose_errors=options.pose_errors)
     session.say(f"written to {options.output}/")
 
 
@@ -70,6 +71,11 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         metavar="SHARE",
         help="pick --grid and --spacing: the coarsest whose placement covers as much but for this share",
+    )
+    parser.add_argument(
+        "--pose-errors",
+        action="store_true",
+        help="try the placement with sensors that do not hang quite as planned, which casts rays",
     )
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser

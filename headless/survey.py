@@ -159,7 +159,7 @@ def survey(
     return Survey(layout, grid, watch)
 
 
-def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool) -> None:
+def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool, pose_errors: bool = False) -> None:
     """Write a plan of a survey, with its record, to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
     now = Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
@@ -169,7 +169,7 @@ def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool) -> No
         layout.geometry,
         layout.site,
         plan,
-        record_of(layout, grid, plan, now, render=render),
+        record_of(layout, grid, plan, now, render=render, pose_errors=pose_errors),
         visible=grid.visible,
         models=layout.models,
         render=render,

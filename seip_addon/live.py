@@ -19,14 +19,13 @@ from .core.deployment import Deployment, Sensor
 from .core.errors import SeipError
 from .core.scans.sensor import MountedSensor
 from .core.visibility.turned import Onlooker
+from .hand import same_pose
 from .scene import contract
 from .scene.sensors import read_sensors
 from .scene.write import show_seen_by
 
 DELAY = 0.02
 """Seconds from a movement to the look at it: a drag reports many."""
-SAME_PLACE = 1e-5
-"""Metres, and cosines, by which single precision may move a sensor."""
 
 
 @dataclass
@@ -128,7 +127,9 @@ def _moved(live: Live, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
 
 
 def _as_placed(deployment: Deployment, visible: Boolean) -> dict[str, tuple[MountedSensor, Boolean]]:
-    return {sensor.label: (_mounted(sensor), visible[sensor.pose]) for sensor in deployment.sensors}
+    """Return what is known of sensors at candidate poses; the others are looked from anew."""
+    there = [(sensor, sensor.pose) for sensor in deployment.sensors if sensor.pose is not None]
+    return {sensor.label: (_mounted(sensor), visible[pose]) for sensor, pose in there}
 
 
 def _mounted(sensor: Sensor) -> MountedSensor:
@@ -136,9 +137,7 @@ def _mounted(sensor: Sensor) -> MountedSensor:
 
 
 def _same(one: MountedSensor, other: MountedSensor) -> bool:
-    near = np.allclose(one.xyz, other.xyz, rtol=0, atol=SAME_PLACE * max(1.0, float(np.abs(other.xyz).max())))
-    turned_alike = np.allclose(one.orientation, other.orientation, rtol=0, atol=SAME_PLACE)
-    return near and turned_alike and one.model.key == other.model.key
+    return same_pose((one.xyz, one.orientation), (other.xyz, other.orientation)) and one.model.key == other.model.key
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]

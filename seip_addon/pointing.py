@@ -51,8 +51,8 @@ def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context,
 def position_of(scene: bpy.types.Scene, thing: bpy.types.Object | None) -> str:
     """Return the name of the position that an object stands for: a sensor's, or a pole's own; empty if for none."""
     while thing is not None:
-        if "seip_position" in thing:
-            return str(thing["seip_position"])
+        if contract.POSITION in thing:
+            return str(thing[contract.POSITION])
         if thing in contract.members(scene)[contract.POLES]:
             return str(thing.name)
         thing = thing.parent

@@ -371,6 +371,11 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("mean", "Any", "On average over all of them"),
         ),
     )
+    pose_errors: BoolProperty(
+        name="Try Pose Errors",
+        description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",
+        default=False,
+    )
     rules: CollectionProperty(type=SEIP_PG_position_rule)
     active_rule: IntProperty(name="Position")
     position: StringProperty(
@@ -507,7 +512,7 @@ class SEIP_PG_view(bpy.types.PropertyGroup):
             (
                 "RENDER",
                 "Rendered",
-                "The rendered view that the batch command makes; Blender does not answer for up to half a minute",
+                "The rendered view that the batch command makes, which takes up to half a minute",
             ),
         ),
     )

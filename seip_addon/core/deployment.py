@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,8 @@ class Sensor:
     ----------
     label : str
         ``S1``, ``S2``, … in the order in which each adds the most to those before it.
-    pose : int
-        Index among the site's candidates.
+    pose : int or None
+        Index among the site's candidates; None where a hand has put it elsewhere.
     model : LidarModel
         What hangs there.
     position_name : str
@@ -45,10 +45,12 @@ class Sensor:
         Share of the targets that it sees and no sensor before it does; they add up to the whole coverage.
     marginal : float
         Share of the targets that it alone sees: what is lost without it.
+    roll : float, radians
+        How far it is rolled about its azimuth zero; only a hand does that.
     """
 
     label: str
-    pose: int
+    pose: int | None
     model: LidarModel
     position_name: str
     on_pole: bool
@@ -57,14 +59,15 @@ class Sensor:
     height: float
     yaw: float
     tilt: float
-    alone: float
-    added: float
-    marginal: float
+    alone: float = 0.0
+    added: float = 0.0
+    marginal: float = 0.0
+    roll: float = 0.0
 
     @property
     def orientation(self) -> Float:
         """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
-        return orientation(self.yaw, self.tilt)
+        return orientation(self.yaw, self.tilt, self.roll)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,20 +121,32 @@ def deploy(
     Deployment
     """
     order = _by_added_coverage(visible, chosen)
-    rows = visible[order]
+    hung = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
+    return deployed(site, hung, visible[order])
+
+
+def deployed(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
+    """Return sensors with what they see, each and together.
+
+    Parameters
+    ----------
+    site : Site
+    hung : sequence of Sensor
+        In the order in which each adds to those before it; their own shares are not looked at.
+    rows : (k, t) bool
+        What each of them sees.
+
+    Returns
+    -------
+    Deployment
+    """
     seen_by = rows.sum(axis=0, dtype=np.int64)
     seen = seen_by > 0
-    before = np.cumsum(rows, axis=0) - rows
+    before: Integer = np.cumsum(rows, axis=0) - rows
     targets = site.targets
     sensors = tuple(
-        _sensor(
-            site,
-            models,
-            rank,
-            int(pose),
-            (_share(row), _share(row & (before[rank] == 0)), _share(row & (seen_by == 1))),
-        )
-        for rank, (pose, row) in enumerate(zip(order, rows, strict=True))
+        replace(sensor, alone=_share(row), added=_share(row & (earlier == 0)), marginal=_share(row & (seen_by == 1)))
+        for sensor, row, earlier in zip(hung, rows, before, strict=True)
     )
     return Deployment(
         sensors=sensors,
@@ -163,14 +178,12 @@ def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Int
     return np.array(order, dtype=np.int64)
 
 
-def _sensor(
-    site: Site, models: Mapping[str, LidarModel], rank: int, pose: int, shares: tuple[float, float, float]
-) -> Sensor:
-    alone, added, marginal = shares
+def sensor_at(site: Site, models: Mapping[str, LidarModel], label: str, pose: int) -> Sensor:
+    """Return the sensor at a candidate pose, without what it sees."""
     candidates = site.candidates
     position = int(candidates.position_of[pose])
     return Sensor(
-        label=f"S{rank + 1}",
+        label=label,
         pose=pose,
         model=models[str(candidates.sensor[pose])],
         position_name=str(candidates.position_name[position]),
@@ -180,9 +193,6 @@ def _sensor(
         height=float(candidates.height[pose]),
         yaw=float(candidates.yaw[pose]),
         tilt=float(candidates.tilt[pose]),
-        alone=alone,
-        added=added,
-        marginal=marginal,
     )
 
 

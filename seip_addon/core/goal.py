@@ -22,6 +22,11 @@ DEFAULT_COUNT = 4
 """Sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four."""
 
 
+MOVED = "moved by hand"
+"""Status of a placement whose sensors hang where a hand has put them."""
+MOVED_SENTENCE = "Moved by hand: judged where the sensors hang; nothing is proven of it."
+
+
 @dataclass(frozen=True)
 class Goal:
     """What is asked for: the most coverage for N sensors or a budget, or a coverage for the least money.
@@ -100,6 +105,8 @@ class Plan:
     @property
     def certificate(self) -> str:
         """How good the placement provably is, as a sentence."""
+        if self.placement.status == MOVED:
+            return MOVED_SENTENCE
         best = "cheapest" if self.goal.cheapest else "best"
         if self.placement.status == "optimal":
             return f"Proven: the {best} placement that there is among these candidates."

@@ -12,9 +12,14 @@ below the horizon; then it rolls about the new x axis.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .arrays import Float
+
+STRAIGHT = 1 - 1e-12
+"""Sine of the tilt from which a sensor looks straight down, or up."""
 
 
 def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
@@ -48,9 +53,17 @@ def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def orientation(yaw: float, tilt: float) -> Float:
-    """Return the rotation of one sensor that does not roll, (3, 3) float64; see `orientations`."""
-    return orientations(np.array(yaw), np.array(tilt), np.array(0.0))
+def orientation(yaw: float, tilt: float, roll: float = 0.0) -> Float:
+    """Return the rotation of one sensor, (3, 3) float64; see `orientations`."""
+    return orientations(np.array(yaw), np.array(tilt), np.array(roll))
+
+
+def angles_of(matrix: Float) -> tuple[float, float, float]:
+    """Return yaw, tilt and roll (radians) of a rotation (3, 3) from a sensor's axes to the site's."""
+    tilt = math.atan2(-matrix[2, 0], math.hypot(matrix[0, 0], matrix[1, 0]))
+    if abs(matrix[2, 0]) > STRAIGHT:  # straight down or up: yaw and roll turn about one axis
+        return math.atan2(-matrix[0, 1], matrix[1, 1]), tilt, 0.0
+    return math.atan2(matrix[1, 0], matrix[0, 0]), tilt, math.atan2(matrix[2, 1], matrix[2, 2])
 
 
 def turned(vectors: Float, matrix: Float) -> Float:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Boolean, Float, Integer
+from .arrays import Boolean, Float
 
 
 @dataclass(frozen=True)
@@ -39,25 +38,20 @@ def rank_alone(visible: Boolean, weight: Float, most: int) -> list[Ranked]:
     return _ranked(visible, weight, np.zeros(visible.shape[1], dtype=bool), most)
 
 
-def rank_added(
-    visible: Boolean, weight: Float, chosen: Sequence[int] | Integer, position_of: Integer, most: int
-) -> list[Ranked]:
+def rank_added(visible: Boolean, weight: Float, seen: Boolean, free: Boolean, most: int) -> list[Ranked]:
     """Return the poses that would add the most weight to a placement, at positions that it leaves free.
 
     Parameters
     ----------
     visible : (c, t) bool
     weight : (t,) float64
-    chosen : (k,) int
-        Poses of the placement.
-    position_of : (c,) int64
-        Position of each pose.
+    seen : (t,) bool
+        What the placement sees.
+    free : (c,) bool
+        Poses at positions that it leaves free.
     most : int
         How many to return.
     """
-    poses = np.array(chosen, dtype=np.int64)
-    seen = visible[poses].any(axis=0)
-    free = ~np.isin(position_of, position_of[poses])
     return [one for one in _ranked(visible, weight, seen, len(visible)) if free[one.pose]][:most]
 
 

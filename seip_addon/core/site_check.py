@@ -346,12 +346,12 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
         [
             (
                 pole.name,
-                f"The origin of the pole {pole.name!r} is {_level(high)} the ground: set it to the post's foot.",
+                f"The foot of the pole {pole.name!r} is {_level(high)} the ground: move it, or its origin, there.",
             )
             for pole, high in zip(poles, above, strict=True)
             if abs(high) > OFF_GROUND
         ],
-        f"poles have their origin more than {OFF_GROUND:g} m above or below the ground: set it to the posts' feet",
+        f"poles have their foot more than {OFF_GROUND:g} m above or below the ground: move them or their origins",
     )
     nearest = shapely.STRtree(shapely.points(feet[:, :2])).query(
         shapely.points(feet[:, :2]), predicate="dwithin", distance=SAME_PLACE

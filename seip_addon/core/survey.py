@@ -27,7 +27,8 @@ from .results.placement_record import Record, Run, placement_record
 from .scene_geometry import SceneGeometry
 from .site import Site, make_site
 from .stability.disturbed_views import Surroundings
-from .stability.pose_study import StudySettings, pose_study, pose_warnings
+from .stability.pose_study import StudySettings, pose_sentence, pose_study
+from .storage import digest
 from .visibility.estimate import Estimate, estimate_visibility
 from .visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
 from .visibility.ray_casting import Engine, engine_name
@@ -36,7 +37,7 @@ from .visibility.rounding import rounding_warnings
 from .visibility.store import stored_visibility
 
 POSES_TRIED = StudySettings(draws=100, draws_of_kind=0)
-"""What every placement is tried with."""
+"""What a placement is tried with where that is asked for."""
 
 
 @dataclass(frozen=True)
@@ -162,6 +163,20 @@ def grid_key(layout: Layout) -> str:
     return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
 
 
+def inputs_of(layout: Layout) -> dict[str, str]:
+    """Return digests of what a placement follows from: of the visibility grid, and of all else about the site.
+
+    Two layouts with the same digests have the same answers to the same goal.
+    """
+    targets, candidates = layout.site.targets, layout.site.candidates
+    prices = np.array([layout.models[key].price for key in candidates.sensor])
+    site = digest(
+        *(targets.weight, targets.central, candidates.position_name, candidates.position_of),
+        *(candidates.mandatory, candidates.mandatory_name, prices),
+    )
+    return {"visibility": grid_key(layout), "site": site}
+
+
 def see(
     layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
 ) -> Generator[Progress, None, VisibilityGrid]:
@@ -187,11 +202,14 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
     return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
-def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progress, None, Plan]:
+def place(
+    layout: Layout, grid: VisibilityGrid, goal: Goal, *, pose_errors: bool = False
+) -> Generator[Progress, None, Plan]:
     """Answer a goal on a survey, and note how far the answer can be trusted.
 
-    The notes of the placement say how many others are as good (`near_best`) and what it loses where its sensors do
-    not hang quite as planned (`pose_warnings`).
+    The notes of the placement say how many others are as good (`near_best`). With ``pose_errors`` they also say what
+    it loses where its sensors do not hang quite as planned (`pose_sentence`): rays are cast for that, and for nothing
+    else.
     """
     site, models, settings = layout.site, layout.models, layout.settings
     steps = make_plan(site, grid.visible, models, goal, solver=settings.solver, time_limit=settings.time_limit)
@@ -200,9 +218,9 @@ def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Generator[Progres
     if plan.placement.status == "optimal" and not goal.cheapest:
         top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
         notes += [] if top is None else [top.sentence]
-    if plan.deployment.sensors:
+    if pose_errors and plan.deployment.sensors:
         study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
-        notes += pose_warnings(study)
+        notes.append(pose_sentence(study))
     return replace(plan, placement=replace(plan.placement, notes=tuple(notes)))
 
 
@@ -231,19 +249,45 @@ class Circumstances:
     versions: Mapping[str, str]
 
 
-def record_of(
-    layout: Layout, grid: VisibilityGrid, plan: Plan, circumstances: Circumstances, *, render: bool
+def record_of(  # what was asked for stands in the record
+    layout: Layout,
+    grid: VisibilityGrid,
+    plan: Plan,
+    circumstances: Circumstances,
+    *,
+    render: bool,
+    pose_errors: bool = False,
 ) -> Record:
-    """Return what ``placement.json`` holds of a plan; ``render`` is whether a rendered view goes with it."""
+    """Return what ``placement.json`` holds of a plan.
+
+    Parameters
+    ----------
+    layout : Layout
+    grid : VisibilityGrid
+    plan : Plan
+    circumstances : Circumstances
+    render : bool
+        Whether a rendered view goes with it.
+    pose_errors : bool
+        Whether the plan was tried with pose errors; see `place`.
+    """
+    asked = {"goal": asdict(plan.goal), "pose_errors": pose_errors, "render": render}
     run = Run(
-        settings=layout.settings.as_record() | {"goal": asdict(plan.goal), "render": render},
+        settings=layout.settings.as_record() | asked,
         created=circumstances.created,
         durations=circumstances.durations,
         versions=circumstances.versions,
-        inputs={"visibility": grid.key},
+        inputs=inputs_of(layout) | {"visibility": grid.key},
         warnings=layout.warnings,
     )
     return placement_record(layout.site, plan, run)
+
+
+def recorded_goal(record: Record) -> Goal:
+    """Return the goal that a record's placement answers."""
+    asked = record["settings"]["goal"]
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
+    return Goal(**named)
 
 
 def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
@@ -265,9 +309,7 @@ def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
     """
     if record.get("inputs", {}).get("visibility") != grid.key:
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
-    asked, objective = record["settings"]["goal"], record["objective"]
-    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
-    goal = Goal(**named)
+    goal, objective = recorded_goal(record), record["objective"]
     chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
     value = objective["value"]
     placement = Placement(

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Generator
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Literal
 
 import bpy
 
 from .. import pointing, state
-from ..core.comparison import packed_counts
 from ..core.errors import SeipError
 from ..core.goal import Goal, check_goal
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
 from ..core.robust_plan import Precaution, check_precaution, place_robustly
-from ..core.storage import digest
 from ..core.survey import Circumstances, place, record_of
 from ..scene.write import write_result
+from .results import keep_result
 from .work import ForReadyScene, LongWork, Outcome, attempt
 
 
@@ -32,7 +31,9 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
         """Read the scene where it has changed, and state the goal."""
         asked = scene.seip.goal
-        return _placed(state.survey(scene), asked.goal(), asked.precaution())
+        precaution = asked.precaution()
+        self._pose_errors = asked.pose_errors and precaution is None
+        return _placed(state.survey(scene), asked.goal(), precaution, pose_errors=self._pose_errors)
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
@@ -40,35 +41,32 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
             raise RuntimeError("the work ended without a placement")
         deployment = result.plan.deployment
         circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(result.layout, result.grid, result.plan, circumstances, render=False)
+        record = record_of(
+            result.layout, result.grid, result.plan, circumstances, render=False, pose_errors=self._pose_errors
+        )
         write_result(scene, result.layout.site, deployment)
-        kept = scene.seip.result
-        kept.record = result.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
-        kept.targets = digest(result.layout.site.targets.xyz)
-        kept.seen = packed_counts(deployment.seen_by)
-        kept.sensors.clear()
-        for sensor in deployment.sensors:
-            kept.sensors.add().name = sensor.label
-        kept.ranking.clear()
-        state.held[scene.session_uid] = result
+        keep_result(scene, result, record)
         self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
 
 def _placed(
-    surveying: Generator[Progress, None, state.Held], goal: Goal, precaution: Precaution | None
+    surveying: Generator[Progress, None, state.Held],
+    goal: Goal,
+    precaution: Precaution | None,
+    *,
+    pose_errors: bool = False,
 ) -> Generator[Progress, None, state.Held]:
     if precaution is not None:
         check_precaution(goal)
     known = yield from surveying
     check_goal(known.layout.site, known.layout.models, goal)
-    grid = yield from state.seen(known)
+    known, grid = yield from state.seen(known)
     began = time.perf_counter()
     if precaution is None:
-        known.plan = yield from place(known.layout, grid, goal)
+        plan = yield from place(known.layout, grid, goal, pose_errors=pose_errors)
     else:
-        known.plan = (yield from place_robustly(known.layout, grid, goal, precaution)).plan
-    known.durations["placement"] = time.perf_counter() - began
-    return known
+        plan = (yield from place_robustly(known.layout, grid, goal, precaution)).plan
+    return replace(known, plan=plan, durations=known.timed("placement", began))
 
 
 class SEIP_OT_add_rule(bpy.types.Operator):

@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+import json
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import bpy
+import numpy as np
 from mathutils import Vector
 
-from .. import live, pointing, state
-from ..core.comparison import compare, unpacked_counts
+from .. import hand, live, pointing, preferences, state
+from ..core.by_hand import judge
+from ..core.comparison import compare, packed_counts, unpacked_counts
 from ..core.errors import SeipError
 from ..core.goal import Plan, target_weights
 from ..core.orientation import tilt_in_words
 from ..core.progress import Progress
 from ..core.ranking import Ranked, rank_added, rank_alone
-from ..core.storage import check_folder
+from ..core.results.placement_record import Record, versions
+from ..core.scans.sensor import MountedSensor
+from ..core.storage import check_folder, digest
+from ..core.survey import Circumstances, record_of, recorded_goal
 from ..core.visibility.grid import VisibilityGrid
 from ..core.visibility.turned import Onlooker, onlooker
-from ..scene.result_folder import write_result_folder
-from ..scene.write import coverage_of, recolour, show_seen_by
-from .work import LongWork, Outcome, attempt
+from ..scene.blend_file import save_blend
+from ..scene.render import render_elsewhere
+from ..scene.result_folder import result_files, write_tables
+from ..scene.sensors import labelled_sensors, read_sensors
+from ..scene.write import coverage_of, recolour, show_seen_by, take_over
+from .work import LongWork, Outcome, attempt, begun
 
 MOST_RANKED = 50
 EYE_DISTANCE = 10.0
@@ -102,8 +113,9 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Rank
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, list[Ranked]]) -> None:
         """Fill the list."""
-        state.held[scene.session_uid], lines = result
-        candidates = state.held[scene.session_uid].layout.site.candidates
+        known, lines = result
+        state.hold(scene, known)
+        candidates = known.layout.site.candidates
         ranking = scene.seip.result.ranking
         ranking.clear()
         for one in lines:
@@ -123,7 +135,8 @@ def _ranked(
     weight = target_weights(site, plan.goal)
     if order == "ALONE":
         return known, rank_alone(visible, weight, MOST_RANKED)
-    return known, rank_added(visible, weight, plan.placement.chosen, site.candidates.position_of, MOST_RANKED)
+    free = ~np.isin(site.candidates.position_of, site.candidates.position_of[plan.placement.chosen])
+    return known, rank_added(visible, weight, plan.deployment.seen_by > 0, free, MOST_RANKED)
 
 
 def _plan_and_grid(known: state.Held) -> tuple[Plan, VisibilityGrid]:
@@ -140,6 +153,16 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     name: bpy.props.StringProperty(name="Name", description="Under which it is kept; empty for a number")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it works, and why not."""
+        if not super().poll(context):
+            return False
+        sentence = not_judged(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Keep it, in place of another of that name."""
@@ -240,8 +263,9 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[state.Held, Onlooker]]
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, Onlooker]) -> None:
         """Begin to follow."""
-        state.held[scene.session_uid], looker = result
-        live.start(scene, state.held[scene.session_uid], looker)
+        known, looker = result
+        state.hold(scene, known)
+        live.start(scene, known, looker)
 
 
 def _set_up(
@@ -253,49 +277,104 @@ def _set_up(
     return known, onlooker(known.layout.site, settings.visibility, settings.engine)
 
 
+class SEIP_OT_judge_sensors(ForPlacement, LongWork[state.Held], bpy.types.Operator):
+    """Take the sensors as hands have moved, deleted and added them for the placement: what they see there counts"""
+
+    bl_idname = "seip.judge_sensors"
+    bl_label = "Judge as They Hang"
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Read where the sensors hang."""
+        hung = read_sensors(scene, preferences.catalogue(), hidden=True)
+        return _judged(state.seen_again(scene), state.record_of(scene.seip.result.record), hung, hand.places(scene))
+
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+        """Make them the placement, where they hang."""
+        plan, grid = _plan_and_grid(result)
+        live.stop()
+        take_over(scene, result.layout.site, plan.deployment, labelled_sensors(scene, hidden=True))
+        circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        keep_result(scene, result, record_of(result.layout, grid, plan, circumstances, render=False))
+        self.report({"INFO"}, f"coverage {plan.deployment.coverage:.2%} where the sensors hang")
+
+
+def _judged(
+    finding: Generator[Progress, None, tuple[state.Held, VisibilityGrid]],
+    record: Record,
+    hung: Sequence[MountedSensor],
+    places: Mapping[str, str],
+) -> Generator[Progress, None, state.Held]:
+    known, grid = yield from finding
+    return replace(known, plan=(yield from judge(known.layout, grid, recorded_goal(record), hung, places)))
+
+
+def keep_result(scene: bpy.types.Scene, known: state.Held, record: Record) -> None:
+    """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
+    plan, _ = _plan_and_grid(known)
+    kept = scene.seip.result
+    kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+    kept.targets = digest(known.layout.site.targets.xyz)
+    kept.seen = packed_counts(plan.deployment.seen_by)
+    kept.sensors.clear()
+    for sensor in plan.deployment.sensors:
+        kept.sensors.add().name = sensor.label
+    kept.ranking.clear()
+    state.hold(scene, replace(known, record=kept.record))
+
+
+def not_judged(scene: bpy.types.Scene) -> str:
+    """Say what was done by hand to the sensors since they were placed or judged; empty if nothing was."""
+    sentence = hand.changes(scene).in_words
+    return f"{sentence} Press {SEIP_OT_judge_sensors.bl_label}, or undo." if sentence else ""
+
+
 class SEIP_OT_export_result(ForPlacement, LongWork[state.Held], bpy.types.Operator):
-    """Write tables, pictures and the scene with its sensors to the folder; sensors moved by hand go back first"""
+    """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
 
     bl_idname = "seip.export_result"
     bl_label = "Export"
+    stopped = "stopped; nothing was written"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether it works, and why not."""
         if not super().poll(context):
             return False
-        sentence = no_folder(context.scene)
+        sentence = no_folder(context.scene) or not_judged(context.scene)
         if sentence:
             cls.poll_message_set(sentence)
         return not sentence
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
-        """See that the folder can be written, and find the placement again."""
+        """See that the folder can be written, save the scene as it is, and find the placement again."""
         self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
         check_folder(self._folder)
-        return state.answered(scene)
+        return begun(_exported(self._folder, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
-        """Write the files."""
-        state.held[scene.session_uid] = result
-        live.stop()
-        plan, grid = _plan_and_grid(result)
-        record = {**state.record_of(result.record)}
-        render = scene.seip.result.render
-        record["settings"] = {**record["settings"], "render": render}
-        layout = result.layout
-        write_result_folder(
-            self._folder,
-            scene,
-            layout.geometry,
-            layout.site,
-            plan,
-            record,
-            visible=grid.visible,
-            models=layout.models,
-            render=render,
-        )
+        """Say where the files are."""
+        state.hold(scene, result)
         self.report({"INFO"}, f"written to {self._folder}")
+
+
+def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    """Write a result: the scene before the first report, which is the part that needs Blender's data."""
+    render, name = scene.seip.result.render, scene.name
+    finding = state.answered(scene)
+    if coverage_of(scene) is not None:
+        show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
+    with result_files(folder) as part:
+        save_blend(part["placed.blend"])
+        yield Progress(0, 0, "reading the scene")
+        known = yield from finding
+        plan, grid = _plan_and_grid(known)
+        record = {**state.record_of(known.record)}
+        record["settings"] = {**record["settings"], "render": render}
+        layout = known.layout
+        yield from write_tables(part, layout.geometry, layout.site, plan, record, grid.visible, layout.models)
+        if render:
+            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, layout.site, plan.deployment)
+    return known
 
 
 CLASSES = (
@@ -305,5 +384,6 @@ CLASSES = (
     SEIP_OT_drop_placement,
     SEIP_OT_show_comparison,
     SEIP_OT_follow_sensors,
+    SEIP_OT_judge_sensors,
     SEIP_OT_export_result,
 )

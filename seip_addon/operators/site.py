@@ -23,6 +23,7 @@ from ..core.survey import SurveySettings, lay_out
 from ..properties import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene
+from ..scene.changes import watch
 from ..scene.check import contents_of
 from .work import LongWork, Outcome, attempt
 
@@ -272,6 +273,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SiteCheck]:
         """Read the scene as it is now."""
+        self._check = state.Check(watch(scene), state.checked_settings(scene))
         contents = contents_of(scene)
         settings: SurveySettings | SeipError
         try:
@@ -282,6 +284,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
         """List what was found."""
+        state.checked[scene.session_uid] = self._check
         site = scene.seip.site
         site.checked = True
         site.counts.clear()

@@ -28,7 +28,7 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from .results import no_placement
+from .results import no_placement, not_judged
 from .work import LongWork, Outcome, Result
 
 INSTANTS = 60
@@ -36,6 +36,7 @@ INSTANTS = 60
 
 NO_FILE = "There is no traffic file: name one, or animate objects of your own in SEIP Traffic."
 NO_LOADED = "There is no loaded traffic: load a traffic file first."
+NOT_AT_CANDIDATES = "Sensors hang where hands have put them: a placement in traffic is tried at candidate poses alone."
 NO_TRAFFIC = "There is nothing to scan: name a traffic file, or animate objects in SEIP Traffic."
 NO_SENSORS = "There is no sensor to scan with: place sensors first."
 
@@ -58,7 +59,11 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
 
 def why_no_trial(scene: bpy.types.Scene) -> str:
     """Return why the placement cannot be tried in traffic; nothing where it can."""
-    return no_placement(scene) or ("" if scene.session_uid in scans.traffic else NO_LOADED)
+    if no_placement(scene) or scene.session_uid not in scans.traffic:
+        return no_placement(scene) or NO_LOADED
+    record = state.record_of(scene.seip.result.record)
+    elsewhere = any(line["pose"] is None for line in record["sensors"])
+    return NOT_AT_CANDIDATES if elsewhere else not_judged(scene)
 
 
 class _Scanning(LongWork[Result]):
@@ -152,11 +157,11 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[state.Held, str]], bpy.types.Operato
         kept = scene.seip.result
         record = json.loads(kept.record)
         record["notes"] = [*(note for note in record["notes"] if not note.startswith(IN_TRAFFIC)), sentence]
-        if known.plan is not None:
-            placement = replace(known.plan.placement, notes=tuple(record["notes"]))
-            known.plan = replace(known.plan, placement=placement)
-        kept.record = known.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
-        state.held[scene.session_uid] = known
+        plan = known.plan
+        if plan is not None:
+            plan = replace(plan, placement=replace(plan.placement, notes=tuple(record["notes"])))
+        kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+        state.hold(scene, replace(known, plan=plan, record=kept.record))
         self.report({"INFO"}, sentence)
 
 

@@ -16,13 +16,14 @@ from ..core.goal import Plan
 from ..core.progress import Progress
 from ..core.sight_lines import pose_at, sight_lines
 from ..scene import contract
+from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of
 from ..scene.write import colour_coverage, coverage_of
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .results import ForPlacement
-from .work import LongWork, Outcome, attempt
+from .results import ForPlacement, not_judged
+from .work import LongWork, Outcome, attempt, begun
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
@@ -127,7 +128,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[state.Held], bpy.types.Ope
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Draw them."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
         thing = placed_sensors(scene).get(self.sensor)
         if result.grid is None or thing is None:
             raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
@@ -164,24 +165,26 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operato
         self._area = context.area
         return super().invoke(context, event)
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Tell whether it works, and why not."""
+        return super().poll(context) and _can(cls, not_judged(context.scene))
+
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
-        """Find the placement again."""
-        _named(scene.seip.view.picture)
-        return state.answered(scene)
+        """Find the placement again, and render it where that is asked for."""
+        self._path = _free(_named(scene.seip.view.picture))
+        self._is_view = scene.seip.view.picture_of == "VIEW"
+        return state.answered(scene) if self._is_view else begun(_rendered_sheet(self._path, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
-        """Take it."""
-        state.held[scene.session_uid] = result
-        settings = scene.seip.view
-        path = _free(_named(settings.picture))
-        if settings.picture_of == "VIEW":
+        """Take the picture of a viewport."""
+        state.hold(scene, result)
+        if self._is_view:
             area = getattr(self, "_area", None) or bpy.context.area
             if bpy.app.background or area not in _viewports():
                 raise SeipError("there is no viewport here to take a picture of: choose the rendered view")
-            save_viewport_sheet(path, scene, area, result)
-        else:
-            save_rendered_sheet(path, scene, result)
-        self.report({"INFO"}, f"written {path}")
+            save_viewport_sheet(self._path, scene, area, result)
+        self.report({"INFO"}, f"written {self._path}")
 
 
 def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, held: state.Held) -> None:
@@ -193,17 +196,22 @@ def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area
     _save_sheet(path, held, Image.fromarray(view_pixels(scene, area)))
 
 
-def save_rendered_sheet(path: Path, scene: bpy.types.Scene, held: state.Held) -> None:
-    """Write the rendered view that batch commands make, and the plan beside it."""
+def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    """Write the rendered view that batch commands make, and the plan beside it; the scene is saved before the rest."""
     from PIL import Image  # noqa: PLC0415  # as above
 
-    from ..scene.render import save_rendered_view  # noqa: PLC0415  # as above
+    from ..scene.render import render_elsewhere  # noqa: PLC0415  # as above
 
+    finding, name = state.answered(scene), scene.name
     with TemporaryDirectory(prefix="seip-") as folder:
-        view = Path(folder) / "view.png"
-        save_rendered_view(view, scene, held.layout.site, _plan(held).deployment)
+        blend, view = (Path(folder) / file for file in ("scene.blend", "view.png"))
+        save_blend(blend)
+        yield Progress(0, 0, "reading the scene")
+        held = yield from finding
+        yield from render_elsewhere(view, blend, name, held.layout.site, _plan(held).deployment)
         with Image.open(view) as picture:
             _save_sheet(path, held, picture)
+    return held
 
 
 def _save_sheet(path: Path, held: state.Held, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 import bpy
 
@@ -25,7 +26,7 @@ class SEIP_OT_compute_visibility(ForReadyScene, LongWork[state.Held], bpy.types.
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Hold the grid."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
         site = result.layout.site
         self.report(
             {"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known"
@@ -45,19 +46,35 @@ class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[state.Held], bpy.types
 
     def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
         """Hold the estimate."""
-        state.held[scene.session_uid] = result
+        state.hold(scene, result)
+
+
+class SEIP_OT_compare_scene(ForReadyScene, LongWork[state.Held], bpy.types.Operator):
+    """Find out whether the placement is of the scene as it is now"""
+
+    bl_idname = "seip.compare_scene"
+    bl_label = "Compare with Scene"
+    bl_options = {"REGISTER"}  # nothing in the file changes
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+        """Read the scene where it has changed."""
+        return state.survey(scene)
+
+    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+        """Hold what was read: the panel compares."""
+        state.hold(scene, result)
 
 
 def _seen(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
     known = yield from surveying
-    yield from state.seen(known)
+    known, _ = yield from state.seen(known)
     return known
 
 
 def _estimated(surveying: Generator[Progress, None, state.Held]) -> Generator[Progress, None, state.Held]:
     known = yield from surveying
-    known.estimate = yield from estimate(known.layout, known.means.cores)
-    return known
+    found = yield from estimate(known.layout, known.means.cores)
+    return replace(known, estimate=found)
 
 
-CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility)
+CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility, SEIP_OT_compare_scene)

@@ -34,6 +34,12 @@ def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
     return {"FINISHED"}
 
 
+def begun(steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+    """Do work up to its first report at once, and return the rest of it: what touches Blender's data comes first."""
+    next(steps)
+    return steps
+
+
 class ForReadyScene:
     """A mixin: a button that works where the scene has what any computation needs."""
 
@@ -51,7 +57,8 @@ class LongWork(Generic[Result]):
 
     From a script, or where there is no window, `execute` does it at once. A
     click does it in a thread: Blender stays responsive, the panel shows how far
-    it is, and Esc stops it within a tenth of a second.
+    it is, and its Stop button stops it within a tenth of a second. Keys are left
+    to Blender: Esc ends an animation that plays, or a drag, and no computation.
     """
 
     bl_options = {"REGISTER", "UNDO"}
@@ -59,11 +66,15 @@ class LongWork(Generic[Result]):
     """What is reported of work that was stopped."""
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
-        """Read what is needed from the scene and return the work, which must not touch Blender's data."""
+        """Read what is needed from the scene and return the work.
+
+        It touches neither Blender's data nor what `state` holds: it returns its result, which nobody looks at if the
+        work is stopped.
+        """
         raise NotImplementedError
 
     def conclude(self, scene: bpy.types.Scene, result: Result) -> None:
-        """Write the result into the scene and report it."""
+        """Take the result over, on the main thread: write it into the scene, have `state` hold it, and report it."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -80,12 +91,12 @@ class LongWork(Generic[Result]):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Look how far the work is, and write its result once it is done."""
-        if self._running is not state.running or self._running.stop or event.type == "ESC":
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if self._running is not state.running or self._running.stop:
             self._end(context)
             self.report({"INFO"}, self.stopped)
             return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
         if not self._running.work.ended:
             _redraw(context)
             return {"PASS_THROUGH"}
@@ -99,9 +110,10 @@ class LongWork(Generic[Result]):
 
     def _begin(self, context: bpy.types.Context) -> None:
         if state.running is not None:
-            raise SeipError("other work is under way: wait for it, or stop it with Esc")
+            raise SeipError("other work is under way: wait for it, or stop it with the button beside its bar")
         self._scene = context.scene.session_uid
-        self._running = state.running = state.Running(self.bl_idname, Background(self.prepare(context.scene)))
+        name = type(self).bl_idname  # as panels know it: the instance's own is another spelling, SEIP_OT_…
+        self._running = state.running = state.Running(name, Background(self.prepare(context.scene)))
         self._running.timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
         context.window_manager.modal_handler_add(self)
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import bpy
 
-from .. import state
+from .. import hand, state
+from ..core.goal import MOVED, MOVED_SENTENCE
 from ..core.results.placement_record import Record
 from ..operators.placement import SEIP_OT_solve_placement
-from ..operators.results import no_placement
+from ..operators.results import SEIP_OT_judge_sensors, no_placement
+from ..operators.visibility import SEIP_OT_compare_scene
 from .run_button import draw_run
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -61,7 +63,7 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
             draw_sentence(layout, obstacle, icon="ERROR")
         draw_run(layout, SEIP_OT_solve_placement.bl_idname)
         if not no_placement(scene):
-            _draw_answer(layout, state.record_of(scene.seip.result.record), state.doubt(scene))
+            _draw_answer(layout, scene)
 
 
 class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
@@ -80,6 +82,7 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
         layout.use_property_decorate = False
         layout.prop(goal, "objective")
         if goal.objective == "PLANNED":
+            layout.prop(goal, "pose_errors")
             return
         for name in ("position_error", "tilt_error", "seen_by", "failure"):
             layout.prop(goal, name)
@@ -124,20 +127,31 @@ class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
         layout.prop(context.scene.seip.survey, "time_limit")
 
 
-def _draw_answer(layout: bpy.types.UILayout, record: Record, doubt: str) -> None:
+def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw what a placement is worth; what is proven of it as long as it is of the scene as it is, and no longer."""
+    record = state.record_of(scene.seip.result.record)
+    doubt, by_hand = state.doubt_of_placement(scene), hand.changes(scene).in_words
     box = layout.box()
-    if doubt:
-        draw_sentence(box, doubt, icon="ERROR")
+    for sentence in (doubt, by_hand):
+        if sentence:
+            draw_sentence(box, sentence, icon="ERROR")
+    if doubt and doubt != state.ANOTHER_SITE:
+        draw_run(box, SEIP_OT_compare_scene.bl_idname)
+    if by_hand:
+        draw_run(box, SEIP_OT_judge_sensors.bl_idname)
     column = box.column(align=True)
+    column.active = not (doubt or by_hand)
     for name, value in figures(record):
         row = column.split(factor=0.5)
         row.label(text=name)
         row.label(text=value)
-    objective = record["objective"]
-    proven = objective["status"] == "optimal"
-    draw_sentence(box, certificate(record), icon="CHECKMARK" if proven else "INFO")
+    if column.active:
+        proven = record["objective"]["status"] == "optimal"
+        draw_sentence(box, certificate(record), icon="CHECKMARK" if proven else "INFO")
+    notes = box.column()
+    notes.active = column.active
     for note in (*record["notes"], *warnings_of_chosen(record)):
-        draw_sentence(box, note, icon="INFO")
+        draw_sentence(notes, note, icon="INFO")
 
 
 def figures(record: Record) -> list[tuple[str, str]]:
@@ -167,6 +181,8 @@ def certificate(record: Record) -> str:
     """Say how good the placement provably is."""
     objective = record["objective"]
     best = "cheapest" if objective["sought"] == "least price" else "best"
+    if objective["status"] == MOVED:
+        return MOVED_SENTENCE
     if objective["status"] == "optimal":
         return f"Proven: the {best} placement that there is among these candidates."
     gap = "an unknown share" if objective["gap"] is None else f"{objective['gap']:.2%}"

@@ -12,7 +12,7 @@ from .. import state
 def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> None:
     """Draw an operator's button, or how far its work is with a button to stop it."""
     running = state.running
-    if running is None or running.operator != operator:
+    if running is None or not is_running(operator):
         layout.operator(operator, icon=icon)
         return
     progress = running.work.progress
@@ -20,7 +20,12 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> N
     row = column.row(align=True)
     row.progress(factor=progress.done / progress.total if progress.total else 0.0, text=progress.what)
     row.operator("seip.stop", text="", icon="X")
-    column.label(text=_times(time.monotonic() - running.began, running.work.seconds_left))
+    column.label(text=times_in_words(time.monotonic() - running.began, running.work.seconds_left))
+
+
+def is_running(operator: str) -> bool:
+    """Return whether an operator's work is under way."""
+    return state.running is not None and state.running.operator == operator
 
 
 def in_words(seconds: float) -> str:
@@ -30,7 +35,6 @@ def in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def _times(passed: float, left: float | None) -> str:
-    return (
-        f"{in_words(passed)} · Esc stops" if left is None else f"{in_words(passed)}, {in_words(left)} left · Esc stops"
-    )
+def times_in_words(passed: float, left: float | None) -> str:
+    """Return how long work has taken, and how long it will take still where that is known."""
+    return in_words(passed) if left is None else f"{in_words(passed)}, {in_words(left)} left"

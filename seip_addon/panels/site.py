@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import state
 from ..core.streetscape.parts import Role
 from ..operators.site import (
     SEIP_OT_add_area,
@@ -146,8 +147,11 @@ class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
         draw_run(layout, SEIP_OT_check_site.bl_idname)
         if not site.checked:
             return
+        doubt = state.doubt_of_check(context.scene)
+        if doubt:
+            draw_sentence(layout, doubt, icon="ERROR")
         if not site.problems:
-            layout.label(text="No problem found", icon="CHECKMARK")
+            layout.label(text="No problem found", icon="NONE" if doubt else "CHECKMARK")
         else:
             layout.template_list(
                 SEIP_UL_problems.bl_idname,
@@ -161,8 +165,10 @@ class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
             if 0 <= site.active_problem < len(site.problems):
                 draw_sentence(layout, site.problems[site.active_problem].text)
                 layout.operator(SEIP_OT_show_problem.bl_idname, icon="ZOOM_SELECTED")
+        counted = layout.column()
+        counted.active = not doubt
         for one in site.counts:
-            draw_sentence(layout, f"{one.name}: {one.value}")
+            draw_sentence(counted, f"{one.name}: {one.value}")
 
 
 CLASSES = (SEIP_PT_site, SEIP_PT_site_map, SEIP_PT_site_roles, SEIP_UL_problems, SEIP_PT_site_check)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import scans
-from ..operators.results import no_placement
+from ..operators.results import no_placement, not_judged
 from ..operators.view import (
     SEIP_OT_colour_coverage,
     SEIP_OT_hide_sight_lines,
@@ -18,6 +18,7 @@ from ..operators.view import (
 from ..scene.write import ASPECT, coverage_of
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
+from .run_button import draw_run, is_running
 from .sentence import draw_sentence
 from .sidebar import Sidebar
 
@@ -65,6 +66,8 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")
         if overlay is not None:
             row.operator(SEIP_OT_hide_sight_lines.bl_idname, text="", icon="X")
+        if is_running(SEIP_OT_show_sight_lines.bl_idname):
+            draw_run(column, SEIP_OT_show_sight_lines.bl_idname)
         why_not = no_placement(context.scene)
         if why_not:
             draw_sentence(column, why_not, icon="INFO")
@@ -87,8 +90,8 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column.label(text="Picture for a Report")
         column.row(align=True).prop(view, "picture_of", expand=True)
         column.prop(view, "picture", text="")
-        column.operator(SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
-        why_not = no_placement(context.scene)
+        draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
+        why_not = no_placement(context.scene) or not_judged(context.scene)
         if why_not:
             draw_sentence(column, why_not, icon="INFO")
 

@@ -9,12 +9,13 @@ import numpy as np
 
 from ..core.arrays import Float
 from ..core.errors import SeipError
-from ..core.scene_geometry import Pole, SceneGeometry
+from ..core.scene_geometry import SceneGeometry
 from ..core.site_check import Problem, SceneContents, Surface
 from . import contract
 from .read import (
     Shown,
     area_of,
+    foot_sentences,
     geometry_of,
     hidden_members,
     hidden_sentence,
@@ -53,6 +54,7 @@ def contents_of(scene: bpy.types.Scene) -> SceneContents:
     hidden = hidden_members(scene, members)
     problems += [*_faults(parts), *_odd_scene(scene)]
     problems += [Problem("WARNING", _sentence(hidden_sentence(name, all_))) for name, all_ in hidden.items()]
+    problems += [Problem("WARNING", _sentence(text)) for text in foot_sentences(_finite(parts))]
     surfaces = tuple(
         Surface(ROLES[name], part.source.name, part.triangles)
         for part in parts
@@ -61,7 +63,7 @@ def contents_of(scene: bpy.types.Scene) -> SceneContents:
     )
     problems += _without_role(scene, members, surfaces)
     geometry, complaint = _geometry(scene, parts)
-    return SceneContents(surfaces, _poles(parts), geometry, tuple(problems), complaint)
+    return SceneContents(surfaces, poles_of(_finite(parts)), geometry, tuple(problems), complaint)
 
 
 def _geometry(scene: bpy.types.Scene, parts: list[Shown]) -> tuple[SceneGeometry | None, str]:
@@ -104,8 +106,8 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}." if not text.endswith(".") else text
 
 
-def _poles(parts: list[Shown]) -> tuple[Pole, ...]:
-    return poles_of([part for part in parts if np.isfinite(part.matrix).all()])
+def _finite(parts: list[Shown]) -> list[Shown]:
+    return [part for part in parts if np.isfinite(part.matrix).all()]
 
 
 def _odd_scene(scene: bpy.types.Scene) -> Iterator[Problem]:

@@ -19,6 +19,11 @@ from .materials import reflectivity
 
 SHAFT_REACH = 0.5
 """Of a pole's faces those within this (metres, in plan) of its foot are its shaft: arms may rise above it."""
+FOUNDATION = 0.5
+"""Metres that a pole's faces may reach below its origin, as foundations do; beyond, their lowest point is its foot."""
+SAME_LEVEL = 0.1
+"""Metres above a pole's lowest point within which its faces stand on the ground."""
+MOST_NAMED = 3
 
 _SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 """Types of object that Blender can turn into faces."""
@@ -132,7 +137,8 @@ def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, li
         mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
         poles=poles_of(parts),
     )
-    return SceneReading(geometry, tuple(hidden_sentence(name, things) for name, things in hidden.items()))
+    hidden_sentences = (hidden_sentence(name, things) for name, things in hidden.items())
+    return SceneReading(geometry, (*hidden_sentences, *foot_sentences(parts)))
 
 
 def missing_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> dict[str, str]:
@@ -286,40 +292,78 @@ def poles_of(parts: list[Shown]) -> tuple[Pole, ...]:
     whatever it is made of. What merely scatters posts, and shows no face of
     its own, is none.
     """
+    whole, pieces = _whole_poles(parts)
+    return tuple(_pole(part, _corners(part, pieces)) for part in whole)
+
+
+def foot_sentences(parts: list[Shown]) -> tuple[str, ...]:
+    """Say which poles' feet are not at their origins."""
+    whole, pieces = _whole_poles(parts)
+    off = [
+        part.name
+        for part in whole
+        if not np.array_equal(_finite_origin(part), _foot(_finite_origin(part), _corners(part, pieces)))
+    ]
+    if not off:
+        return ()
+    named = ", ".join(map(repr, off[:MOST_NAMED])) + f" and {len(off) - MOST_NAMED} more" * (len(off) > MOST_NAMED)
+    what = "pole" if len(off) == 1 else "poles"
+    sentence = f"the origin of the {what} {named} is not at the foot: heights are counted from the faces' lowest point"
+    return (f"{sentence}; set origins to the feet to choose another",)
+
+
+def _whole_poles(parts: list[Shown]) -> tuple[list[Shown], list[Shown]]:
+    """Return what is a pole of its own, and the pieces that collection instances are made of."""
     members = [part for part in parts if contract.POLES in part.collections]
     pieces = [part for part in members if contract.POLES not in part.own]
     scattered = [part for part in pieces if part.source.instance_type != "COLLECTION"]
     scatterers = {part.source for part in scattered}
     whole = [p for p in members if contract.POLES in p.own and (p.triangles is not None or p.source not in scatterers)]
-    return tuple(
-        Pole(
-            part.name,
-            _finite_foot(part),
-            _height(part, pieces),
-            forbidden=bool(part.source.get(contract.FORBIDDEN, False)),
-            mandatory=bool(part.source.get(contract.MANDATORY, False)),
-            source=str(part.source.get(contract.SOURCE, "")),
-        )
-        for part in (*whole, *scattered)
+    return [*whole, *scattered], pieces
+
+
+def _pole(part: Shown, corners: Float | None) -> Pole:
+    foot = _foot(_finite_origin(part), corners)
+    return Pole(
+        part.name,
+        foot,
+        None if corners is None else float((_shaft(foot, corners)[:, 2] - foot[2]).max()),
+        forbidden=bool(part.source.get(contract.FORBIDDEN, False)),
+        mandatory=bool(part.source.get(contract.MANDATORY, False)),
+        source=str(part.source.get(contract.SOURCE, "")),
     )
 
 
-def _height(pole: Shown, pieces: list[Shown]) -> float | None:
-    """Return how far the shaft reaches above the foot, or None where there are no faces to tell."""
+def _corners(pole: Shown, pieces: list[Shown]) -> Float | None:
+    """Return the corners (n, 3) of all that a pole is made of, or None where it has no faces."""
     made_of = [pole] if pole.triangles is not None else [part for part in pieces if part.source == pole.source]
     corners = [part.triangles.reshape(-1, 3) for part in made_of if part.triangles is not None]
-    if not corners:
-        return None
-    above = np.concatenate(corners) - pole.matrix[:3, 3]
-    near = np.hypot(above[:, 0], above[:, 1]) <= SHAFT_REACH
-    return float(above[near if near.any() else slice(None), 2].max())
+    return np.concatenate(corners) if corners else None
 
 
-def _finite_foot(part: Shown) -> Float:
-    foot: Float = part.matrix[:3, 3]
-    if not np.isfinite(foot).all():
+def _shaft(foot: Float, corners: Float) -> Float:
+    """Return the corners near the axis of a pole; all of them where none is near."""
+    near = np.hypot(*(corners - foot)[:, :2].T) <= SHAFT_REACH
+    return corners[near] if near.any() else corners
+
+
+def _foot(origin: Float, corners: Float | None) -> Float:
+    """Return the foot of a pole: its origin, unless its faces reach lower or stand elsewhere."""
+    if corners is None:
+        return origin
+    low, high = corners[:, :2].min(axis=0) - SHAFT_REACH, corners[:, :2].max(axis=0) + SHAFT_REACH
+    if ((origin[:2] < low) | (origin[:2] > high)).any():
+        bottom = corners[corners[:, 2] <= corners[:, 2].min() + SAME_LEVEL]
+        return np.append((bottom[:, :2].min(axis=0) + bottom[:, :2].max(axis=0)) / 2, bottom[:, 2].min())
+    lowest = float(_shaft(origin, corners)[:, 2].min())
+    return np.append(origin[:2], lowest) if lowest < origin[2] - FOUNDATION else origin
+
+
+def _finite_origin(part: Shown) -> Float:
+    origin: Float = part.matrix[:3, 3]
+    if not np.isfinite(origin).all():
         raise SeipError(f"pole {part.name!r} stands at a place that is no finite number: set its location")
-    return foot
+    return origin
 
 
 def origin_of(scene: bpy.types.Scene) -> Float:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import re
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ..core.arrays import Boolean, Float
 from ..core.deployment import Deployment
 from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
+from ..core.progress import PAUSE, Progress
 from ..core.site import Site
 from . import contract
 from .daylight import add_daylight
@@ -29,7 +36,40 @@ AZIMUTH, ELEVATION = math.radians(-115.0), math.radians(52.0)  # of the camera, 
 FIELD_OF_VIEW = math.radians(35.0)  # across the picture
 ROOM = 1.04  # around the region
 SENSOR_ROOM = 0.5  # metres round a sensor that its own body and bracket take up
+SAMPLE = re.compile(rb"Sample (\d+)/")
+"""How Cycles tells of its progress."""
 UNSEEN_TYPES = {"LIGHT", "CAMERA", "SPEAKER", "LIGHT_PROBE"}
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """What it takes to take the picture, but for the scene.
+
+    Parameters
+    ----------
+    viewpoint : Viewpoint
+    reach : float, metres
+        From the camera, as far as anything is shown.
+    sensors : (k, 3) float64, metres
+        Optical centres.
+    """
+
+    viewpoint: Viewpoint
+    reach: float
+    sensors: Float
+
+    def as_json(self) -> str:
+        """Return it as a text for `from_json`."""
+        view = self.viewpoint
+        arrays = (view.place, view.axes, view.slopes, self.sensors)
+        return json.dumps([self.reach, *(array.tolist() for array in arrays)])
+
+    @classmethod
+    def from_json(cls, text: str) -> Shot:
+        """Return what `as_json` wrote down."""
+        reach, place, axes, slopes, sensors = json.loads(text)
+        viewpoint = Viewpoint(np.array(place), np.array(axes), np.array(slopes))
+        return cls(viewpoint, reach, np.array(sensors, dtype=np.float64).reshape(-1, 3))
 
 
 def save_rendered_view(
@@ -52,15 +92,88 @@ def save_rendered_view(
     deployment : Deployment
         The chosen sensors and what they see.
     """
-    with tempfile.TemporaryDirectory(prefix="seip-") as folder, _stage(scene) as stage:
+    shot = _shot(site, deployment)
+    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
         raw = Path(folder) / "view.png"
-        viewpoint = _add_camera(stage, site)
+        with _silence():
+            hidden = take(shot, scene, raw)
+        save_labelled_view(path, raw, site, deployment, _sight(shot, hidden, site))
+
+
+def render_elsewhere(
+    path: Path, blend: Path, scene: str, site: Site, deployment: Deployment
+) -> Generator[Progress, None, None]:
+    """Render a scene as `save_rendered_view` does, in a Blender of its own: the one that asks goes on answering.
+
+    Parameters
+    ----------
+    path : path
+        The picture to write.
+    blend : path
+        Holds the scene.
+    scene : str
+        Its name.
+    site : Site
+    deployment : Deployment
+        The sensors and what they see.
+
+    Yields
+    ------
+    Progress
+        Of samples; the other Blender is ended when this is closed.
+
+    Raises
+    ------
+    SeipError
+        The other Blender failed.
+    """
+    shot = _shot(site, deployment)
+    with tempfile.TemporaryDirectory(prefix="seip-") as folder:
+        raw, job, log = (Path(folder) / name for name in ("view.png", "job.json", "log"))
+        job.write_text(
+            json.dumps({"path": sys.path, "blend": str(blend), "scene": scene, "raw": str(raw), "shot": shot.as_json()})
+        )
+        yield from _waited_for(_command(job), log)
+        try:
+            hidden = np.array(json.loads(raw.with_suffix(".json").read_text()), dtype=bool)
+        except OSError as error:
+            last = log.read_text(errors="replace").strip().splitlines()[-1:]
+            raise SeipError(f"the view could not be rendered ({' '.join(last)}): export without it") from error
+        save_labelled_view(path, raw, site, deployment, _sight(shot, hidden, site))
+
+
+def _command(job: Path) -> list[str]:
+    """Return what starts a Blender without a window, or the bpy module, on a job of `render_job`."""
+    script = str(Path(__file__).with_name("render_job.py"))
+    if bpy.app.binary_path:
+        tell = ["--log", "*render*", "--log-level", "info"] if bpy.app.version >= (5, 0) else []  # others tell unasked
+        return [bpy.app.binary_path, "-b", "--factory-startup", *tell, "-P", script, "--", str(job)]
+    return [sys.executable, script, "--", str(job)]
+
+
+def _waited_for(command: list[str], log: Path) -> Generator[Progress, None, None]:
+    """Run a command to its end, its lines to a file, and report the samples that it tells of."""
+    with log.open("wb") as lines:
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=lines, stderr=subprocess.STDOUT)  # noqa: S603  # Blender itself, or this Python
+    try:
+        while process.poll() is None:
+            told = SAMPLE.findall(log.read_bytes())
+            yield Progress(int(told[-1]) if told else 0, SAMPLES, "rendering")
+            time.sleep(PAUSE)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def take(shot: Shot, scene: bpy.types.Scene, raw: Path) -> Boolean:
+    """Render a scene's picture without labels, and return which sensors something stands in front of, (k,) bool."""
+    with _stage(scene) as stage:
+        _add_camera(stage, shot)
         add_daylight(stage, stage.collection)
         _set_up(stage, raw)
-        with _silence(), held_interrupts():
+        with held_interrupts():
             bpy.ops.render.render(scene=stage.name, write_still=True)
-        sight = _sight(stage, viewpoint, site, deployment)
-        save_labelled_view(path, raw, site, deployment, sight)
+        return _hidden(stage, shot)
 
 
 @contextmanager
@@ -109,19 +222,24 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     ]
 
 
-def _add_camera(stage: bpy.types.Scene, site: Site) -> Viewpoint:
-    """Add a camera that has the whole region in its picture, and return where it stands."""
-    data = bpy.data.cameras.new("SEIP view")
-    data.angle = FIELD_OF_VIEW
+def _shot(site: Site, deployment: Deployment) -> Shot:
+    """Return a shot that has the whole region in its picture."""
     slope = math.tan(FIELD_OF_VIEW / 2.0)
     slopes = np.array((slope, slope * HEIGHT / WIDTH))
     tight = frame(site.targets.xyz, AZIMUTH, ELEVATION, slopes / ROOM)
+    reach = 2.0 * float(np.linalg.norm(site.targets.xyz - tight.place, axis=1).max())
+    sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
+    return Shot(Viewpoint(tight.place, tight.axes, slopes), reach, sensors)
+
+
+def _add_camera(stage: bpy.types.Scene, shot: Shot) -> None:
+    data = bpy.data.cameras.new("SEIP view")
+    data.angle = FIELD_OF_VIEW
     camera = bpy.data.objects.new("SEIP view", data)
-    camera.matrix_world = Matrix.Translation(tight.place) @ Matrix(tight.axes.tolist()).to_4x4()
-    data.clip_end = 2.0 * float(np.linalg.norm(site.targets.xyz - tight.place, axis=1).max())
+    camera.matrix_world = Matrix.Translation(shot.viewpoint.place) @ Matrix(shot.viewpoint.axes.tolist()).to_4x4()
+    data.clip_end = shot.reach
     stage.collection.objects.link(camera)
     stage.camera = camera
-    return Viewpoint(tight.place, tight.axes, slopes)
 
 
 def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
@@ -143,14 +261,17 @@ def _set_up(stage: bpy.types.Scene, raw: Path) -> None:
     stage.cycles.max_bounces = 2
 
 
-def _sight(stage: bpy.types.Scene, viewpoint: Viewpoint, site: Site, deployment: Deployment) -> Sight:
-    """Return where sensors and targets are on the picture, and which sensors something stands in front of."""
-    sensors = np.array([sensor.xyz for sensor in deployment.sensors]).reshape(-1, 3)
+def _hidden(stage: bpy.types.Scene, shot: Shot) -> Boolean:
     layer = stage.view_layers[0]
     layer.update()
-    start = Vector(viewpoint.place)
-    ways = [Vector(sensor) - start for sensor in sensors]
-    hidden = [
+    start = Vector(shot.viewpoint.place)
+    ways = [Vector(sensor) - start for sensor in shot.sensors]
+    hits = [
         stage.ray_cast(layer.depsgraph, start, way.normalized(), distance=way.length - SENSOR_ROOM)[0] for way in ways
     ]
-    return Sight(viewpoint.project(sensors), np.array(hidden, dtype=bool), viewpoint.project(site.targets.xyz))
+    return np.array(hits, dtype=bool)
+
+
+def _sight(shot: Shot, hidden: Boolean, site: Site) -> Sight:
+    """Return where sensors and targets are on the picture, and which sensors something stands in front of."""
+    return Sight(shot.viewpoint.project(shot.sensors), hidden, shot.viewpoint.project(site.targets.xyz))

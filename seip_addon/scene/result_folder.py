@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import secrets
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 
 from ..core.arrays import Boolean
+from ..core.errors import SeipError
 from ..core.goal import Plan
 from ..core.lidar import LidarModel
 from ..core.pictures.plan_view import save_plan_view
+from ..core.progress import Progress, finish
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
 from ..core.results.placement_record import Record, save_placement_record
@@ -20,7 +24,47 @@ from .blend_file import save_blend
 from .render import save_rendered_view
 from .write import write_result
 
-FILES = ("placement.json", "candidates.csv", "carla_spawn.json", "plan.png", "view.png", "placed.blend")
+FILES = ("candidates.csv", "carla_spawn.json", "plan.png", "view.png", "placed.blend", "placement.json")
+"""In the order in which they take their places: where ``placement.json`` stands, everything else does."""
+
+
+@contextmanager
+def result_files(folder: Path) -> Iterator[dict[str, Path]]:
+    """Yield temporary names for the files of a result, which take the place of an earlier result's at the end.
+
+    An earlier result stays whole until everything is written, and stays for good if the block raises; of a file that
+    the new result does not have, none stays.
+
+    Parameters
+    ----------
+    folder : path
+
+    Yields
+    ------
+    dict of str to path
+        In the same folder, by the names of `FILES`.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be written.
+    """
+    mark = secrets.token_hex(4)
+    part = {name: folder / f".{mark}.{name}" for name in FILES}
+    try:
+        yield part
+        (folder / FILES[-1]).unlink(missing_ok=True)
+        for name, temporary in part.items():
+            if temporary.exists():
+                temporary.replace(folder / name)
+            else:
+                (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
+    finally:
+        for temporary in part.values():
+            temporary.unlink(missing_ok=True)
 
 
 def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
@@ -36,8 +80,6 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     render: bool = True,
 ) -> None:
     """Write a plan into the scene and all its files into a folder, in place of earlier ones.
-
-    ``placement.json`` comes last: where it stands, everything else does.
 
     Parameters
     ----------
@@ -56,17 +98,33 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     render : bool
         Whether to render ``view.png``, which takes the longest.
     """
-    for name in FILES:
-        (folder / name).unlink(missing_ok=True)
     deployment = plan.deployment
-    save_candidate_table(folder / "candidates.csv", site, models, visible, deployment)
-    save_carla_spawns(folder / "carla_spawn.json", deployment, site.origin)
-    save_plan_view(folder / "plan.png", geometry, site, deployment, _notes(plan, record["warnings"], models))
-    write_result(scene, site, deployment)
-    save_blend(folder / "placed.blend")
-    if render:
-        save_rendered_view(folder / "view.png", scene, site, deployment)
-    save_placement_record(folder / "placement.json", record)
+    with result_files(folder) as part:
+        write_result(scene, site, deployment)
+        save_blend(part["placed.blend"])
+        finish(write_tables(part, geometry, site, plan, record, visible, models))
+        if render:
+            save_rendered_view(part["view.png"], scene, site, deployment)
+
+
+def write_tables(  # noqa: PLR0913, PLR0917  # as above
+    part: Mapping[str, Path],
+    geometry: SceneGeometry,
+    site: Site,
+    plan: Plan,
+    record: Record,
+    visible: Boolean,
+    models: Mapping[str, LidarModel],
+) -> Generator[Progress, None, None]:
+    """Write all of a result that takes no look at Blender's data; see `write_result_folder`."""
+    deployment = plan.deployment
+    yield Progress(0, 3, "writing tables")
+    save_placement_record(part["placement.json"], record)
+    save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
+    yield Progress(1, 3, "writing tables")
+    save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
+    yield Progress(2, 3, "drawing the plan")
+    save_plan_view(part["plan.png"], geometry, site, deployment, _notes(plan, record["warnings"], models))
 
 
 def _notes(plan: Plan, warnings: Sequence[str], models: Mapping[str, LidarModel]) -> list[str]:

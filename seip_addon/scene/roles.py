@@ -23,7 +23,7 @@ WORDS = {
     Role.ROADS: "the carriageway: targets lie on it, and rays end on it",
     Role.GROUND: "other surfaces that rays end on: pavements, verges, terrain",
     Role.OCCLUDERS: "what stands in the way: buildings, trees, walls",
-    Role.POLES: "posts that can carry a sensor: the object's origin is the foot of the post",
+    Role.POLES: "posts that can carry a sensor: the origin is the foot, unless faces reach below it",
     Role.CANDIDATE_AREAS: "where new posts may stand, in plan; usually the pavements",
     Role.WEIGHTED_REGIONS: "targets in its outline in plan count more",
     Role.FORBIDDEN_AREAS: "no sensor within its outline in plan",

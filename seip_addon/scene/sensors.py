@@ -15,18 +15,22 @@ from ..core.scans.sensor import MountedSensor
 from . import contract
 
 
-def read_sensors(scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel]) -> tuple[MountedSensor, ...]:
+def read_sensors(
+    scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel], *, hidden: bool = False
+) -> tuple[MountedSensor, ...]:
     """Read where each sensor is and how it is turned: as the viewport shows it, moved by hand or not.
 
     An empty's x axis points along azimuth zero and its z axis along the sensor's
-    axis; its scale means nothing. Hidden empties do not count. One without a
-    label of its own gets the first that is free.
+    axis; its scale means nothing. Hidden empties do not count unless they are
+    asked for. One without a label of its own gets the first that is free.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     catalogue : mapping of str to LidarModel
         Of which the empties' ``seip_sensor`` are keys.
+    hidden : bool
+        Whether hidden empties count.
 
     Returns
     -------
@@ -38,19 +42,31 @@ def read_sensors(scene: bpy.types.Scene, catalogue: Mapping[str, LidarModel]) ->
     SeipError
         There is no sensor, or one names no type, an unknown one, or has no proper transform.
     """
-    layer = scene.view_layers[0]
-    layer.update()
-    collection = contract.find(scene, contract.SENSORS)
-    members = [] if collection is None else [thing for thing in collection.all_objects if thing.type == "EMPTY"]
-    empties = [thing for thing in members if thing.name in layer.objects and thing.visible_get(view_layer=layer)]
-    if not empties:
-        hidden = f"; {len(members)} hidden ones do not count" * bool(members)
+    scene.view_layers[0].update()
+    sensors = labelled_sensors(scene, hidden=hidden)
+    if not sensors:
+        count = len(_empties(scene))
+        others = f"; {count} hidden ones do not count" * bool(count)
         raise SeipError(
-            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{hidden}: place some first"
+            f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{others}: place some first"
         )
+    return tuple(_mounted(thing, label, catalogue) for label, thing in sensors.items())
+
+
+def labelled_sensors(scene: bpy.types.Scene, *, hidden: bool = False) -> dict[str, bpy.types.Object]:
+    """Return the empties of sensors by their labels, S2 before S10; see `read_sensors`."""
+    empties = [thing for thing in _empties(scene) if hidden or _is_shown(thing, scene.view_layers[0])]
     labels = _labels(empties)
-    sensors = [_mounted(thing, labels[thing.name], catalogue) for thing in empties]
-    return tuple(sorted(sensors, key=lambda sensor: _natural(sensor.label)))
+    return {labels[thing.name]: thing for thing in sorted(empties, key=lambda thing: _natural(labels[thing.name]))}
+
+
+def _is_shown(thing: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    return thing.name in layer.objects and bool(thing.visible_get(view_layer=layer))
+
+
+def _empties(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    collection = contract.find(scene, contract.SENSORS)
+    return [] if collection is None else [thing for thing in collection.all_objects if thing.type == "EMPTY"]
 
 
 def placed_sensors(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:

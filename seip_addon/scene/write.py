@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -59,6 +59,32 @@ def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> 
     _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)
 
 
+def take_over(
+    scene: bpy.types.Scene, site: Site, deployment: Deployment, empties: Mapping[str, bpy.types.Object]
+) -> None:
+    """Make sensors that hang where a hand has put them the scene's result: no object of theirs is moved or removed.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    site : Site
+        What the result was computed on.
+    deployment : Deployment
+        The sensors and what they see.
+    empties : mapping of str to Object
+        Theirs, by their labels.
+    """
+    contract.leave_shared(scene, contract.COVERAGE)
+    old = coverage_of(scene)
+    if old is not None:
+        _remove(old)
+    for sensor in deployment.sensors:
+        if sensor.label in empties:  # nobody has deleted it meanwhile
+            empties[sensor.label].name = _name(sensor)
+            _describe(empties[sensor.label], sensor)
+    _write_coverage(contract.find_or_make(scene, contract.COVERAGE), site.targets, deployment)
+
+
 def clear_result(scene: bpy.types.Scene) -> None:
     """Remove the objects and meshes of an earlier result."""
     for name in (contract.SENSORS, contract.COVERAGE):
@@ -87,20 +113,29 @@ def _write_sensors(collection: bpy.types.Collection, sensors: Sequence[Sensor]) 
 
 
 def _empty(sensor: Sensor) -> bpy.types.Object:
-    mounting = f"{sensor.height:.3g} m{tilt_in_words(sensor.tilt)}"
-    empty = bpy.data.objects.new(f"{sensor.model.key} @ {mounting} · {sensor.position_name}", None)
+    empty = bpy.data.objects.new(_name(sensor), None)
     empty.empty_display_type = "ARROWS"
     empty.empty_display_size = 0.8
     empty.show_name = True
     empty.show_in_front = True
     empty.location = sensor.xyz
     empty.rotation_euler = (0.0, sensor.tilt, sensor.yaw)
+    _describe(empty, sensor)
+    return empty
+
+
+def _name(sensor: Sensor) -> str:
+    return f"{sensor.model.key} @ {sensor.height:.3g} m{tilt_in_words(sensor.tilt)} · {sensor.position_name}"
+
+
+def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:
+    """Say in an empty's properties which sensor it is, where it hangs and what it sees."""
     properties = {
         MARK: True,
         contract.LABEL: sensor.label,
         contract.SENSOR: sensor.model.key,
         "seip_sensor_name": sensor.model.name,
-        "seip_position": sensor.position_name,
+        contract.POSITION: sensor.position_name,
         "seip_on_pole": sensor.on_pole,
         "seip_height": sensor.height,
         "seip_yaw_deg": math.degrees(sensor.yaw),
@@ -113,7 +148,6 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
     }
     for name, value in properties.items():
         empty[name] = value
-    return empty
 
 
 def _hardware(sensor: Sensor) -> Solid:

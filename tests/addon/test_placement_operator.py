@@ -1,8 +1,11 @@
 """From a click to placed sensors: operators do what the batch command does, and what they find outlives the file."""
 
+import csv
 import json
 import math
+from collections.abc import Generator
 from pathlib import Path
+from types import SimpleNamespace
 
 from headless import place, robust
 
@@ -10,8 +13,10 @@ import bpy
 import pytest
 
 from seip_addon import pointing, state
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.core.visibility.grid import VisibilityGrid
+from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.scene.write import MARK
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
@@ -47,6 +52,53 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path):
     assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
     for name in ("candidates.csv", "carla_spawn.json"):
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
+
+
+def test_pose_errors_are_tried_where_that_is_asked_for(junction, tmp_path):
+    junction.seip.goal.pose_errors = True
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    panel = json.loads(junction.seip.result.record)
+    assert any("in one of twenty cases" in note for note in panel["notes"])
+    place.main([str(SCENE), *OPTIONS, "--pose-errors", "-o", str(tmp_path)])
+    assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
+
+
+def test_a_placement_with_the_grid_at_hand_casts_no_ray(junction, monkeypatch):
+    bpy.ops.seip.compute_visibility()
+    for caster in (BvhRayCaster, EmbreeRayCaster):
+        monkeypatch.setattr(caster, "cast", None)
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+
+
+def work_of(operator: str, scene: bpy.types.Scene) -> Generator[Progress, None, object]:
+    """Return the work of a button, which a thread would do."""
+    return getattr(bpy.types, operator).prepare(SimpleNamespace(), scene)
+
+
+def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
+    bpy.ops.seip.solve_placement()
+    junction.seip.goal.count = 3
+    junction.seip.survey.time_limit = 30.0
+    before = state.find(junction)
+    seen = dict(vars(before))
+    placed = finish(work_of("SEIP_OT_solve_placement", junction))
+    assert len(placed.plan.deployment.sensors) == 3
+    for name in ("compute_visibility", "estimate_visibility", "rank_candidates", "follow_sensors", "save_picture"):
+        finish(work_of(f"SEIP_OT_{name}", junction))
+        assert state.find(junction) is before
+        assert vars(before) == seen
+
+
+def test_a_stopped_placement_does_not_reach_the_export(junction, tmp_path):
+    bpy.ops.seip.solve_placement()
+    junction.seip.goal.count = 3
+    finish(work_of("SEIP_OT_solve_placement", junction))  # and stopped
+    junction.seip.result.folder = str(tmp_path)
+    bpy.ops.seip.export_result()
+    record = load_placement_record(tmp_path / "placement.json")
+    rows = list(csv.DictReader((tmp_path / "candidates.csv").read_text(encoding="utf-8").splitlines()))
+    assert {int(row["pose"]) for row in rows if row["chosen"]} == {sensor["pose"] for sensor in record["sensors"]}
+    assert len(json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))) == 2
 
 
 def test_a_mistake_is_one_sentence(junction):

@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import state
+from seip_addon import hand, pointing, state
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 
@@ -113,3 +113,81 @@ def test_other_settings_lay_out_anew_from_the_same_reading(known):
 def test_a_slip_in_the_settings_is_said_by_the_panel(known):
     bpy.context.scene.seip.survey.heights = "x"
     assert "neither a height" in state.doubt(bpy.context.scene)
+
+
+def reopened(tmp_path: Path) -> bpy.types.Scene:
+    path = tmp_path / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene
+
+
+def doubt_once_compared(scene: bpy.types.Scene) -> str:
+    assert state.doubt_of_placement(scene) == state.NOT_COMPARED
+    assert bpy.ops.seip.compare_scene() == {"FINISHED"}
+    return state.doubt_of_placement(scene)
+
+
+def test_a_placement_that_is_opened_again_holds_once_it_is_compared(known, tmp_path):
+    bpy.ops.seip.solve_placement()
+    assert state.doubt_of_placement(bpy.context.scene) == ""
+    assert doubt_once_compared(reopened(tmp_path)) == ""
+
+
+def weigh() -> None:
+    region = bpy.data.collections["SEIP Weighted Regions"].objects[0]
+    region["seip_weight"] = 5.0
+
+
+@pytest.mark.parametrize("change", [move, reshape, delete, hide, forbid, weigh])
+def test_a_change_before_saving_shows_once_the_file_is_open_again(known, change, tmp_path):
+    bpy.ops.seip.solve_placement()
+    change()
+    assert doubt_once_compared(reopened(tmp_path)) == state.ANOTHER_SITE
+
+
+def test_visibility_of_other_settings_does_not_make_an_older_placement_hold(known):
+    scene = bpy.context.scene
+    bpy.ops.seip.solve_placement()
+    scene.seip.survey.heights = "5"
+    bpy.ops.seip.compute_visibility()
+    assert state.doubt(scene) == ""
+    assert state.doubt_of_placement(scene) == state.ANOTHER_SITE
+    scene.seip.survey.heights = "8"
+    bpy.ops.seip.compute_visibility()
+    assert state.doubt_of_placement(scene) == ""
+
+
+def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
+    scene = bpy.context.scene
+    bpy.ops.seip.check_site()
+    assert state.doubt_of_check(scene) == ""
+    scene.seip.survey.time_limit = 30.0  # nothing that a check looks at
+    assert state.doubt_of_check(scene) == ""
+    scene.seip.survey.heights = "5 8"
+    assert state.doubt_of_check(scene) == "The settings have changed since the check."
+    bpy.ops.seip.check_site()
+    move()
+    bpy.context.view_layer.update()
+    assert state.doubt_of_check(scene) == "The scene has changed since the check."
+    bpy.ops.seip.check_site()
+    assert state.doubt_of_check(reopened(tmp_path)) == state.OLD_CHECK
+
+
+def test_what_a_hand_did_to_the_sensors_is_said(known):
+    scene = bpy.context.scene
+    bpy.ops.seip.solve_placement()
+    bpy.data.collections["SEIP Sensors"].hide_viewport = True
+    assert not hand.changes(scene)
+    bpy.data.collections["SEIP Sensors"].hide_viewport = False
+    sensors = pointing.sensor_empties(scene)
+    sensors["S1"].location.z -= 2.0
+    sensors["S2"].rotation_euler.x = 0.2
+    sensors["S4"]["seip_sensor"] = "vlp16"
+    copy = sensors["S1"].copy()
+    bpy.data.collections["SEIP Sensors"].objects.link(copy)
+    bpy.context.view_layer.update()
+    assert hand.changes(scene).in_words == "By hand: S1, S2, S4 moved; S5 added."
+    bpy.data.objects.remove(copy)
+    bpy.data.objects.remove(sensors["S3"])
+    assert hand.changes(scene).in_words == "By hand: S1, S2, S4 moved; S3 deleted."

@@ -161,4 +161,5 @@ def test_work_asks_blender_for_nothing_once_it_is_under_way(scene, monkeypatch):
     seeing = state.seen(finish(state.survey(scene)))
     for name in ("cache_folder", "cores", "own"):
         monkeypatch.setattr(preferences, name, asked)
-    assert finish(seeing).visible.any()
+    _, grid = finish(seeing)
+    assert grid.visible.any()

@@ -35,9 +35,11 @@ def test_the_sensor_faces_the_same_way_in_left_handed_axes(example, yaw):
     assert -180 <= spawn["transform"]["rotation"]["yaw"] < 180
 
 
-@pytest.mark.parametrize(("yaw", "tilt"), [(0.0, 0.2), (1.0, -0.4), (-2.5, 1.3), (4.0, 0.0)])
-def test_a_tilted_sensor_hangs_the_same_in_left_handed_axes(example, yaw, tilt):
-    sensor = replace(example.deployment.sensors[0], yaw=yaw, tilt=tilt)
+@pytest.mark.parametrize(
+    ("yaw", "tilt", "roll"), [(0.0, 0.2, 0.0), (1.0, -0.4, 0.3), (-2.5, 1.3, 0.0), (4.0, 0.0, -1.2), (0.5, 0.1, 3.0)]
+)
+def test_a_turned_sensor_hangs_the_same_in_left_handed_axes(example, yaw, tilt, roll):
+    sensor = replace(example.deployment.sensors[0], yaw=yaw, tilt=tilt, roll=roll)
     turn = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))[0]["transform"]["rotation"]
     p, y, r = (math.radians(turn[name]) for name in ("pitch", "yaw", "roll"))
     # Unreal's forward vector: up where the pitch is positive; its y is our -y.

@@ -36,7 +36,7 @@ def test_ranks_leave_out_taken_positions_and_seen_targets():
     visible = np.array([[1, 1, 0, 0], [1, 1, 1, 0], [0, 0, 1, 1], [0, 1, 0, 0]], dtype=bool)
     weight = np.array([1.0, 1.0, 1.0, 3.0])
     assert [one.pose for one in rank_alone(visible, weight, 3)] == [2, 1, 0]
-    added = rank_added(visible, weight, [1], np.array([0, 0, 1, 2]), 9)
+    added = rank_added(visible, weight, visible[1], np.array([False, False, True, True]), 9)
     assert [(one.pose, one.share) for one in added] == [(2, 0.5), (3, 0.0)]
 
 

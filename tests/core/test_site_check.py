@@ -120,7 +120,7 @@ def test_many_culprits_are_named_together():
     problems = found(*SOUND.surfaces, poles=poles)
     assert len(problems) == 6
     assert problems[-1][1:] == ("p5", problems[-1][2])
-    assert problems[-1][2].startswith("35 more poles have their origin")
+    assert problems[-1][2].startswith("35 more poles have their foot")
 
 
 def test_a_weighted_region_that_is_there_twice_weighs_twice():

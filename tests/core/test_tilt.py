@@ -19,7 +19,7 @@ from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.goal import Goal
 from seip_addon.core.lidar import beam_directions, load_catalogue
-from seip_addon.core.orientation import orientation, orientations, tilt_in_words, turned
+from seip_addon.core.orientation import angles_of, orientation, orientations, tilt_in_words, turned
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
@@ -334,3 +334,10 @@ def test_rings_before_a_tilted_sensor_are_where_its_rays_meet_the_road():
     rings = np.sort(height * rays[:, 0] / -rays[:, 2])
     border = rings[np.flatnonzero(np.diff(rings) > 2.0)[0]]
     assert unresolved_from(model, height, 1.0, 1000.0, tilt) == pytest.approx(border)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.3, -1.4, math.pi / 2, -math.pi / 2])
+@pytest.mark.parametrize(("yaw", "roll"), [(0.0, 0.0), (2.0, -0.5), (-3.0, 3.0)])
+def test_angles_say_how_a_sensor_is_turned_in_any_way(yaw, tilt, roll):
+    matrix = orientation(yaw, tilt, roll)
+    np.testing.assert_allclose(orientation(*angles_of(matrix)), matrix, atol=1e-7)

@@ -16,6 +16,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "scenes" / "junction.blend"
@@ -49,7 +50,8 @@ def test_the_folder_holds_every_result(folder):
 def test_the_record_says_how_far_it_can_be_trusted(folder):
     record = load_placement_record(folder / "placement.json")
     assert any("within 1% of the best" in note for note in record["notes"])
-    assert any("in one of twenty cases" in note for note in record["notes"])
+    assert record["settings"]["pose_errors"] is False
+    assert not any("in one of twenty cases" in note for note in record["notes"])
     assert any("neighbouring rings" in warning for warning in record["warnings"])
 
 
@@ -95,6 +97,34 @@ def test_another_goal_uses_the_stored_grid(folder, tmp_path):
     assert stored.stat().st_mtime_ns == before
     run(tmp_path, "--count", "2", "--delta", "0.7")
     assert stored.stat().st_mtime_ns != before
+
+
+@pytest.fixture
+def rays(monkeypatch):
+    """Count the rays of each cast."""
+    counts = []
+
+    def counted(cast):
+        def cast_and_count(caster, origin, directions, max_range):
+            counts.append(len(directions))
+            return cast(caster, origin, directions, max_range)
+
+        return cast_and_count
+
+    for caster in (BvhRayCaster, EmbreeRayCaster):
+        monkeypatch.setattr(caster, "cast", counted(caster.cast))
+    return counts
+
+
+def test_another_goal_casts_no_ray_again(folder, tmp_path, rays):
+    (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
+    run(tmp_path, "--count", "3")
+    run(tmp_path, "--budget", "20000")
+    assert sum(rays) == 0
+    record = run(tmp_path, "--count", "3", "--pose-errors")
+    assert sum(rays) > 0
+    assert record["settings"]["pose_errors"] is True
+    assert any("in one of twenty cases" in note for note in record["notes"])
 
 
 def test_heights_come_as_a_list_or_a_range(tmp_path):

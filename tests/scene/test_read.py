@@ -5,6 +5,7 @@ import hashlib
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.scene import contract
@@ -143,6 +144,38 @@ def test_poles_stand_at_their_origins_and_their_faces_occlude(scene):
     assert poles["post"].mandatory
     assert not poles["mark"].mandatory
     assert [mesh.name for mesh in geometry.occluders] == ["post"]
+
+
+def cylinder(scene, location, depth, rotation=(0, 0, 0)):
+    """Blender's own, whose origin is in its middle."""
+    bpy.ops.mesh.primitive_cylinder_add(radius=0.1, depth=depth, location=location, rotation=rotation)
+    return put(scene, bpy.context.object, (contract.POLES,), location)
+
+
+def test_the_foot_of_a_pole_is_its_lowest_point_where_its_origin_is_in_its_middle(scene):
+    cylinder(scene, (3, 9, 3.1), 6.0)
+    reading = read_scene(scene)
+    (pole,) = reading.geometry.poles
+    np.testing.assert_allclose(pole.base, (3, 9, 0.1), atol=1e-6)
+    assert pole.height == pytest.approx(6.0)
+    assert [sentence for sentence in reading.warnings if "'Cylinder' is not at the foot" in sentence]
+
+
+def test_the_foot_of_a_pole_is_where_its_faces_stand_though_its_origin_is_elsewhere(scene):
+    post = cylinder(scene, (0, 0, 0), 6.0)
+    for vertex in post.data.vertices:  # as Apply Location leaves it
+        vertex.co += Vector((3, 9, 3.1))
+    (pole,) = read_scene(scene).geometry.poles
+    np.testing.assert_allclose(pole.base, (3, 9, 0.1), atol=1e-6)
+    assert pole.height == pytest.approx(6.0)
+
+
+def test_a_shallow_foundation_and_a_head_without_shaft_leave_the_origin_the_foot(scene):
+    box(scene, "founded", (contract.POLES,), (-0.1, -0.1, -0.4), (0.1, 0.1, 6), (3, 9, 0.1))
+    box(scene, "head", (contract.POLES,), (-0.1, -0.1, 5), (0.1, 0.1, 6), (8, 9, 0.1))
+    reading = read_scene(scene)
+    assert [pole.base[2] for pole in reading.geometry.poles] == pytest.approx([0.1, 0.1])
+    assert reading.warnings == ()
 
 
 def box(scene, name, where, low, high, at=(0, 0, 0)):

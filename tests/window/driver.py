@@ -12,13 +12,16 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import bpy
+import numpy as np
 
 Steps = Generator[float, None, None]
 
@@ -26,9 +29,15 @@ ROW = 10
 """Pixels between two places that are asked: buttons are 20 high."""
 HEADING = 38
 """Pixels from near the upper edge of a button down to the heading below it."""
+CLOSED = 26
+"""Pixels that a closed panel takes."""
 FOOT = 200
 """Pixels at the foot of the sidebar in which a button is too near to it for a panel below."""
 TRIES = 3
+EDGE, STEP, STOP = 24, 6, 16
+"""Pixels from the sidebar's edge to its buttons, between two places of a row, and from a Stop button to its bar."""
+BLUE = 40
+"""How much more blue than red a bar's filled part is."""
 BEAT = 0.04
 """Seconds that Blender has to notice an event."""
 NAMES = dict(
@@ -161,33 +170,67 @@ class Window:
         yield from self.press("LEFTMOUSE", place)
         yield 0.2
 
-    def open_below(self, what: str, inside: str) -> Steps:
-        """Open the panel whose heading stands below a button, and in which there is another button."""
+    def open_below(self, what: str, inside: str, skip: int = 0) -> Steps:
+        """Open the panel whose heading stands below a button, some closed ones between, and that holds another one."""
         for _ in range(TRIES):
             x, y = yield from self.find(what)
             if y < self.region("UI").y + FOOT:  # bring into view what is below
                 yield from self._scroll(1)
                 x, y = yield from self.find(what)
-            yield from self._hover((x, y - HEADING), 10 * BEAT)
-            yield from self.press("LEFTMOUSE", (x, y - HEADING))
+            heading = (x, y - HEADING - skip * CLOSED)
+            yield from self._hover(heading, 10 * BEAT)
+            yield from self.press("LEFTMOUSE", heading)
             yield 0.5
             if (yield from self._find_here(inside, (0.6,))):
                 return
         raise LookupError(f"there is no panel with {inside} below {what}")
+
+    def beside(self, place: tuple[int, int], what: str) -> Generator[float, None, tuple[int, int]]:
+        """Return the place of a button in the row of a place, or next to that row, from the right."""
+        region = self.region("UI")
+        for y in (place[1], place[1] - ROW, place[1] + ROW):
+            for x in range(region.x + region.width - EDGE, region.x, -STEP):
+                yield from self._hover((x, y), BEAT / 2)
+                if what in self._asked():
+                    yield from self._hover((x, y), 10 * BEAT)
+                    if what in self._asked():
+                        return x, y
+        raise LookupError(f"there is no button {what} beside {place}")
+
+    def pixels(self) -> Any:
+        """Return what the window shows, (height, width, 3) uint8, from the top."""
+        from PIL import Image  # noqa: PLC0415  # comes with the extension
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "window.png"
+            subprocess.run(["import", "-window", "root", str(path)], check=True)  # noqa: S603, S607  # as in `picture`
+            with Image.open(path) as shot:
+                return np.asarray(shot.convert("RGB"))
+
+    def filled(self, stop: tuple[int, int]) -> float:
+        """Return which share of a progress bar is filled, as it is drawn left of its Stop button."""
+        region, pixels = self.region("UI"), self.pixels()
+        row = pixels[len(pixels) - 1 - stop[1], region.x + EDGE // 2 : stop[0] - STOP].astype(int)
+        return float(np.mean(row[:, 2] - row[:, 0] > BLUE))
 
     def enter(self, what: str, text: str) -> Steps:
         """Type into a field of the sidebar, in place of what is there."""
         place = yield from self.find(what)
         yield from self.press("RET", place)
         yield from self.press("A", place, ctrl=True)
-        for letter in text:
-            key = NAMES.get(letter, letter.upper())
-            self.event(key, "PRESS", place, unicode=letter)
-            yield BEAT
-            self.event(key, "RELEASE", place)
-            yield BEAT
+        yield from self.type(text, place)
         yield from self.press("RET", place)
         yield 0.2
+
+    def type(self, text: str, place: tuple[int, int] | None = None) -> Steps:
+        """Press the keys of a text one after the other."""
+        where = place or self.middle
+        for letter in text:
+            key = NAMES.get(letter, letter.upper())
+            self.event(key, "PRESS", where, unicode=letter)
+            yield BEAT
+            self.event(key, "RELEASE", where)
+            yield BEAT
 
     def until(self, holds: Callable[[], object], seconds: float) -> Steps:
         """Wait until something holds."""

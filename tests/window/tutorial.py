@@ -7,13 +7,29 @@ from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import state
+from bl_ext.user_default.seip.seip_addon import preferences, state
+from bl_ext.user_default.seip.seip_addon.panels import run_button
 from driver import Steps, Window, play
+
+TIMES: list[str] = []
+"""What was drawn below bars."""
+
+
+def _noted(times: Callable[..., str]) -> Callable[..., str]:
+    def times_and_note(*given: float | None) -> str:
+        TIMES.append(times(*given))
+        return TIMES[-1]
+
+    return times_and_note
+
+
+run_button.times_in_words = _noted(run_button.times_in_words)
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 TRAFFIC = Path(bpy.data.filepath).with_name("junction_traffic") / "run-1.npz"
@@ -34,6 +50,9 @@ def scenario(window: Window) -> Steps:
 
 
 def _begin(window: Window) -> Steps:
+    cache = OUT / "visibility"
+    shutil.rmtree(cache, ignore_errors=True)
+    preferences.own().cache = str(cache)
     copy = OUT / "junction.blend"
     shutil.copy(bpy.data.filepath, copy)
     bpy.ops.wm.open_mainfile(filepath=str(copy))
@@ -57,9 +76,15 @@ def _choose(window: Window) -> Steps:
 
 
 def _compute(window: Window) -> Steps:
-    yield from window.click("seip.compute_visibility(")
+    button = yield from window.find("seip.compute_visibility(")
+    yield from window.press("LEFTMOUSE", button)
     yield from window.until(lambda: state.running is not None, 10)
-    yield from window.press("ESC")
+    stop = yield from _bar_moves(window, button)
+    yield from window.press("LEFTMOUSE", stop)
+    yield from window.until(lambda: state.running is None, 0.5)
+    yield from window.press("LEFTMOUSE", button)  # which is there again
+    yield from window.until(lambda: state.running is not None, 10)
+    bpy.ops.seip.stop()
     yield from window.until(lambda: state.running is None, 0.5)
     assert _known() is None or _known().grid is None, "the run that was stopped went on"
     yield from window.click("seip.estimate_visibility(")
@@ -68,6 +93,16 @@ def _compute(window: Window) -> Steps:
     yield from window.until(lambda: state.running is None and _known().grid is not None, 120)
     yield from window.find("seip.compute_visibility(")
     yield from window.picture("4-visibility")
+
+
+def _bar_moves(window: Window, button: tuple[int, int]) -> Generator[float, None, tuple[int, int]]:
+    """See that a bar stands in place of a button, moves, and tells the time left; return where its Stop button is."""
+    stop = yield from window.beside(button, "seip.stop(")
+    before = window.filled(stop)
+    yield from window.until(lambda: window.filled(stop) > before + 0.02, 60)
+    yield from window.until(lambda: any("left" in words for words in TIMES), 10)
+    assert state.running is not None, "the work ended before it could be stopped"
+    return stop
 
 
 def _place(window: Window) -> Steps:
@@ -104,8 +139,9 @@ def _save_and_reopen(window: Window) -> Steps:
     yield 1.5
     yield from window.open_sidebar("SEIP")
     yield from window.press("NUMPAD_0")  # the camera's view
-    assert _known() is None
     assert _scene().seip.result.record == record
+    yield from window.until(lambda: state.running is None and _known() is not None, 30)  # compared with the scene
+    assert not state.doubt_of_placement(_scene())
     yield from window.open_below("seip.follow_sensors(", "seip.rank_candidates(")
     yield from window.click("seip.rank_candidates(")
     yield from window.until(lambda: len(_scene().seip.result.ranking), 60)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deployment import Deployment, weighted_share
+from ..deployment import Deployment, Sensor, sensor_at, weighted_share
 from ..lidar import LidarModel
 from ..site import Site
 from ..storage import whole_file
@@ -46,7 +46,7 @@ def save_candidate_table(
     visible: NDArray[np.bool_],
     deployment: Deployment,
 ) -> None:
-    """Write one row for each pose, in the order of the poses.
+    """Write one row for each pose, in their order, and then one for each sensor that a hand has put elsewhere.
 
     Parameters
     ----------
@@ -64,33 +64,35 @@ def save_candidate_table(
     seen = visible.sum(axis=1)
     weighted = np.array([weighted_share(row, site.targets.weight) for row in visible])
     rank = _ranks(weighted, seen)
-    candidates = site.candidates
     with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
-        for pose, position in enumerate(candidates.position_of):
-            model = models[str(candidates.sensor[pose])]
-            xyz = candidates.xyz[pose]
-            writer.writerow(
-                (
-                    pose,
-                    candidates.position_name[position],
-                    int(candidates.on_pole[position]),
-                    candidates.pole_source[position],
-                    model.key,
-                    f"{candidates.height[pose]:.3f}",
-                    *(f"{value:.3f}" for value in xyz),
-                    *(f"{value:.3f}" for value in xyz + site.origin),
-                    f"{degrees(candidates.yaw[pose]):.3f}",
-                    f"{tilt_degrees(candidates.tilt[pose]):.3f}",
-                    f"{model.price:.2f}",
-                    seen[pose],
-                    f"{seen[pose] / len(site.targets):.6f}",
-                    f"{weighted[pose]:.6f}",
-                    rank[pose],
-                    label.get(pose, ""),
-                )
-            )
+        for pose in range(len(site.candidates)):
+            sensor = sensor_at(site, models, label.get(pose, ""), pose)
+            source = str(site.candidates.pole_source[site.candidates.position_of[pose]])
+            share = seen[pose] / len(site.targets)
+            worth = (seen[pose], f"{share:.6f}", f"{weighted[pose]:.6f}", rank[pose])
+            writer.writerow((pose, *_place(sensor, site, source), *worth, sensor.label))
+        for sensor in deployment.sensors:
+            if sensor.pose is None:
+                worth = (round(sensor.alone * len(site.targets)), f"{sensor.alone:.6f}", "", "")
+                writer.writerow(("", *_place(sensor, site, ""), *worth, sensor.label))
+
+
+def _place(sensor: Sensor, site: Site, source: str) -> tuple[object, ...]:
+    """Return the columns of where a sensor hangs, how it is turned and what it costs."""
+    return (
+        sensor.position_name,
+        int(sensor.on_pole),
+        source,
+        sensor.model.key,
+        f"{sensor.height:.3f}",
+        *(f"{value:.3f}" for value in sensor.xyz),
+        *(f"{value:.3f}" for value in sensor.xyz + site.origin),
+        f"{degrees(sensor.yaw):.3f}",
+        f"{tilt_degrees(sensor.tilt):.3f}",
+        f"{sensor.model.price:.2f}",
+    )
 
 
 def _ranks(weighted: NDArray[np.float64], seen: NDArray[np.int64]) -> NDArray[np.int64]:

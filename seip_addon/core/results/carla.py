@@ -3,7 +3,7 @@
 CARLA stands on Unreal's left-handed axes. A town's world coordinates are those
 of its OpenDRIVE map with y negated, so a yaw that is counter-clockwise here is
 clockwise there [1]_; its pitch turns the nose up where it is positive, so that a
-tilt has the opposite sign [3]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
+tilt has the opposite sign, and a roll the same [3]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
 ``upper_fov`` to ``lower_fov``, both included, and
 ``points_per_second / rotation_frequency / channels`` steps over a turn [2]_.
 
@@ -63,7 +63,7 @@ def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
             "rotation": {
                 "pitch": -tilt_degrees(sensor.tilt) + 0.0,
                 "yaw": clockwise_degrees(sensor.yaw),
-                "roll": 0.0,
+                "roll": tilt_degrees(sensor.roll),
             },
         },
         "attributes": _attributes(sensor),

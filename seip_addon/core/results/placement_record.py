@@ -168,6 +168,7 @@ def _sensor(sensor: Sensor, origin: Float) -> Record:
         "coverage_alone": _share(sensor.alone),
         "coverage_added": _share(sensor.added),
         "coverage_marginal": _share(sensor.marginal),
+        **({"roll_deg": tilt_degrees(sensor.roll)} if sensor.pose is None else {}),
     }
 
 

@@ -146,7 +146,7 @@ def pose_study(
     PoseStudy
     """
     site = around.site
-    poses = np.array([sensor.pose for sensor in deployment.sensors], dtype=np.int64)
+    poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
 
     def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[Views, Boolean]]:
         drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
@@ -186,17 +186,20 @@ def _one_errs(site: Site, planned: Boolean, together: Views, number: int) -> Cov
 
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
     """Say where a placement does not hold what was planned, in sentences."""
+    lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
+    return (pose_sentence(study),) if lost >= NOTABLE else ()
+
+
+def pose_sentence(study: PoseStudy) -> str:
+    """Say what a placement covers in one of twenty cases, and which sensor's error costs most."""
     errors, low = study.settings.errors, study.quantile(QUANTILES[0])
-    lost = study.planned.whole[0] - low.value
-    if lost < NOTABLE:
-        return ()
+    lost = max(study.planned.whole[0] - low.value, 0.0)
     worst, certain = study.worst_sensor()
     which = f"{worst}'s error costs most" if certain else "no sensor's error stands out"
-    sentence = (
+    return (
         f"with errors of {errors.position:g} m and {np.degrees(errors.tilt):.3g}° of tilt (standard deviations) the "
         f"placement covers less than {low.value:.1%} in one of twenty cases, {lost:.1%} less than planned; {which}"
     )
-    return (sentence,)
 
 
 def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
@@ -216,7 +219,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             f"mean {mean_of(study.together.whole).in_words()}",
             f"{settings.draws} draws, all sensors erring; half of them "
             f"{'say the same' if study.is_converged() else 'say something else: take more'}",
-            "placement over pose scenarios; a warning where the 5 % quantile loses 1 % or more",
+            "placement over pose scenarios; `--pose-errors` says what the 5 % quantile loses",
         ),
         Row(
             "a sensor's own error",

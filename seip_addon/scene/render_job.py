@@ -1,0 +1,30 @@
+"""Renders a scene's view in a Blender of its own; `render.render_elsewhere` starts it.
+
+blender -b --factory-startup -P render_job.py -- job.json
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import bpy
+
+
+def main(job: Path) -> None:
+    """Render what a job asks for, and write beside the picture which sensors are hidden."""
+    asked = json.loads(job.read_text())
+    package = Path(__file__).resolve().parents[1]
+    sys.path[:] = [str(package.parent), *asked["path"]]
+    render = import_module(f"{package.name}.scene.render")  # no extension is installed here
+
+    bpy.ops.wm.open_mainfile(filepath=asked["blend"], load_ui=False, use_scripts=False)
+    raw = Path(asked["raw"])
+    hidden = render.take(render.Shot.from_json(asked["shot"]), bpy.data.scenes[asked["scene"]], raw)
+    raw.with_suffix(".json").write_text(json.dumps(hidden.tolist()))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[sys.argv.index("--") + 1]))

@@ -1,0 +1,195 @@
+"""Sensors that hands have moved: nothing puts them back, and they are judged, kept and exported as what they are."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from seip_addon import hand, live, pointing, state
+from seip_addon.core.comparison import unpacked_counts
+from seip_addon.core.goal import MOVED, MOVED_SENTENCE
+from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.scene import result_folder
+from seip_addon.scene.result_folder import FILES
+from tests.json_schema import violations
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = ROOT / "scenes" / "junction.blend"
+
+
+@pytest.fixture
+def placed(add_on, tmp_path):
+    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
+    scene = bpy.context.scene
+    scene.seip.survey.heights = "8"
+    scene.seip.survey.grid = 4.0
+    scene.seip.survey.spacing = 12.0
+    scene.seip.goal.count = 3
+    scene.seip.result.folder = str(tmp_path / "out")
+    bpy.ops.seip.solve_placement()
+    return scene
+
+
+def move(scene: bpy.types.Scene) -> None:
+    """Lower and turn S1 in all ways, and delete S3."""
+    sensors = pointing.sensor_empties(scene)
+    sensors["S1"].location.z -= 3.0
+    sensors["S1"].rotation_euler = (0.1, 0.2, 0.3)
+    bpy.data.objects.remove(sensors["S3"])
+    bpy.context.view_layer.update()
+
+
+def record(scene: bpy.types.Scene) -> dict:
+    return json.loads(scene.seip.result.record)
+
+
+def full_scan(scene: bpy.types.Scene) -> np.ndarray:
+    """Return which targets the sensors see as followed sensors do, which go another way through the code."""
+    bpy.ops.seip.follow_sensors()
+    seen = np.sum([row for _, row in live.following.sensors.values()], axis=0)
+    assert live.following.moved == ()
+    live.stop()
+    return seen
+
+
+def test_moved_sensors_are_neither_exported_nor_kept_as_what_they_were(placed):
+    move(placed)
+    for operator in (bpy.ops.seip.export_result, bpy.ops.seip.keep_placement):
+        with pytest.raises(RuntimeError, match=r"By hand: S1 moved; S3 deleted\. Press Judge as They Hang"):
+            operator()
+
+
+def test_moved_sensors_are_judged_where_they_hang(placed):
+    before = record(placed)
+    move(placed)
+    pose = pointing.sensor_empties(placed)["S1"].matrix_world.copy()
+    assert bpy.ops.seip.judge_sensors() == {"FINISHED"}
+    assert pointing.sensor_empties(placed)["S1"].matrix_world == pose
+    assert not hand.changes(placed)
+    now = record(placed)
+    assert [line["id"] for line in now["sensors"]] == ["S1", "S2"]
+    first, second = now["sensors"]
+    assert first["pose"] is None
+    assert first["position"] == f"by hand, from {before['sensors'][0]['position']}"
+    assert first["local_m"] == pytest.approx(list(pose.translation), abs=1e-5)
+    assert [first[f"{name}_deg"] for name in ("roll", "tilt", "yaw")] == pytest.approx(
+        [math.degrees(angle) for angle in (0.1, 0.2, 0.3)], abs=1e-4
+    )
+    assert first["height_m"] == pytest.approx(5.0, abs=0.2)
+    assert {**second, **dict.fromkeys(("coverage_added", "coverage_marginal"))} == {
+        **before["sensors"][1],
+        **dict.fromkeys(("coverage_added", "coverage_marginal")),
+    }
+    objective = now["objective"]
+    assert (objective["status"], objective["bound"], objective["gap"]) == (MOVED, None, None)
+    assert now["price_usd"] == sum(line["price_usd"] for line in now["sensors"])
+    seen = unpacked_counts(placed.seip.result.seen)
+    assert (full_scan(placed) == seen).all()
+    assert now["coverage"]["whole"] == pytest.approx((seen > 0).mean(), abs=1e-9)
+    assert now["coverage"]["whole"] != before["coverage"]["whole"]
+    assert bpy.data.objects["Coverage"]["seip_coverage"] == pytest.approx(now["coverage"]["whole"])
+    schema = json.loads((ROOT / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
+    assert violations(now, schema) == []
+
+
+def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_path):
+    bpy.ops.seip.keep_placement(name="placed")
+    move(placed)
+    bpy.ops.seip.judge_sensors()
+    bpy.ops.seip.keep_placement(name="by hand")
+    assert [json.loads(one.record)["objective"]["status"] for one in placed.seip.kept] == ["optimal", MOVED]
+    placed.seip.active_kept = 0
+    assert bpy.ops.seip.show_comparison() == {"FINISHED"}
+    assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
+    there = {name: thing.matrix_world.copy() for name, thing in pointing.sensor_empties(placed).items()}
+    assert bpy.ops.seip.export_result() == {"FINISHED"}
+    assert {name: thing.matrix_world for name, thing in pointing.sensor_empties(placed).items()} == there
+    out = tmp_path / "out"
+    written = load_placement_record(out / "placement.json")
+    assert comparable(written) == comparable(record(placed))
+    rows = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
+    chosen = {row["chosen"]: row for row in rows if row["chosen"]}
+    assert chosen.keys() == {"S1", "S2"}
+    assert (chosen["S1"]["pose"], chosen["S1"]["rank"]) == ("", "")
+    assert float(chosen["S1"]["z_m"]) == pytest.approx(there["S1"].translation.z, abs=1e-3)
+    spawned = json.loads((out / "carla_spawn.json").read_text(encoding="utf-8"))[0]["transform"]
+    assert spawned["rotation"]["roll"] == pytest.approx(math.degrees(0.1), abs=1e-4)
+    assert spawned["rotation"]["pitch"] == pytest.approx(-math.degrees(0.2), abs=1e-4)
+    bpy.ops.wm.open_mainfile(filepath=str(out / "placed.blend"))
+    scene = bpy.context.scene
+    assert {name: thing.matrix_world for name, thing in pointing.sensor_empties(scene).items()} == there
+    assert not hand.changes(scene)
+    assert bpy.ops.seip.export_result() == {"FINISHED"}  # found again from the file and the cache
+    assert comparable(load_placement_record(out / "placement.json")) == comparable(written)
+    again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
+    assert again == rows
+    assert state.find(scene).plan.certificate == MOVED_SENTENCE
+
+
+def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):
+    first = pointing.sensor_empties(placed)["S1"]
+    copy = first.copy()
+    copy.location.x += 5.0
+    bpy.data.collections["SEIP Sensors"].objects.link(copy)
+    bpy.context.view_layer.update()
+    bpy.ops.seip.judge_sensors()
+    assert [line["id"] for line in record(placed)["sensors"]] == ["S1", "S2", "S3", "S4"]
+    first.location.z -= 100.0
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match=r"sensor S1 is 9\d\.\d\d m below the ground: lift it"):
+        bpy.ops.seip.judge_sensors()
+
+
+def test_undo_brings_the_placement_back_that_was_moved(placed):
+    before = placed.seip.result.record
+    bpy.ops.ed.undo_push(message="placed")
+    move(placed)
+    bpy.ops.ed.undo_push(message="moved")
+    bpy.ops.seip.judge_sensors()
+    bpy.ops.ed.undo_push(message="judged")
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    assert scene.seip.result.record == before
+    assert not hand.changes(scene)
+
+
+def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed, tmp_path, monkeypatch):
+    bpy.ops.seip.export_result()
+    out = tmp_path / "out"
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert before.keys() == set(FILES) - {"view.png"}
+    placed.seip.goal.count = 1
+    bpy.ops.seip.solve_placement()
+    work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)
+    for _ in range(3):
+        next(work)
+    work.close()  # as Stop does
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(result_folder, "save_plan_view", full)
+    with pytest.raises(RuntimeError, match="No space left on device"):
+        bpy.ops.seip.export_result()
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    monkeypatch.undo()
+    monkeypatch.setattr("seip_addon.preferences.cache_folder", lambda: tmp_path / "cache")
+    bpy.ops.seip.export_result()
+    assert (out / "placement.json").read_bytes() != before["placement.json"]
+
+
+@pytest.mark.slow
+def test_the_view_is_rendered_elsewhere_and_ends_with_who_asked(placed, tmp_path):
+    placed.seip.result.render = True
+    work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)
+    rendering = [progress.done for progress in work if progress.what == "rendering"]
+    assert rendering == sorted(rendering)
+    assert rendering[-1] > rendering[0] == 0
+    assert (tmp_path / "out" / "view.png").stat().st_size > 50_000
+    assert load_placement_record(tmp_path / "out" / "placement.json")["settings"]["render"] is True
