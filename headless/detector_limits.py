@@ -126,7 +126,12 @@ def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[Configur
     layout = surveyed.layout
     settings = layout.settings
     return case_study.place_all(
-        layout.site, layout.models, surveyed.grid, solver=settings.solver, time_limit=settings.time_limit
+        layout.site,
+        layout.models,
+        surveyed.grid,
+        solver=settings.solver,
+        time_limit=settings.time_limit,
+        effort=settings.effort,
     )
 
 

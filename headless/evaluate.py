@@ -114,8 +114,9 @@ def set_stage(options: argparse.Namespace) -> Stage:
         surveyed.layout.site,
         surveyed.layout.models,
         surveyed.grid,
-        solver=options.solver,
-        time_limit=options.time_limit,
+        solver=surveyed.layout.settings.solver,
+        time_limit=surveyed.layout.settings.time_limit,
+        effort=surveyed.layout.settings.effort,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)

@@ -74,7 +74,15 @@ def _studied(surveyed: survey.Survey, goal: Goal, options: argparse.Namespace) -
     instants = spread_instants(to_choose_on, options.instants, options.seed)
     scenarios = watch.run("looks at traffic", look_at_traffic(around, problem, instants, options.see))
     judged = spread_instants(to_judge_in, options.judged_at, options.seed + 1)
-    steps = traffic_study(around, problem, scenarios, judged, solver=settings.solver, time_limit=settings.time_limit)
+    steps = traffic_study(
+        around,
+        problem,
+        scenarios,
+        judged,
+        solver=settings.solver,
+        time_limit=settings.time_limit,
+        effort=settings.effort,
+    )
     return watch.run("placement in traffic", steps)
 
 

@@ -287,7 +287,15 @@ def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
     choose, judge = stage.scope.instants
     scenarios = yield from look_at_traffic(around, problem, spread_instants(to_choose_on, choose, seed=0))
     judged = spread_instants(to_judge_in, judge, seed=1)
-    steps = traffic_study(around, problem, scenarios, judged, solver=settings.solver, time_limit=settings.time_limit)
+    steps = traffic_study(
+        around,
+        problem,
+        scenarios,
+        judged,
+        solver=settings.solver,
+        time_limit=settings.time_limit,
+        effort=settings.effort,
+    )
     study = yield from steps
     chosen = study.traffic.placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
@@ -322,7 +330,7 @@ def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
 
 def _settings(stage: Stage) -> RobustSettings:
     settings = stage.surveyed.layout.settings
-    return replace(stage.scope.robust, solver=settings.solver, time_limit=settings.time_limit)
+    return replace(stage.scope.robust, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
 
 
 def _lead(stage: Stage) -> str:

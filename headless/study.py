@@ -27,7 +27,14 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=1)))
     site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
-    steps = coverage_study(site, surveyed.layout.models, visible, solver=options.solver, time_limit=options.time_limit)
+    steps = coverage_study(
+        site,
+        surveyed.layout.models,
+        visible,
+        solver=surveyed.layout.settings.solver,
+        time_limit=surveyed.layout.settings.time_limit,
+        effort=surveyed.layout.settings.effort,
+    )
     study = surveyed.stopwatch.run("study", steps)
     claims = judge(study)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
@@ -115,7 +116,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     work.add_argument(
         "--solver", default="auto", help="auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi"
     )
-    work.add_argument("--time-limit", type=float, default=60.0, metavar="S", help="for each answer, in seconds")
+    work.add_argument(
+        "--time-limit", type=float, metavar="S", help="for each answer, in seconds (default: 60, or none with --effort)"
+    )
+    work.add_argument(
+        "--effort",
+        type=float,
+        metavar="UNITS",
+        default=math.inf,
+        help="for each answer, in units of counted work, each about a second of one core: the same answer every time",
+    )
 
 
 Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
@@ -182,6 +192,13 @@ def sensor_in_words(sensor: Sensor) -> str:
     return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
 
 
+def time_limit_of(options: argparse.Namespace) -> float:
+    """Return the limit of time for each answer; where work is limited there is none unless it is asked for."""
+    if options.time_limit is None:
+        return math.inf if math.isfinite(options.effort) else SurveySettings().time_limit
+    return float(options.time_limit)
+
+
 def _settings(options: argparse.Namespace) -> SurveySettings:
     return SurveySettings(
         candidates=CandidateSettings(
@@ -199,7 +216,8 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         catalogue=tuple(options.catalogue),
         engine=options.engine,
         solver=options.solver,
-        time_limit=options.time_limit,
+        time_limit=time_limit_of(options),
+        effort=options.effort,
     )
 
 
@@ -217,7 +235,7 @@ class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
     """Help that names the default of each option that has one."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        return action.help if action.default in (None, []) else super()._get_help_string(action)
+        return action.help if action.default in (None, [], math.inf) else super()._get_help_string(action)
 
 
 def _several(numbers_of: Callable[[list[str]], tuple[float, ...]]) -> type[argparse.Action]:

@@ -256,6 +256,16 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         min=1.0,
         soft_max=3600.0,
     )
+    effort: FloatProperty(
+        name="Effort",
+        description=(
+            "Limit the search by counted work instead of time: about a second of one processor core for each unit, "
+            "and the same placement again on every run. 0: limit the time"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=3600.0,
+    )
 
     def settings(self) -> SurveySettings:
         """Return what is asked, as the core takes it.
@@ -282,7 +292,8 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             catalogue=catalogue_files(),
             engine=self.engine,
             solver=self.solver,
-            time_limit=_written(self.time_limit),
+            time_limit=math.inf if self.effort else _written(self.time_limit),
+            effort=_written(self.effort) if self.effort else math.inf,
         )
 
 

@@ -344,7 +344,7 @@ def _same_grid(one: SurveySettings, other: SurveySettings) -> bool:
 
 def _without_search(settings: SurveySettings) -> SurveySettings:
     default = SurveySettings()
-    return replace(settings, solver=default.solver, time_limit=default.time_limit)
+    return replace(settings, solver=default.solver, time_limit=default.time_limit, effort=default.effort)
 
 
 def _is_of(record: Record, known: Held) -> bool:

@@ -227,7 +227,7 @@ def padded(some: Sequence[Pupil]) -> list[Pupil]:
 
 
 def place_all(
-    site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, *, solver: str, time_limit: float
+    site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, *, solver: str, time_limit: float, effort: float
 ) -> Generator[Progress, None, tuple[Configuration, ...]]:
     """Place 1, 2 and 4 sensors of each type where they cover most.
 
@@ -242,7 +242,7 @@ def place_all(
     for done, cell in enumerate(cells):
         progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
         yield progress
-        steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit)
+        steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit, effort=effort)
         placed.append((yield from within(progress, steps)))
     yield Progress(len(cells), len(cells), "placed")
     return tuple(Configuration(case) for case in placed)

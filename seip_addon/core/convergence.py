@@ -215,7 +215,13 @@ class Judge:
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
         return (
             yield from make_plan(
-                site, grid.visible, self._models, self._goal, solver=settings.solver, time_limit=settings.time_limit
+                site,
+                grid.visible,
+                self._models,
+                self._goal,
+                solver=settings.solver,
+                time_limit=settings.time_limit,
+                effort=settings.effort,
             )
         )
 

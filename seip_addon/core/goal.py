@@ -175,7 +175,7 @@ def check_goal(site: Site, models: Mapping[str, LidarModel], goal: Goal) -> None
     placement_problem(site, everything, models, goal)
 
 
-def make_plan(  # a place, what is asked of it, and how hard to try
+def make_plan(  # noqa: PLR0913 -- a problem, and the limits of its solution
     site: Site,
     visible: NDArray[np.bool_],
     models: Mapping[str, LidarModel],
@@ -183,6 +183,7 @@ def make_plan(  # a place, what is asked of it, and how hard to try
     *,
     solver: str = "highs",
     time_limit: float = 60.0,
+    effort: float = math.inf,
 ) -> Generator[Progress, None, Plan]:
     """Answer a goal on a site: the most coverage, or the least price for a coverage.
 
@@ -197,6 +198,8 @@ def make_plan(  # a place, what is asked of it, and how hard to try
     solver : str
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds
+    effort : float, units of work
+        As for `placement.solve`.
 
     Yields
     ------
@@ -213,10 +216,12 @@ def make_plan(  # a place, what is asked of it, and how hard to try
     """
     problem = placement_problem(site, visible, models, goal)
     if goal.coverage is not None:
-        placement = yield from cheapest_for_coverage(problem, goal.coverage, solver=solver, time_limit=time_limit)
+        placement = yield from cheapest_for_coverage(
+            problem, goal.coverage, solver=solver, time_limit=time_limit, effort=effort
+        )
         greedy = None
     else:
-        placement = yield from solve(problem, solver=solver, time_limit=time_limit)
+        placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
         greedy = solve_greedy(problem)
     return Plan(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
 

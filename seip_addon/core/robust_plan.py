@@ -110,6 +110,7 @@ def place_robustly(
         seed=precaution.seed,
         solver=layout.settings.solver,
         time_limit=layout.settings.time_limit,
+        effort=layout.settings.effort,
     )
     problem = placement_problem(site, grid.visible, models, goal)
     study = yield from robust_study(around, problem, settings, [precaution.risk])

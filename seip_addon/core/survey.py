@@ -58,6 +58,8 @@ class SurveySettings:
         ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
     time_limit : float, seconds
         For each answer.
+    effort : float, units of work
+        Alike, but counted, so that an answer can be had again: see `placement.solve`.
     spacings_because : str
         Why the spacings of targets and candidates are what they are; empty where the user chose them.
     """
@@ -69,6 +71,7 @@ class SurveySettings:
     engine: Engine = "auto"
     solver: str = "auto"
     time_limit: float = 60.0
+    effort: float = math.inf
     spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
@@ -95,7 +98,8 @@ class SurveySettings:
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
             "solver": self.solver,
-            "time_limit_s": self.time_limit,
+            "time_limit_s": self.time_limit if math.isfinite(self.time_limit) else None,
+            "effort": self.effort if math.isfinite(self.effort) else None,
             "spacings_because": self.spacings_because,
         }
 
@@ -212,7 +216,15 @@ def place(
     else.
     """
     site, models, settings = layout.site, layout.models, layout.settings
-    steps = make_plan(site, grid.visible, models, goal, solver=settings.solver, time_limit=settings.time_limit)
+    steps = make_plan(
+        site,
+        grid.visible,
+        models,
+        goal,
+        solver=settings.solver,
+        time_limit=settings.time_limit,
+        effort=settings.effort,
+    )
     plan = yield from steps
     notes = [*plan.placement.notes]
     if plan.placement.status == "optimal" and not goal.cheapest:

@@ -124,7 +124,11 @@ class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(context.scene.seip.survey, "solver")
-        layout.prop(context.scene.seip.survey, "time_limit")
+        limits = layout.column(align=True)
+        row = limits.row(align=True)
+        row.active = context.scene.seip.survey.effort == 0
+        row.prop(context.scene.seip.survey, "time_limit")
+        limits.prop(context.scene.seip.survey, "effort")
 
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

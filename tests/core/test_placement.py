@@ -26,6 +26,7 @@ from seip_addon.core.placement import (
     solve_greedy,
     ties,
 )
+from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import common_unit, make_instance, merge_targets
 from seip_addon.core.placement.integer_program import Outcome, cover_by_cliques
 from seip_addon.core.progress import Progress, finish
@@ -378,3 +379,53 @@ def test_posts_exactly_as_far_apart_as_asked_for_may_both_carry_a_sensor(offset)
         min_distance=0.3,
     )
     assert len(finish(solve(problem)).chosen) == 3
+
+
+def hard_problem() -> PlacementProblem:
+    """Return a problem whose proof takes minutes: sensors that overlap a little everywhere."""
+    visible = np.random.default_rng(7).random((150, 900)) < 0.12
+    return replace(street_problem(150, 900, heights=1), visible=visible, count=8)
+
+
+@pytest.mark.parametrize("solver", ["highs", "cbc"])
+def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
+    first, again = (finish(solve(hard_problem(), solver=solver, time_limit=math.inf, effort=0.3)) for _ in range(2))
+    assert first.status == "feasible"
+    assert [(one.chosen.tolist(), one.objective, one.bound, one.notes) for one in (first, again)] == 2 * [
+        (first.chosen.tolist(), first.objective, first.bound, first.notes)
+    ]
+
+
+def test_more_effort_proves_no_less() -> None:
+    little, more = (finish(solve(hard_problem(), time_limit=math.inf, effort=effort)) for effort in (0.1, 1.0))
+    assert little.objective <= more.objective <= more.bound < little.bound
+
+
+def test_an_answer_that_is_not_proven_says_what_more_time_does() -> None:
+    short, longer = (finish(solve(hard_problem(), time_limit=math.inf, effort=effort)) for effort in (1.0, 8.0))
+    assert "hardly closed in the second half of the time" in short.notes[1]
+    assert "at half the time and is" in longer.notes[1]
+
+
+@pytest.mark.parametrize("effort", [0.0, -1.0, math.nan])
+def test_an_effort_is_positive(effort: float) -> None:
+    with pytest.raises(SeipError, match=r"the effort is .* units of work; give a positive number"):
+        finish(solve(row_problem(halves), effort=effort))
+
+
+def test_breaking_ties_takes_no_longer_than_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    # all is seen by many choices: the proof is quick, the ties are many
+    visible = np.random.default_rng(1).random((300, 200)) < 0.5
+    problem = replace(street_problem(300, 200, heights=1), visible=visible, count=12)
+    clock, proven = Clock(math.inf), []
+    broken = exact.canonical_optimum
+
+    def noted(*arguments: object) -> object:
+        proven.append(clock.work)
+        return broken(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(exact, "canonical_optimum", noted)
+    placement = finish(exact.solve_within(problem, "highs", clock))
+    assert placement.status == "optimal"
+    assert any("not all ties were broken" in note for note in placement.notes)
+    assert clock.work < proven[0] + 1.1 * max(proven[0], exact.LEAST_FOR_TIES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
@@ -143,6 +144,7 @@ def coverage_study(
     *,
     solver: str = "highs",
     time_limit: float = 60.0,
+    effort: float = math.inf,
 ) -> Generator[Progress, None, CoverageStudy]:
     """Solve every cell: each type, each height alone and all together, N = 1, 2, 4; then a sweep of central weights.
 
@@ -159,6 +161,8 @@ def coverage_study(
     solver : str
     time_limit : float, seconds
         For each cell.
+    effort : float, units of work
+        As for `placement.solve`.
 
     Returns
     -------
@@ -180,7 +184,7 @@ def coverage_study(
         progress = Progress(done, len(plan), f"{cell.sensor}, {at}, N = {cell.count}, central weight {cell.weight:g}")
         yield progress
         try:
-            steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit)
+            steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit, effort=effort)
             cells.append((yield from within(progress, steps)))
         except SeipError as error:
             cells.append(EmptyCell(**vars(cell), note=str(error)))
@@ -190,7 +194,7 @@ def coverage_study(
     return CoverageStudy(sensors, heights, tuple(cells), len(site.targets))
 
 
-def solve_cell(
+def solve_cell(  # noqa: PLR0913 -- a problem, and the limits of its solution
     site: Site,
     models: Mapping[str, LidarModel],
     visible: NDArray[np.bool_],
@@ -198,6 +202,7 @@ def solve_cell(
     *,
     solver: str,
     time_limit: float,
+    effort: float,
 ) -> Generator[Progress, None, Case]:
     """Solve one cell; the arguments are those of `coverage_study`.
 
@@ -211,6 +216,6 @@ def solve_cell(
         allowed &= site.candidates.height == cell.height
     goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
-    placement = yield from solve(problem, solver=solver, time_limit=time_limit)
+    placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
     deployment = deploy(site, models, visible, placement.chosen)
     return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

@@ -163,6 +163,7 @@ class Search:
                 return False
             yield Progress(0, 0, f"searching placements, {self._met:,} branches so far")
             self._met += 1
+            clock.spend(len(self.instance))
             self._push((yield from self._expand(self._pop())))
         return True
 

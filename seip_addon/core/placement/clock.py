@@ -10,6 +10,9 @@ from ..errors import SeipError
 OPERATIONS = 1e10
 """Multiplications that make a unit of work: about a second of one processor core."""
 
+OVERHEAD = 3e6
+"""Multiplications that take as long as what goes on around each counted step."""
+
 SHORTEST = 0.01
 """Seconds, or units of work, of a part of a limit where nothing is left."""
 
@@ -52,8 +55,8 @@ class Clock:
         self.work = 0.0
 
     def spend(self, operations: float) -> None:
-        """Count some multiplications as work."""
-        self.work += operations / OPERATIONS
+        """Count a step of so many multiplications as work."""
+        self.work += (operations + OVERHEAD) / OPERATIONS
         if self._whole is not None:
             self._whole.spend(operations)
 

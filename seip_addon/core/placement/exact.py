@@ -337,11 +337,11 @@ def _outlook(instance: Instance, proof: Proof) -> list[str]:
     before, now = (bound / value - 1 for bound in (proof.halfway, proof.bound))
     if before - now < SLOW * before:
         slow = (
-            "the gap has hardly closed in the second half of the time: more of it helps little; fewer candidates "
-            "(a larger spacing, fewer heights) or fewer sensors make a proof easier"
+            "the gap has hardly closed in the second half of the time: a proof may take many times as long; fewer "
+            "candidates (a larger spacing, fewer heights) or fewer sensors make it easier"
         )
         return [slow]
-    return [f"the gap was {before:.2%} at half the time and is {now:.2%} now: a longer time limit closes more of it"]
+    return [f"the gap was {before:.2%} at half the time and is {now:.2%} now: a longer time limit may close more of it"]
 
 
 def _surplus(asked: int, used: int) -> str:

@@ -162,6 +162,8 @@ class CoverProgram:
 
         The solver works in a thread of its own; when the generator is closed it is told to stop.
         """
+        if clock.left <= 0:
+            return Outcome(None, math.inf, finished=False)
         self.model.setObjective(objective)
         ends = clock.elapsed + share * clock.left
         size = np.count_nonzero(self.instance.visible) + len(self.x)

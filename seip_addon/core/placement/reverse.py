@@ -74,7 +74,12 @@ def cheapest_for_coverage(
     whole = math.fsum(problem.weights) * factor
     goal = instance.attainable(coverage * whole)
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
-    cheapest, bound = yield from _cheapest(instance, without_idle(instance, chosen, goal), goal, solver, clock)
+    chosen = without_idle(instance, chosen, goal)
+    if problem.prices.any():
+        cheapest, bound = yield from _cheapest(instance, chosen, goal, solver, clock)
+    else:
+        cheapest, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        bound = 0.0 if proven else -math.inf
     finishing = clock.part(clock.elapsed, FINISH)  # no longer than it took to find the price
     best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
     reached = best.covered * factor >= goal - instance.margin
@@ -110,14 +115,8 @@ def _reaching(
 def _cheapest(
     instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Integer, float]]:
-    """Return the cheapest placement that reaches the goal and a lower bound on the price of any.
-
-    Where all prices are zero the bound is -inf unless no fewer sensors suffice.
-    """
+    """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
     price = math.fsum(instance.price[chosen])
-    if not instance.price.any():
-        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
-        return chosen, 0.0 if proven else -math.inf
     if price == 0:
         return chosen, price
     no_dearer = replace(instance, budget=min(price, instance.budget))
@@ -151,7 +150,7 @@ def _below(price: float, prices: Float) -> float:
 
 def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
     """Return the problem of covering most for the price of the cheapest placement."""
-    if np.ptp(instance.price) == 0:
+    if np.ptp(instance.price) == 0 and (instance.price.any() or not problem.prices.any()):
         return replace(problem, count=len(cheapest))
     return replace(problem, budget=math.fsum(instance.price[cheapest]))
 

@@ -39,6 +39,7 @@ from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..placement import Placement, PlacementProblem, solve
 from ..placement.clock import Clock
+from ..placement.exact import solve_within
 from ..placement.feasibility import starting_choice
 from ..placement.instance import Instance, common_unit, make_instance, merge_targets
 from ..placement.problem import TIE, relative_gap
@@ -55,7 +56,7 @@ FORESEEING = 0.5
 """Share of the time for the problems of single scenarios."""
 
 LEAST_SECONDS = 1.0
-"""For what comes after them, however slow they were."""
+"""Or units of work, for what comes after them, however slow they were."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +78,14 @@ class RobustPlacement:
     outcomes: Float
 
 
-def solve_robust(
+def solve_robust(  # noqa: PLR0913 -- a problem, and the limits of its solution
     problem: PlacementProblem,
     scenarios: Views,
     risk: Risk,
     *,
     solver: str = "highs",
     time_limit: float = 60.0,
+    effort: float = math.inf,
     foreseen: Sequence[Placement] | None = None,
 ) -> Generator[Progress, None, RobustPlacement]:
     """Choose the placement that has the least to fear.
@@ -100,6 +102,8 @@ def solve_robust(
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds
         After it the best placement found is returned with its bound and gap.
+    effort : float, units of work
+        As for `placement.solve`.
     foreseen : sequence of Placement, optional
         See `foresee`; found within the time limit if not given, and only of use where one look is enough.
 
@@ -124,21 +128,27 @@ def solve_robust(
     different = _without_copies(scenarios)
     plain = risk.seen_by == 1 and risk.failure == "none"
     if plain and len(different) == 1:
-        placement = yield from solve(replace(problem, visible=different.seen(0)), solver=solver, time_limit=time_limit)
+        planned = replace(problem, visible=different.seen(0))
+        placement = yield from solve(planned, solver=solver, time_limit=time_limit, effort=effort)
         placement = replace(placement, covered=_covered(problem, placement.chosen))
         return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
-    clock = Clock(time_limit)
+    clock = Clock(time_limit, effort)
     if foreseen is None and risk.seen_by == 1:
-        foreseen = yield from foresee(problem, different, solver=solver, time_limit=FORESEEING * time_limit)
-    placement = yield from _searched(problem, different, risk, solver, max(clock.left, LEAST_SECONDS))
+        foreseen = yield from _foreseen(problem, different, solver, clock.part(FORESEEING * clock.left))
+    placement = yield from _searched(problem, different, risk, solver, clock.part(math.inf, LEAST_SECONDS))
     if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
         placement = _with_foresight(problem, different, risk, placement, foreseen)
-    placement = replace(placement, seconds=clock.elapsed)
+    placement = replace(placement, seconds=clock.seconds)
     return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
 
 
 def foresee(
-    problem: PlacementProblem, scenarios: Views, *, solver: str = "highs", time_limit: float = 60.0
+    problem: PlacementProblem,
+    scenarios: Views,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
     """Solve each scenario as if it were known that it comes: no placement does better there.
 
@@ -149,6 +159,8 @@ def foresee(
     solver : str
     time_limit : float, seconds
         For all of them.
+    effort : float, units of work
+        For all of them, as for `placement.solve`.
 
     Yields
     ------
@@ -159,16 +171,20 @@ def foresee(
     tuple of Placement
         One for each scenario; one alone where all are the same.
     """
-    scenarios = _without_copies(scenarios)
-    clock = Clock(time_limit)
+    return (yield from _foreseen(problem, _without_copies(scenarios), solver, Clock(time_limit, effort)))
+
+
+def _foreseen(
+    problem: PlacementProblem, scenarios: Views, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Placement, ...]]:
     found = []
     for scenario in range(len(scenarios)):
         here = Progress(scenario, len(scenarios), "solving each scenario by itself")
         yield here
         alone = replace(problem, visible=scenarios.seen(scenario))
         # what the quick ones leave goes to those that follow
-        seconds = max(clock.left / (len(scenarios) - scenario), LEAST_SECONDS)
-        found.append((yield from within(here, solve(alone, solver=solver, time_limit=seconds))))
+        part = clock.part(clock.left / (len(scenarios) - scenario), LEAST_SECONDS)
+        found.append((yield from within(here, solve_within(alone, solver, part))))
     return tuple(found)
 
 
@@ -257,10 +273,9 @@ def _covered(problem: PlacementProblem, chosen: Integer) -> float:
 
 
 def _searched(
-    problem: PlacementProblem, scenarios: Views, risk: Risk, solver: str, time_limit: float
+    problem: PlacementProblem, scenarios: Views, risk: Risk, solver: str, clock: Clock
 ) -> Generator[Progress, None, Placement]:
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
-    clock = Clock(time_limit)
     yield Progress(0, 0, "reducing the scenarios' targets")
     whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
     game = _Game(problem, scenarios, risk, whole)
@@ -269,7 +284,7 @@ def _searched(
     search = RobustSearch(game.cover(share), game.unit(share), game.judge, chosen, TIE * math.fsum(problem.weights))
     found = yield from search.run(clock)
     notes = () if found.finished else ("the time was too short to prove this placement the best: the gap says how far",)
-    return _record(problem, whole.original[found.chosen], found.value, found.bound, notes, clock.elapsed)
+    return _record(problem, whole.original[found.chosen], found.value, found.bound, notes, clock.seconds)
 
 
 def _record(  # what is known of a placement
@@ -345,6 +360,7 @@ class _Game:
             if clock.left < 0:
                 break
             yield Progress(played, ROUNDS, "weighing the scenarios")
+            clock.spend(2 * self._scenarios.packed.size * 8)
             seen = _seen(self._scenarios, self._whole.original[chosen])
             share[self._risk.worst(self._risk.outcomes(seen, self._weight, self._sensors))] += 1
             chosen = yield from exchanged(self.cover(share), chosen)

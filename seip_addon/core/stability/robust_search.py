@@ -62,6 +62,9 @@ RELAXED, WIDE = 2, 40
 Only where each sensor adds less than the one before it: elsewhere branching itself tightens the bound, and sooner.
 """
 
+COPY = 8
+"""Multiplications for each entry of V that count as the work of one branch."""
+
 OPEN = 10_000
 """Branches that wait to be taken by their bounds; with so many, those below one are searched before any other."""
 
@@ -386,6 +389,7 @@ class RobustSearch:
         queue, dive, nodes = [(-first.bound, 0, first)], list[_Node](), 0
         while (queue or dive) and clock.left > 0:
             yield Progress(0, 0, f"searching placements, {nodes:,} branches so far")
+            clock.spend(self._cover.matrix.size * COPY)
             node = dive.pop() if dive else heappop(queue)[2]
             for child in reversed((yield from self._expand(node))):
                 nodes += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -40,6 +41,8 @@ class RobustSettings:
     solver : str
     time_limit : float, seconds
         For each placement.
+    effort : float, units of work
+        As for `placement.solve`.
     """
 
     errors: PoseErrors = field(default_factory=PoseErrors)
@@ -48,6 +51,7 @@ class RobustSettings:
     seed: int = 0
     solver: str = "highs"
     time_limit: float = 60.0
+    effort: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,17 +155,25 @@ def robust_study(
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
     scenarios = yield from disturbed_views(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
-    nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit)
+    nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
     foreseen = None
     if any(risk.seen_by == 1 for risk in risks):
-        foreseen = yield from foresee(problem, spread, solver=settings.solver, time_limit=settings.time_limit)
+        foreseen = yield from foresee(
+            problem, spread, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort
+        )
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
     entries = [_Entry("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.in_words()}")
         yield here
         steps = solve_robust(
-            problem, spread, risk, solver=settings.solver, time_limit=settings.time_limit, foreseen=foreseen
+            problem,
+            spread,
+            risk,
+            solver=settings.solver,
+            time_limit=settings.time_limit,
+            effort=settings.effort,
+            foreseen=foreseen,
         )
         found: RobustPlacement = yield from within(here, steps)
         placed = at_least(found.placement, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))

@@ -7,6 +7,7 @@ stretches of time (`mean_over_time`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -172,7 +173,7 @@ def look_at_traffic(
     return Scenarios(layer, spread.seen(0), Views(spread.packed[1:], spread.targets))
 
 
-def traffic_study(
+def traffic_study(  # noqa: PLR0913 -- a problem, and the limits of its solution
     around: Surroundings,
     problem: PlacementProblem,
     scenarios: Scenarios,
@@ -180,6 +181,7 @@ def traffic_study(
     *,
     solver: str = "highs",
     time_limit: float = 60.0,
+    effort: float = math.inf,
 ) -> Generator[Progress, None, TrafficStudy]:
     """Place for the empty road and on traffic, and judge both at other instants.
 
@@ -194,6 +196,8 @@ def traffic_study(
     solver : str
     time_limit : float, seconds
         For each placement.
+    effort : float, units of work
+        As for `placement.solve`.
 
     Yields
     ------
@@ -204,8 +208,10 @@ def traffic_study(
     TrafficStudy
     """
     problem = replace(problem, visible=scenarios.empty)
-    empty = yield from solve(problem, solver=solver, time_limit=time_limit)
-    found = yield from solve_robust(problem, scenarios.views, Risk(), solver=solver, time_limit=time_limit)
+    empty = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+    found = yield from solve_robust(
+        problem, scenarios.views, Risk(), solver=solver, time_limit=time_limit, effort=effort
+    )
     reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
     placed = at_least(found.placement, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
