@@ -91,6 +91,7 @@ class SurveySettings:
 
     def as_record(self) -> dict[str, Any]:
         """Return the settings as records hold them: defaults included, values that JSON knows."""
+        limits = {"time_limit_s": self.time_limit, "effort": self.effort}
         return {
             "grid_spacing_m": self.grid_spacing,
             "candidates": _candidates_record(self.candidates),
@@ -98,9 +99,8 @@ class SurveySettings:
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
             "solver": self.solver,
-            "time_limit_s": self.time_limit if math.isfinite(self.time_limit) else None,
-            "effort": self.effort if math.isfinite(self.effort) else None,
             "spacings_because": self.spacings_because,
+            **{name: limit for name, limit in limits.items() if math.isfinite(limit)},
         }
 
 

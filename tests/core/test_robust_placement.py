@@ -146,6 +146,9 @@ class Branches:
         self.number -= 1
         return self.number + 1
 
+    def spend(self, operations):
+        pass
+
 
 @pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
 @pytest.mark.parametrize("open_branches", [10_000, 3])

@@ -38,7 +38,10 @@ RELAXED = 3
 """With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""
 
 WIDE = 60
-"""... where at least so many children are left."""
+"""... where at least so many children are left ..."""
+
+TRIALS, WORTHWHILE = 4, 0.5
+"""... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
 
 FIRST_STEPS, LATER_STEPS = 300, 100
 """Steps that the multipliers of the first node may take, and of each later one from its parent's."""
@@ -143,6 +146,7 @@ class Search:
         self._queue: list[tuple[tuple[float, int, int], _Node]] = []
         self._stack: list[_Node] = []
         self._serial = self._waiting = self._met = 0
+        self._left_over: dict[int, list[float]] = {}
         gains = self._matrix @ self._weight
         everyone = np.argsort(-gains, kind="stable")
         self._push([_Node(math.inf, (), 0.0, -math.inf, everyone, gains[everyone])])
@@ -213,8 +217,10 @@ class Search:
         if left == 1:
             self._take_leaves(node, children)
             return []
-        if left >= RELAXED and children >= WIDE:
+        if children >= WIDE and self._relaxation_pays(left):
+            before = children
             node, children = yield from self._relaxed(node, left, goal)
+            self._left_over.setdefault(left, []).append(children / before)
             if children == 0:
                 return []
         kept = self._children(node, children, left, goal)
@@ -281,6 +287,11 @@ class Search:
             count=left,
             budget=max(instance.budget * (1 + TIE) - spent, 0.0),
         )
+
+    def _relaxation_pays(self, left: int) -> bool:
+        """Whether enough children were cut where nodes with so many sensors to come were relaxed before."""
+        shares = self._left_over.get(left, [])
+        return left >= RELAXED and (len(shares) < TRIALS or sum(shares) <= WORTHWHILE * len(shares))
 
     def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
         """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
