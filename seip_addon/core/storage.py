@@ -7,11 +7,8 @@ import hashlib
 import json
 import os
 import tempfile
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -87,76 +84,6 @@ def save_json(path: str | os.PathLike[str], value: object) -> None:
     text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
     with whole_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
-
-
-@dataclass(frozen=True)
-class ArrayFile:
-    """A kind of file that holds named arrays and a header: npz, with JSON as the text ``header``.
-
-    Parameters
-    ----------
-    schema : str
-        What the files are, for programs.
-    version : int
-        Of their layout; files of another version are refused.
-    what : str
-        What a file holds, for messages: "visibility grid".
-    remedy : str
-        How to get a new one, for messages: "delete it and compute it again".
-    compressed : bool
-        Not worth its time for arrays of measurements, whose noise does not compress.
-    """
-
-    schema: str
-    version: int
-    what: str
-    remedy: str
-    compressed: bool = True
-
-    def save(self, path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write a header, whose values JSON knows, and arrays by their names."""
-        full = {"schema": self.schema, "version": self.version, **header}
-        text = json.dumps(full, ensure_ascii=False, allow_nan=False)
-        write = np.savez_compressed if self.compressed else np.savez
-        with whole_file(path) as temporary, temporary.open("wb") as file:
-            write(file, header=np.array(text), **dict(arrays))
-
-    @contextmanager
-    def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:
-        """Yield the header and the arrays; what a block trips over in them is the file's fault.
-
-        Raises
-        ------
-        SeipError
-            The file is not there, damaged, something else, or of another version.
-        """
-        try:
-            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
-            header = json.loads(str(arrays.pop("header")))
-            known = (header["schema"], header["version"]) == (self.schema, self.version)
-            if known:
-                yield header, arrays
-        except FileNotFoundError as error:
-            raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
-        except _DAMAGE as error:
-            raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
-        if not known:
-            raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
-
-
-_DAMAGE = (
-    OSError,
-    EOFError,
-    AttributeError,
-    ValueError,
-    LookupError,
-    TypeError,
-    RecursionError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What reading an npz, or taking from it what should be there, raises where the file is not what it should be."""
 
 
 def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
