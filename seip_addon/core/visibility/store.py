@@ -45,7 +45,7 @@ class PieceFolder:
         self._prefix = key[:16]
         for other in self._folder.glob("*.npz"):
             if not other.name.startswith(self._prefix):
-                other.unlink()
+                other.unlink(missing_ok=True)  # another process may be at it too
 
     def load(self, number: int) -> Rows | None:
         """Return a piece, or None where there is none that can be used."""
@@ -61,8 +61,7 @@ class PieceFolder:
 
     def remove(self) -> None:
         """Remove the folder, once the grid is whole."""
-        if self._folder.exists():
-            shutil.rmtree(self._folder)
+        shutil.rmtree(self._folder, ignore_errors=True)  # another process may have, or be at it too
 
     def _file(self, number: int) -> Path:
         return self._folder / f"{self._prefix}-{number:06d}.npz"
