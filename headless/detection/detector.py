@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 import pickle
 import struct
@@ -278,7 +277,7 @@ def _check_grid(grid: PillarGrid, settings: NetworkSettings) -> None:
         raise _ContentError(f"it is of pillars of {settings.pillar:g} m on a grid with pillars of {grid.pillar:g} m")
     places = (grid.west, grid.south, grid.bottom, grid.top)
     counts = (grid.columns, grid.rows)
-    if not all(isinstance(value, int | float) and math.isfinite(value) for value in places) or grid.bottom >= grid.top:
+    if not all(isinstance(value, int | float) and abs(value) <= 1e8 for value in places) or grid.bottom >= grid.top:
         raise _ContentError("its grid is nowhere")
     if not all(isinstance(count, int) and count > 0 for count in counts) or len(grid) > MOST_PILLARS:
         raise _ContentError("its grid has no or too many pillars")
