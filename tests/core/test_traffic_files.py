@@ -226,10 +226,9 @@ def test_a_senseless_size_is_refused(tmp_path, size):
         finish(read_vehicle_types([path]))
 
 
-@pytest.mark.parametrize(
-    "text", ["<net/>", '<net><location netOffset="nan,0"/></net>', '<net><location netOffset="here"/></net>']
-)
-def test_a_network_without_offset_is_refused(tmp_path, text):
+@pytest.mark.parametrize("offset", [None, "nan,0", "5,nan", "here", "1e300,0"])
+def test_a_network_without_offset_is_refused(tmp_path, offset):
+    text = "<net/>" if offset is None else f'<net><location netOffset="{offset}"/></net>'
     with pytest.raises(SeipError, match="no SUMO network"):
         read_net_offset(written(tmp_path, "n.xml", text))
 

@@ -126,6 +126,6 @@ def read_net_offset(path: str | os.PathLike[str]) -> Float:
         x, y = (float(number) for number in found[0].split(","))
     except (IndexError, ValueError):
         x = y = math.nan
-    if not max(abs(x), abs(y)) <= FARTHEST:
+    if not (abs(x) <= FARTHEST and abs(y) <= FARTHEST):
         raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml")
     return np.array([x, y])
