@@ -413,7 +413,19 @@ def _blends(folder: Path) -> list[bytes]:
         bpy.context.scene.collection.children.link(collection)
         collection.objects.link(bpy.data.objects.new(name, mesh))
     save_blend(folder / "sample.blend")
-    return [(folder / "sample.blend").read_bytes(), (ROOT / "scenes" / "junction.blend").read_bytes()]
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "plain.blend"), copy=True, compress=False)
+    packed = [folder / "sample.blend", ROOT / "scenes" / "junction.blend"]
+    return [path.read_bytes() for path in (*packed, folder / "plain.blend")]
+
+
+def _mutate_blend(random: Random, content: bytes) -> Case:
+    """Mostly other values in bytes that stay where they are: Blender itself sees what is put in or taken out."""
+    if random.random() < 0.3:
+        return Case(mutated_bytes(random, content))
+    data = np.frombuffer(content, dtype=np.uint8).copy()
+    where = random.integers(len(data), size=int(2 ** random.uniform(0, 8)))
+    data[where] = random.integers(256, size=len(where))
+    return Case(data.tobytes())
 
 
 def _read_blend(path: Path, _: bytes) -> None:
@@ -477,7 +489,7 @@ FORMATS = {
     "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),
     "npz": Format((".npz",), _arrays, _mutate_arrays, _read_arrays),
     "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),
-    "blend": Format((".blend",), _blends, lambda random, content: Case(mutated_bytes(random, content)), _read_blend),
+    "blend": Format((".blend",), _blends, _mutate_blend, _read_blend),
     "pt": Format((".pt",), _detectors, _mutate_detector, _read_detector),
 }
 
