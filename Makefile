@@ -9,6 +9,7 @@
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
 # make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
 # make extension   build the Blender extension in dist/
+# make lock        write wheels.lock anew, the digests of all pinned packages, after a pin has changed
 # make clean       remove what was built; make distclean removes the environment and the wheels as well
 #
 # Another Python: make PYTHON=python3.13 VENV=.venv313 test
@@ -20,7 +21,7 @@ PY := "$(VENV)/bin/python"
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings stability benchmark extension clean distclean
+.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -48,7 +49,7 @@ scenes: environment
 	$(PY) -m headless.build_scene scenes/corridor.toml -o scenes/corridor.blend
 
 sumo: environment
-	$(PY) -m pip install --quiet --only-binary :all: --group traffic
+	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
 	$(PY) -m pytest tests/core/test_shipped_maps.py tests/core/test_traffic_simulation.py tests/headless/test_traffic.py
@@ -67,10 +68,10 @@ traffic: sumo
 
 # PyTorch: 200 MB for the CPU alone, several GB where pip finds builds for graphics cards first.
 detection: environment
-	$(PY) -m pip install --quiet --only-binary :all: --group detection
+	@$(PYTHON) -m headless.set_up "$(VENV)" detection
 
 test-detection: detection
-	$(PY) -m pip install --quiet --no-deps --only-binary :all: --group second-opinion
+	@$(PYTHON) -m headless.set_up "$(VENV)" second-opinion
 	$(PY) -m pytest tests/detection tests/headless/test_train.py tests/headless/test_evaluate.py tests/headless/test_compare_detectors.py tests/headless/test_detector_limits.py
 
 study: detection
@@ -89,6 +90,10 @@ benchmark: environment
 
 extension: environment
 	$(PY) -m headless.build_extension --platforms $(PLATFORMS)
+
+# The environment as it is: one of the new pins needs the new digests.
+lock:
+	$(PY) -m headless.lock_wheels
 
 clean:
 	rm -rf build dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis

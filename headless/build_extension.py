@@ -3,12 +3,13 @@
     python -m headless.build_extension --platforms linux-x64 windows-x64 macos-arm64
 
 The wheels are the group ``extension`` of the pins in ``pyproject.toml``, in
-`wheels/`; each zip serves every Python that a supported Blender runs on.
+`wheels/`, checked against ``wheels.lock``; each zip serves every Python that a supported Blender runs on.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import importlib.util
 import json
 import shutil
@@ -16,6 +17,8 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+
+from headless.set_up import LOCK
 
 ROOT = Path(__file__).resolve().parent.parent
 WHEELS = ROOT / "wheels"
@@ -83,7 +86,20 @@ def fetch_wheels(platform: str) -> list[Path]:
             if not download(folder, compiled, python, ["--implementation=cp", *tags]):
                 sys.exit(f"cannot download the wheels for {platform}, Python {python}: see pip's message above")
         stamp.write_text(wanted, encoding="utf-8")
-    return sorted(folder.glob("*.whl"))
+    wheels = sorted(folder.glob("*.whl"))
+    check_wheels(wheels)
+    return wheels
+
+
+def check_wheels(wheels: list[Path]) -> None:
+    """End with one sentence where a wheel is not, to the last bit, the one of its name in ``wheels.lock``."""
+    known = {tuple(line.split()) for line in LOCK.read_text(encoding="utf-8").splitlines()}
+    for wheel in wheels:
+        if (hashlib.sha256(wheel.read_bytes()).hexdigest(), wheel.name) not in known:
+            sys.exit(
+                f"{wheel} is not the wheel of that name in {LOCK.name}: delete it, or, where a pin has changed, "
+                "run python -m headless.lock_wheels"
+            )
 
 
 def download(folder: Path, requirements: list[str], python: str, tags: list[str]) -> bool:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 from headless.system_libraries import complaint, missing_libraries
 
+from seip_addon.core import storage
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import check_folder as check_folder  # noqa: PLC0414  # the commands find it here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -46,6 +46,9 @@ except ImportError:
 STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
 
+_LOCKS: dict[Path, int] = {}
+"""Folders that this process has locked, and what holds each lock."""
+
 
 def in_blender() -> bool:
     """Return whether the real program runs this, not Python with the bpy module."""
@@ -72,6 +75,20 @@ def open_scene(path: Path | None) -> None:
         open_blend(path)
     elif not (in_blender() and bpy.data.filepath):
         raise SeipError("no scene: name a .blend")
+
+
+def check_folder(folder: Path) -> None:
+    """See that a folder can be written, and that no other run writes into it until this process ends.
+
+    Raises
+    ------
+    SeipError
+        It cannot, or another run does.
+    """
+    storage.check_folder(folder)
+    place = folder.resolve()
+    if place not in _LOCKS:
+        _LOCKS[place] = storage.lock_folder(place)
 
 
 @contextmanager

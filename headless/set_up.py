@@ -1,9 +1,11 @@
 """Set up a virtual environment with everything that the commands and the tests need.
 
     python3 -m headless.set_up .venv
+    python3 -m headless.set_up .venv traffic  # and a group of packages more
 
 It does nothing when the environment is there and the pins in ``pyproject.toml``
-have not changed. It runs under any Python 3, so that one of the wrong version
+have not changed. pip takes no package whose digest is not in ``wheels.lock``,
+but for `UNLOCKED`. It runs under any Python 3, so that one of the wrong version
 gets a sentence and no traceback.
 """
 
@@ -11,21 +13,31 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
+from typing import Any
 
 from headless.system_libraries import complaint, missing_libraries
 
 SUPPORTED = ((3, 11), (3, 13))
 ROOT = Path(__file__).resolve().parent.parent
+LOCK = ROOT / "wheels.lock"
+
+UNLOCKED = {"torch"}
+"""Packages of many builds, of which pip's settings choose: those for graphics cards bring packages of their own."""
+
+ALONE = {"second-opinion"}
+"""Groups of packages that ask for others which are not used here."""
 
 
 def main(arguments: list[str]) -> str | None:
-    """Set up the environment in the folder named by the only argument; return what went wrong."""
-    if len(arguments) != 1:
-        return "usage: python3 -m headless.set_up FOLDER"
+    """Set up the environment in the folder named first, with the groups named after it; return what went wrong."""
+    if not arguments:
+        return "usage: python3 -m headless.set_up FOLDER [GROUP ...]"
     environment = Path(arguments[0])
     trouble = what_is_missing()
     if trouble:
@@ -35,6 +47,8 @@ def main(arguments: list[str]) -> str | None:
     if not stamp.is_file() or stamp.read_text() != wanted:
         install(environment)
         stamp.write_text(wanted)
+    for group in arguments[1:]:
+        install_group(environment, group)
     return None
 
 
@@ -51,18 +65,57 @@ def what_is_missing() -> str | None:
     return complaint(missing) if missing else None
 
 
-def dependency_groups() -> dict[str, list[str]]:
+def dependency_groups() -> dict[str, list[Any]]:
     """Return the pins of ``pyproject.toml`` by group."""
     import tomllib  # noqa: PLC0415  # Python 3.10 has none, and must get as far as its sentence
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    groups: dict[str, list[str]] = project["dependency-groups"]
+    groups: dict[str, list[Any]] = project["dependency-groups"]
     return groups
 
 
+def requirements(group: str) -> list[str]:
+    """Return the pins of a group, and of those that it includes."""
+    pins: list[str] = []
+    for pin in dependency_groups()[group]:
+        pins += requirements(pin["include-group"]) if isinstance(pin, dict) else [pin]
+    return pins
+
+
+def locked_hashes() -> dict[tuple[str, str], list[str]]:
+    """Return the digests of all wheels by name and version, without what a build adds to the version."""
+    hashes: dict[tuple[str, str], list[str]] = {}
+    for line in LOCK.read_text(encoding="utf-8").splitlines():
+        sha256, file = line.split()
+        name, version = file.split("-")[:2]
+        hashes.setdefault((canonical(name), version.split("+")[0]), []).append(sha256)
+    return hashes
+
+
+def locked(pins: list[str]) -> list[str]:
+    """Return pins as lines of a requirements file, each with the digests that pip may take for it."""
+    hashes = locked_hashes()
+    lines = []
+    for pin in pins:
+        name, version = pin.split(";")[0].strip().split("==")
+        allowed = hashes.get((canonical(name), version), [])
+        if not allowed:
+            sys.exit(f"{LOCK.name} holds no wheel of {name} {version}: run python -m headless.lock_wheels")
+        lines.append(" ".join([pin, *(f"--hash=sha256:{sha256}" for sha256 in sorted(set(allowed)))]))
+    return lines
+
+
+def canonical(name: str) -> str:
+    """Return the name of a package as it is compared (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
 def fingerprint() -> str:
-    """Return what an environment depends on: this Python and the pins."""
-    return json.dumps({"python": sys.version, "base": sys.base_prefix, "groups": dependency_groups()}, indent=1)
+    """Return what an environment depends on: this Python, the pins and their digests."""
+    lock = LOCK.read_text(encoding="utf-8")
+    return json.dumps(
+        {"python": sys.version, "base": sys.base_prefix, "groups": dependency_groups(), "lock": lock}, indent=1
+    )
 
 
 def install(environment: Path) -> None:
@@ -73,10 +126,23 @@ def install(environment: Path) -> None:
             sys.exit(f"{environment} is there already and no virtual environment; name another: make VENV=.venv ...")
         shutil.rmtree(environment)
     run(sys.executable, "-m", "venv", str(environment))
-    python = str(environment / "bin" / "python")
-    run(python, "-m", "pip", "install", "--quiet", *dependency_groups()["installer"])
-    run(python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--group", "development")
-    run(python, "-c", "import bpy")
+    for group in ("installer", "development"):
+        install_group(environment, group)
+    run(str(environment / "bin" / "python"), "-c", "import bpy")
+
+
+def install_group(environment: Path, group: str) -> None:
+    """Install the packages of a group, those of the lock first."""
+    pip = [str(environment / "bin" / "python"), "-m", "pip", "install", "--quiet", "--only-binary", ":all:"]
+    pip += ["--no-deps"] if group in ALONE else []
+    pins = requirements(group)
+    free = [pin for pin in pins if pin.split("==")[0] in UNLOCKED]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "requirements.txt"
+        file.write_text("\n".join(locked([pin for pin in pins if pin not in free])), encoding="utf-8")
+        run(*pip, "--require-hashes", "-r", str(file))
+    if free:
+        run(*pip, *free)
 
 
 def run(*command: str) -> None:

@@ -38,6 +38,8 @@ def main(argv: list[str]) -> None:
     """Simulate the frames of a run and write them to a folder."""
     options = _parser().parse_args(argv)
     session.check_folder(options.output)
+    if options.dataset is not None:
+        session.check_folder(options.dataset)
     session.open_scene(options.scene)
     settings = _settings(options)
     run = _run(options, settings)

@@ -112,7 +112,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--min-intensity", type=float, default=sight.min_intensity, help="least intensity of a return that sees"
     )
     work.add_argument("--engine", choices=("auto", "bvh", "embree"), default="auto", help="ray caster")
-    work.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers cast, like tcp://host:8786")
+    work.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers cast: tcp://host:8786, tls://host:8786",
+    )
     work.add_argument(
         "--solver", default="auto", help="auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi"
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import os
 import pickle
+import struct
 import sys
 import threading
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -18,16 +20,18 @@ import torch
 from torch import Tensor, nn
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import whole_file
+from seip_addon.core.storage import digest, whole_file
 
 from .anchor_head import AnchorHead
 from .centre_head import CentreHead
 from .heads import DetectionHead
 from .network import FeatureMap
-from .pillars import PillarGrid, Pillars
+from .pillars import MOST_PILLARS, PillarGrid, Pillars
 from .settings import NetworkSettings
 
-SCHEMA, VERSION = "seip.detector", 1
+SCHEMA, VERSION = "seip.detector", 2
+_UNDIGESTED = 1  # the version of files that hold no digest
+_LARGEST = 1 << 32  # bytes of a file: 4 GiB
 _SEEDED = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
 
 
@@ -112,11 +116,12 @@ class Detector(nn.Module):
             The file is not there, damaged, something else, or of another version.
         """
         state = load_state(path)
-        with _fault_of(path):
+        with fault_of(path):
             settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
             grid = PillarGrid(**state["grid"])
-            known = state.get("experience", {})
-            experience = Experience(**{name: tuple(values) for name, values in known.items()})
+            _check_grid(grid, settings)
+            experience = _experience(state.get("experience", {}))
+            _check_finite(state["weights"])
             detector = cls(settings, grid, experience=experience)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
@@ -179,10 +184,12 @@ def require_grid(detector: Detector, grid: PillarGrid, path: str | os.PathLike[s
 
 
 def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
-    """Write plain values and tensors."""
-    with whole_file(path) as temporary, temporary.open("wb") as file:
-        # To an open file: a name would go into the bytes.
-        torch.save(_shared_text({"schema": SCHEMA, "version": VERSION, **state}), file)
+    """Write plain values and tensors, with a digest of them."""
+    full = {"schema": SCHEMA, "version": VERSION, **state}
+    content = io.BytesIO()  # to no file: its name would go into the bytes, and a full disk leave it unclosed
+    torch.save(_shared_text({**full, "digest": _digest(full)}), content)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.getbuffer())
 
 
 def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -194,25 +201,125 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
         The file is not there, damaged, something else, or of another version.
     """
     try:
-        content = Path(path).read_bytes()
+        with Path(path).open("rb") as file:
+            content = file.read(_LARGEST + 1)
     except OSError as error:
         raise SeipError(f"there is no detector {path}: train one, or name another file") from error
-    with _fault_of(path):
+    with fault_of(path):
+        _check_archive(content)
         state: dict[str, Any] = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
-        known = (state["schema"], state["version"]) == (SCHEMA, VERSION)
+        _check_sizes(state, len(content))
+        version = state["version"]
+        known = state["schema"] == SCHEMA and version in {_UNDIGESTED, VERSION}
+        written = state.pop("digest", None)
+        if known and (version != _UNDIGESTED or written is not None) and written != _digest(state):
+            raise _ContentError("its content is not what was written")
     if not known:
         raise SeipError(f"{path} is no detector of this version; train it again")
     return state
 
 
 @contextmanager
-def _fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
+def fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
     """Lay what goes wrong in the block at the door of the file."""
-    damage = (RuntimeError, ValueError, TypeError, LookupError, EOFError, pickle.UnpicklingError, zipfile.BadZipFile)
     try:
         yield
-    except damage as error:
+    except SeipError as error:
+        raise SeipError(f"{path} is no detector, or is damaged: {error}; train it again") from error
+    except _DAMAGE as error:
         raise SeipError(f"{path} is no detector, or is damaged; train it again") from error
+
+
+class _ContentError(SeipError):
+    """What is wrong with the content of a file, as a part of a sentence."""
+
+
+_DAMAGE = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    EOFError,
+    ImportError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    pickle.UnpicklingError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What torch raises on reading what it has not written, or taking from it what should be there."""
+
+
+def _check_archive(content: bytes) -> None:
+    """See that a file is what `torch.save` writes, to the last of its bits: torch itself compares no checksums."""
+    if len(content) > _LARGEST:
+        raise _ContentError(f"it is larger than {_LARGEST >> 30} GiB")
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        infos = archive.infolist()
+        if any(info.compress_type != zipfile.ZIP_STORED or info.file_size > len(content) for info in infos):
+            raise _ContentError("it is packed as torch packs none")
+        if archive.testzip() is not None:
+            raise _ContentError("its checksums do not fit")
+
+
+def _check_sizes(state: object, most: int) -> None:
+    """See that tensors are not larger than the file that they are from."""
+    if sum(tensor.numel() * tensor.element_size() for tensor in _tensors(state)) > most:
+        raise _ContentError("it has tensors larger than itself")
+
+
+def _check_grid(grid: PillarGrid, settings: NetworkSettings) -> None:
+    if grid.pillar != settings.pillar:
+        raise _ContentError(f"it is of pillars of {settings.pillar:g} m on a grid with pillars of {grid.pillar:g} m")
+    places = (grid.west, grid.south, grid.bottom, grid.top)
+    counts = (grid.columns, grid.rows)
+    if not all(isinstance(value, int | float) and abs(value) <= 1e8 for value in places) or grid.bottom >= grid.top:
+        raise _ContentError("its grid is nowhere")
+    if not all(isinstance(count, int) and count > 0 for count in counts) or len(grid) > MOST_PILLARS:
+        raise _ContentError("its grid has no or too many pillars")
+
+
+def _check_finite(weights: Mapping[str, Tensor]) -> None:
+    if not all(bool(torch.isfinite(tensor).all()) for tensor in weights.values()):
+        raise _ContentError("its weights are not finite")
+
+
+def _experience(known: Mapping[str, Any]) -> Experience:
+    listed = all(isinstance(values, list | tuple) for values in known.values())
+    if not listed or not all(isinstance(name, str) for values in known.values() for name in values):
+        raise _ContentError("what it has learnt from has no names")
+    return Experience(**{name: tuple(values) for name, values in known.items()})
+
+
+def _tensors(value: Any) -> Iterator[Tensor]:  # noqa: ANN401  # plain values of any kind
+    if isinstance(value, Tensor):
+        yield value
+    elif isinstance(value, Mapping):
+        for part in value.values():
+            yield from _tensors(part)
+    elif isinstance(value, list | tuple):
+        for part in value:
+            yield from _tensors(part)
+
+
+def _digest(state: Mapping[str, Any]) -> str:
+    """Return the digest of plain values and tensors, in their order."""
+    return digest(repr(_digested(state)))
+
+
+def _digested(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
+    """Return a value with digests in place of its tensors."""
+    if isinstance(value, Tensor):
+        return digest(value.detach().cpu().numpy())
+    if isinstance(value, Mapping):
+        return {key: _digested(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_digested(part) for part in value]
+    return value
 
 
 def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind

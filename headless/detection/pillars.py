@@ -23,7 +23,9 @@ from .settings import GROUND_ABOVE_BOTTOM, HEADROOM, STRIDE
 
 FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
-_MOST_PILLARS = 16_000_000
+
+MOST_PILLARS = 16_000_000
+"""Of a grid at most."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def grid_over(
     if not (west < east and south < north and heights[0] < heights[1]):
         raise SeipError("the extent of the detector is empty: give a region of interest with an area")
     columns, rows = (stride * math.ceil(side / (pillar * stride) - 1e-9) for side in (east - west, north - south))
-    if columns * rows > _MOST_PILLARS:
+    if columns * rows > MOST_PILLARS:
         raise SeipError(f"{columns} × {rows} pillars are too many: choose larger ones or a smaller region")
     return PillarGrid(
         west=(west + east - columns * pillar) / 2,

@@ -43,6 +43,10 @@ def _require(checks: dict[str, bool]) -> None:
             raise SeipError(f"detector: {sentence}")
 
 
+def _whole(value: object, least: int, most: int) -> bool:
+    return isinstance(value, int) and least <= value <= most
+
+
 @dataclass(frozen=True)
 class NetworkSettings:
     """The network, apart from its weights.
@@ -75,12 +79,13 @@ class NetworkSettings:
     def __post_init__(self) -> None:
         checks = {
             "a pillar must be 0.05 to 2 m wide": 0.05 <= self.pillar <= 2,
-            "a pillar must keep 1 to 32 points": 1 <= self.most_points <= 32,
-            "the width must lie between 8 and 256 channels": 8 <= self.width <= 256,
+            "a pillar must keep 1 to 32 points": _whole(self.most_points, 1, 32),
+            "the width must lie between 8 and 256 channels": _whole(self.width, 8, 256),
             "there must be three blocks of 0 to 20 convolutions": (
-                len(self.blocks) == 3 and all(0 <= count <= 20 for count in self.blocks)
+                len(self.blocks) == 3 and all(_whole(count, 0, 20) for count in self.blocks)
             ),
             "the head must be centre or anchor": self.head in {"centre", "anchor"},
+            "padded must be true or false": isinstance(self.padded, bool),
         }
         _require(checks)
 

@@ -23,7 +23,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 
 from .average_precision import evaluate
-from .detector import Detector, load_state, save_state
+from .detector import Detector, fault_of, load_state, save_state
 from .frame_results import Detected, FrameResult, Truth
 from .frames import Sample, SampledRecording, drawn, experience_of, require_separate, spread
 from .heads import Targets
@@ -230,7 +230,8 @@ class _Run:
         state = load_state(path)
         earlier = state.get("training", {})
         same = (
-            all(state[name] == self.detector.description()[name] for name in ("settings", "grid"))
+            all(state.get(name) == self.detector.description()[name] for name in ("settings", "grid"))
+            and isinstance(earlier, dict)
             and earlier.get("settings") == asdict(self.settings)
             and earlier.get("recordings") == self._sources()
         )
@@ -239,12 +240,13 @@ class _Run:
                 f"{path} is of a training with other settings, another grid or other recordings: "
                 "delete it, or choose another file"
             )
-        self.step = int(earlier["step"])
-        self.curve = Curve(**earlier["curve"])
-        self.best = state["weights"]
-        self.detector.load_state_dict(earlier["weights"])
-        self.optimiser.load_state_dict(earlier["optimiser"])
-        self.schedule.load_state_dict(earlier["schedule"])
+        with fault_of(path):
+            self.step = int(earlier["step"])
+            self.curve = Curve(**earlier["curve"])
+            self.best = state["weights"]
+            self.detector.load_state_dict(earlier["weights"])
+            self.optimiser.load_state_dict(earlier["optimiser"])
+            self.schedule.load_state_dict(earlier["schedule"])
 
     def _sources(self) -> list[list[str | int]]:
         both = (*self.lessons, *self.aside)

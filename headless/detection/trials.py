@@ -11,13 +11,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from seip_addon.core.array_file import ArrayFile, ArrayRule, ContentError
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import Frame, prepare
 from seip_addon.core.scans.run_folder import Run
 from seip_addon.core.source_digest import source_digest
-from seip_addon.core.storage import ArrayFile, digest
+from seip_addon.core.storage import digest
 from seip_addon.core.traffic.bodies import fitted_body
 
 from .average_precision import Evaluation, Judged, Wanted, evaluate
@@ -31,7 +32,29 @@ from .recordings import Configuration, Studio, TrafficRun
 from .settings import GROUPS
 from .training import deterministic
 
-FILE = ArrayFile("seip.trial", 1, "trial of a detector", "delete it, and it is tried again")
+FILE = ArrayFile(
+    "seip.trial",
+    2,
+    "trial of a detector",
+    "delete it, and it is tried again",
+    {
+        "detections.score": ArrayRule("f8", ("d",), 0.0, 1.0),
+        "detections.hit": ArrayRule("b1", ("d",)),
+        "detections.frame": ArrayRule("i8", ("d",), 0),
+        "detections.density": ArrayRule("f8", ("d",), 0.0),
+        "detections.points": ArrayRule("i8", ("d",), 0),
+        "detections.distance": ArrayRule("f8", ("d",), 0.0),
+        "detections.border": ArrayRule("f8", ("d",), 0.0),
+        "wanted.score": ArrayRule("f8", ("t",), most=1.0),
+        "wanted.frame": ArrayRule("i8", ("t",), 0),
+        "wanted.category": ArrayRule("U", ("t",)),
+        "wanted.points": ArrayRule("i8", ("t",), 0),
+        "wanted.visibility": ArrayRule("f8", ("t",), 0.0, 1.0),
+        "wanted.distance": ArrayRule("f8", ("t",), 0.0),
+        "wanted.border": ArrayRule("f8", ("t",), 0.0),
+        "block": ArrayRule("i8", ("f",), 0),
+    },
+)
 
 RULE = Rule()
 """How average precision is taken: the evaluation's own."""
@@ -217,6 +240,9 @@ def _load(path: Path) -> Trial:
             table: kind(**{part.name: arrays[f"{table}.{part.name}"] for part in fields(kind)})
             for table, kind in TABLES.items()
         }
+        frames = len(arrays["block"])
+        if any((arrays[f"{table}.frame"] >= frames).any() for table in TABLES):
+            raise ContentError("it has detections of frames that are not in it")
         evaluation = Evaluation(RULE, tables["detections"], tables["wanted"], arrays["block"])
         beside = {
             table: replace(rows, distance=arrays[f"{table}.border"])  # type: ignore[type-var]  # each is a dataclass

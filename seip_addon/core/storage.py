@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import errno
+import functools
 import hashlib
 import json
 import os
+import sys
 import tempfile
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     The temporary name keeps the suffix of ``path``, so that libraries which
     choose a format by suffix do the same for both. Nothing is left behind when
-    the block raises, `KeyboardInterrupt` included.
+    the block raises, `KeyboardInterrupt` included; what a killed process left
+    in the folder is removed.
 
     Parameters
     ----------
@@ -42,7 +43,9 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=".", suffix=target.suffix, dir=target.parent)
+        _remove_leftovers(target.parent.resolve())
+        prefix = f"{_TEMPORARY}{os.getpid()}-"
+        handle, name = tempfile.mkstemp(prefix=prefix, suffix=target.suffix, dir=target.parent)
     except OSError as error:
         raise _unwritable(target, error) from error
     os.close(handle)
@@ -74,6 +77,38 @@ def check_folder(folder: Path) -> None:
         raise SeipError(f"cannot write to {folder}: {reason}; choose a folder that you may write to") from error
 
 
+def lock_folder(folder: Path) -> int:
+    """Keep other processes from writing into a folder until this one ends, however it ends.
+
+    Parameters
+    ----------
+    folder : path
+        It is there.
+
+    Returns
+    -------
+    int
+        What holds the lock: a file descriptor, whose closing opens it.
+
+    Raises
+    ------
+    SeipError
+        Another process holds the lock.
+    """
+    windows = sys.platform == "win32"  # which opens no folders as files
+    held = os.open(folder / ".seip-lock", os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
+    try:
+        _lock(held)
+    except OSError as error:
+        if error.errno not in _LOCKED:  # a file system without locks
+            return held
+        os.close(held)
+        raise SeipError(
+            f"another run is writing to {folder}: wait until it has ended, or choose another folder"
+        ) from error
+    return held
+
+
 def save_json(path: str | os.PathLike[str], value: object) -> None:
     """Write a value as JSON for people and programs: indented, UTF-8, and without NaN or infinity.
 
@@ -87,76 +122,6 @@ def save_json(path: str | os.PathLike[str], value: object) -> None:
     text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
     with whole_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
-
-
-@dataclass(frozen=True)
-class ArrayFile:
-    """A kind of file that holds named arrays and a header: npz, with JSON as the text ``header``.
-
-    Parameters
-    ----------
-    schema : str
-        What the files are, for programs.
-    version : int
-        Of their layout; files of another version are refused.
-    what : str
-        What a file holds, for messages: "visibility grid".
-    remedy : str
-        How to get a new one, for messages: "delete it and compute it again".
-    compressed : bool
-        Not worth its time for arrays of measurements, whose noise does not compress.
-    """
-
-    schema: str
-    version: int
-    what: str
-    remedy: str
-    compressed: bool = True
-
-    def save(self, path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Write a header, whose values JSON knows, and arrays by their names."""
-        full = {"schema": self.schema, "version": self.version, **header}
-        text = json.dumps(full, ensure_ascii=False, allow_nan=False)
-        write = np.savez_compressed if self.compressed else np.savez
-        with whole_file(path) as temporary, temporary.open("wb") as file:
-            write(file, header=np.array(text), **dict(arrays))
-
-    @contextmanager
-    def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:
-        """Yield the header and the arrays; what a block trips over in them is the file's fault.
-
-        Raises
-        ------
-        SeipError
-            The file is not there, damaged, something else, or of another version.
-        """
-        try:
-            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
-            header = json.loads(str(arrays.pop("header")))
-            known = (header["schema"], header["version"]) == (self.schema, self.version)
-            if known:
-                yield header, arrays
-        except FileNotFoundError as error:
-            raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
-        except _DAMAGE as error:
-            raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
-        if not known:
-            raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
-
-
-_DAMAGE = (
-    OSError,
-    EOFError,
-    AttributeError,
-    ValueError,
-    LookupError,
-    TypeError,
-    RecursionError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What reading an npz, or taking from it what should be there, raises where the file is not what it should be."""
 
 
 def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
@@ -186,13 +151,58 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     return state.hexdigest()
 
 
+_TEMPORARY = ".seip-"
+"""How the names of unfinished files begin; the number of the process that writes them follows."""
+
+_OLD = 86400.0
+"""Seconds after which an unfinished file is nobody's, where processes cannot be asked for."""
+
+_LOCKED = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(file: int) -> None:
+        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+else:
+    import fcntl
+
+    def _lock(file: int) -> None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@functools.cache
+def _remove_leftovers(folder: Path) -> None:
+    """Remove unfinished files of processes that were killed, once in a process."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            number, dash, _ = entry.name.removeprefix(_TEMPORARY).partition("-")
+            if entry.name.startswith(_TEMPORARY) and dash and number.isdecimal() and _is_nobodys(entry, int(number)):
+                Path(entry).unlink(missing_ok=True)
+
+
+def _is_nobodys(entry: os.DirEntry[str], process: int) -> bool:
+    if sys.platform == "win32":  # asking for a process there means stopping it
+        return time.time() - entry.stat().st_mtime > _OLD
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return True
+    except PermissionError:  # somebody else's, alive
+        return False
+    return False
+
+
 def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
 
 
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
 def _unwritable(path: Path, error: OSError) -> SeipError:
     reason = error.strerror or str(error)
-    cure = "make room there" if error.errno == errno.ENOSPC else "choose a folder that you may write to"
+    cure = "make room there" if error.errno in _FULL else "choose a folder that you may write to"
     return SeipError(f"cannot write {path}: {reason}; {cure}")

@@ -57,12 +57,18 @@ def save_blend(path: Path) -> None:
         _set_up_views()
     with whole_file(path) as temporary:
         temporary.unlink()  # Blender would keep a backup of a file that is there
-        with held_interrupts():
-            bpy.ops.wm.save_as_mainfile(
-                filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False
-            )
+        full = SeipError(f"cannot write {path} to its end; make room there or choose another folder")
+        try:
+            with held_interrupts():
+                bpy.ops.wm.save_as_mainfile(
+                    filepath=str(temporary.resolve()), copy=True, compress=True, check_existing=False
+                )
+        except RuntimeError as error:
+            raise full from error
+        finally:
+            Path(f"{temporary}@").unlink(missing_ok=True)  # as far as Blender came
         if not _is_whole(temporary):
-            raise SeipError(f"cannot write {path} to its end; make room there or choose another folder")
+            raise full
 
 
 def _is_whole(path: Path) -> bool:

@@ -221,7 +221,9 @@ def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
     mesh.loop_triangles.foreach_get("material_index", material)
     if is_copied:
         evaluated.to_mesh_clear()
-    triangles = places.reshape(-1, 3).astype(np.float64)[corners].reshape(-1, 3, 3)
+    vertices = np.append(places.reshape(-1, 3).astype(np.float64), [[np.nan] * 3], axis=0)
+    known = (corners >= 0) & (corners < len(vertices) - 1)  # a damaged file names vertices that are not there
+    triangles = vertices[np.where(known, corners, -1)].reshape(-1, 3, 3)
     return _Faces(triangles, material.astype(np.int64))
 
 

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from itertools import islice
 
+import npz_by_hand as npz
 import numpy as np
 import pytest
 from engines import ANY, needs_any
@@ -121,6 +122,84 @@ def test_a_damaged_manifest_has_its_sentence(tmp_path, text) -> None:
     (tmp_path / "manifest.json").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(SeipError, match="damaged"):
         load_manifest(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        (("frames", 1, "name"), "../000001"),
+        (("frames", 1, "name"), "000002"),
+        (("frames", 0, "sha256"), 7),
+        (("frames",), []),
+        (("complete",), "yes"),
+        (("sensors", 0, "local_m"), [1.0, 2.0]),
+        (("sensors", 0, "local_m"), [1.0, 2.0, float("nan")]),
+        (("sensors", 0, "sensor"), None),
+        (("trajectories",), []),
+        (("key",), None),
+    ],
+)
+def test_a_manifest_that_cannot_be_is_refused(tmp_path, part, value) -> None:
+    record = finish(steps(tmp_path, make_run()))
+    inner = record
+    for step in part[:-1]:
+        inner = inner[step]
+    inner[part[-1]] = value
+    (tmp_path / "manifest.json").write_text(json.dumps(record))
+    with pytest.raises(SeipError, match="is damaged: delete the folder and simulate again"):
+        load_manifest(tmp_path)
+
+
+def test_a_frame_of_another_run_is_noticed(tmp_path) -> None:
+    finish(steps(tmp_path / "one", make_run()))
+    finish(steps(tmp_path / "two", make_run(settings=ScanSettings(seed=4, engine=ANY))))
+    frame_path(tmp_path / "two", 2).replace(frame_path(tmp_path / "one", 2))
+    with pytest.raises(SeipError, match=r"000002\.npz is a frame of another run"):
+        list(load_frames(tmp_path / "one"))
+
+
+def _wrong_labels(arrays):
+    arrays["labels.category"][0] = "tank"
+
+
+def _twice(arrays):
+    arrays["labels.user"][:] = 0
+
+
+def _foreign(arrays):
+    arrays["instance"][0] = 99
+
+
+def _uncounted(arrays):
+    arrays["sensor"][0] = 7
+
+
+def _nowhere(arrays):
+    arrays["points"][0, 0] = np.nan
+
+
+def _dazzling(arrays):
+    arrays["intensity"][0] = 1e9
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (_wrong_labels, "unknown category"),
+        (_twice, "labelled twice"),
+        (_foreign, "road users without a label"),
+        (_uncounted, "sensors that the labels do not count"),
+        (_nowhere, "points has the value nan"),
+        (_dazzling, "intensity has the value"),
+    ],
+)
+def test_a_frame_that_contradicts_itself_is_refused(tmp_path, change, sentence) -> None:
+    finish(steps(tmp_path, make_run()))
+    path = frame_path(tmp_path, 0)
+    header, arrays = npz.contents(path)
+    change(arrays)
+    with pytest.raises(SeipError, match=sentence):
+        Frame.load(npz.write(path, header, arrays))
 
 
 def test_a_manifest_of_another_version_has_its_sentence(tmp_path) -> None:

@@ -16,6 +16,7 @@ from seip_addon.core.traffic.floating_car_data import (
     Window,
     read_floating_car_data,
     read_trajectories,
+    some,
     unwrapped,
 )
 from seip_addon.core.traffic.sumo_files import read_net_offset
@@ -172,6 +173,14 @@ BOMB = '<!DOCTYPE f [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export><timest
         ("f.xml", BOMB, "declares a document type"),
         ("f.csv", "a;b\n1;2\n", "no column timestep_time"),
         ("f.csv", "", "no column timestep_time"),
+        ("f.csv", NATIVE_CSV[:-20], "line 6 has 6 cells under 10 columns"),
+        ("f.csv", NATIVE_CSV.replace("0.20;a", '0.20;"a'), "line 6 has 2 cells under 10 columns"),
+        ("f.csv", NATIVE_CSV.replace("0.20;a", "0.20;" + 50_000 * "a").replace("112.0", "x"), "aaa…' at 0.2 s is no"),
+        ("f.xml", one(ROW.replace('x="1"', f'x="{50_000 * "1"}x"')), "111…' of 'a' at 0 s is no number"),
+        ("f.xml", one(ROW.replace('x="1"', 'x="1e300"')), "x='1e300' of 'a' at 0 s is beyond 1e+08"),
+        ("f.xml", one(ROW, ("1e300",)), "time='1e300' of 'a time step' is beyond"),
+        ("f.xml", FCD.replace("UTF-8", "klingon"), "encoding that cannot be read"),
+        ("f.xml", FCD.replace("UTF-8", "utf-7"), "encoding that cannot be read"),
     ],
 )
 def test_a_wrong_file_gets_one_sentence(tmp_path, name, text, complaint):
@@ -179,7 +188,21 @@ def test_a_wrong_file_gets_one_sentence(tmp_path, name, text, complaint):
         read(written(tmp_path, name, text))
     assert complaint in str(caught.value)
     assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
     assert name in str(caught.value)
+
+
+def test_blank_lines_of_a_table_say_nothing(tmp_path):
+    blank = read(written(tmp_path, "f.csv", NATIVE_CSV.replace("\n0.20", "\n\n0.20") + "\n\n"))
+    np.testing.assert_array_equal(blank.time, read(written(tmp_path, "g.csv", NATIVE_CSV)).time)
+
+
+def test_a_long_name_is_cut_in_sentences(tmp_path):
+    path = written(tmp_path, "r.xml", f'<routes><vType id="{50_000 * "t"}" length="0"/></routes>')
+    with pytest.raises(SeipError, match="is no size") as caught:
+        finish(read_vehicle_types([path]))
+    assert len(str(caught.value)) < 300
+    assert len(some([50_000 * "a"])) < 100
 
 
 def test_damaged_or_missing_files_get_one_sentence(tmp_path):
@@ -203,8 +226,9 @@ def test_a_senseless_size_is_refused(tmp_path, size):
         finish(read_vehicle_types([path]))
 
 
-@pytest.mark.parametrize("text", ["<net/>", '<net><location netOffset="here"/></net>'])
-def test_a_network_without_offset_is_refused(tmp_path, text):
+@pytest.mark.parametrize("offset", [None, "nan,0", "5,nan", "here", "1e300,0"])
+def test_a_network_without_offset_is_refused(tmp_path, offset):
+    text = "<net/>" if offset is None else f'<net><location netOffset="{offset}"/></net>'
     with pytest.raises(SeipError, match="no SUMO network"):
         read_net_offset(written(tmp_path, "n.xml", text))
 

@@ -145,6 +145,13 @@ def test_a_gap_in_time_ends_a_stay():
     assert len(fit.at(2.0)) == 0
 
 
+@pytest.mark.parametrize(("gap", "stays"), [(0.2, 1), (0.3, 2)])
+def test_a_stay_outlives_the_loss_of_one_sample_and_not_of_two(gap, stays):
+    time = np.cumsum([0.0, 0.1, 0.1, gap, 0.1, 0.1])
+    fit = fit_to_road(moving(10.0 * time, 0.0, time=time), scene()).trajectories
+    assert len(fit.users) == stays
+
+
 def test_who_is_put_somewhere_else_is_another_one_there():
     fit = fit_to_road(moving([0.0, 0.1, 20.0, 20.1], 0.0), scene()).trajectories
     assert [user.name for user in fit.users] == ["car", "car/2"]

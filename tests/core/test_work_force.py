@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,6 +49,43 @@ def test_a_scheduler_that_does_not_answer_has_its_sentence(address: str, monkeyp
     monkeypatch.setattr("seip_addon.core.visibility.work_force._SECONDS_FOR_AN_ANSWER", 0.5)
     with pytest.raises(SeipError, match="no Dask scheduler answers at"):
         finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler=address))
+
+
+@needs_dask
+def test_an_encrypted_scheduler_without_certificates_has_its_sentence() -> None:
+    with pytest.raises(SeipError, match=r"tls://127\.0\.0\.1:1 needs certificates"):
+        finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler="tls://127.0.0.1:1"))
+
+
+@needs_dask
+@needs_embree
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+def test_an_encrypted_cluster_is_reached_with_the_certificates_of_dasks_settings(tmp_path: Path) -> None:
+    import dask  # noqa: PLC0415 - an extra that need not be installed
+    from distributed import LocalCluster  # noqa: PLC0415 - as above
+    from distributed.security import Security  # noqa: PLC0415 - as above
+
+    key, certificate = str(tmp_path / "key.pem"), str(tmp_path / "certificate.pem")
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1"]
+    subprocess.run([*command, "-keyout", key, "-out", certificate], check=True, capture_output=True)  # noqa: S603  # our own
+    files = {"ca-file": certificate}
+    files |= {
+        f"{who}.{what}": file
+        for who in ("client", "scheduler", "worker")
+        for what, file in (("cert", certificate), ("key", key))
+    }
+    settings = {f"distributed.comm.tls.{name}": file for name, file in files.items()}
+    with (
+        dask.config.set({**settings, "distributed.comm.require-encryption": True}),
+        LocalCluster(
+            n_workers=1, processes=False, dashboard_address=None, host="127.0.0.1", protocol="tls", security=Security()
+        ) as started,
+    ):
+        assert started.scheduler_address.startswith("tls://")
+        there = finish(compute_visibility(SITE, MODELS, SETTINGS, "embree", scheduler=started.scheduler_address))
+    here = finish(compute_visibility(SITE, MODELS, SETTINGS, "embree"))
+    assert (there.packed == here.packed).all()
 
 
 @needs_dask

@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+import resource
 import subprocess
 import sys
 import time
@@ -20,6 +22,7 @@ from small_junction import ORIGIN, make_example
 from seip_addon.core.errors import SeipError
 from seip_addon.core.scans import Frame
 from seip_addon.core.scans.run_folder import load_frames
+from seip_addon.core.storage import lock_folder
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
@@ -179,6 +182,37 @@ def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
         )
     with pytest.raises(SeipError, match="no traffic"):
         simulate.main([str(folder / "placed.blend"), "-o", str(folder / "wrong")])
+
+
+def test_a_disk_without_room_has_its_sentence(folder):
+    """A limit on the size of files stands for a full disk."""
+    command = [sys.executable, "-m", "headless.simulate", *arguments(folder, "full")]
+    done = subprocess.run(  # noqa: S603  # as above
+        command,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+    )
+    assert done.returncode == 1
+    assert "error: cannot write" in done.stderr
+    assert "make room there" in done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list((folder / "full" / "frames").iterdir()) == []
+
+
+def test_two_runs_into_one_folder_have_a_sentence(folder):
+    (folder / "shared").mkdir()
+    held = lock_folder(folder / "shared")
+    command = [sys.executable, "-m", "headless.simulate", *arguments(folder, "shared")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)  # noqa: S603  # as above
+    os.close(held)
+    assert done.returncode == 1
+    assert f"error: another run is writing to {folder / 'shared'}: wait until it has ended" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_killed_run_leaves_whole_frames_alone(folder):

@@ -13,6 +13,7 @@ from packaging.utils import canonicalize_name, parse_wheel_filename
 pytest.importorskip("bpy", reason="Blender's extension tool comes with the bpy module")
 
 from headless import build_extension
+from headless.set_up import LOCK
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKE_WHEEL = "thing-1.0-py3-none-any.whl"
@@ -27,6 +28,13 @@ def built(tmp_path, monkeypatch):
     monkeypatch.setattr(build_extension, "STAGING", tmp_path / "staging")
     monkeypatch.setattr(build_extension, "fetch_wheels", lambda _platform: [wheel])
     return build_extension.build("linux-x64", tmp_path / "out")
+
+
+def test_a_wheel_that_is_another_than_the_locked_one_is_not_bundled(tmp_path):
+    name = next(line.split()[1] for line in LOCK.read_text().splitlines() if "shapely" in line)
+    (tmp_path / name).write_bytes(b"forged")
+    with pytest.raises(SystemExit, match=r"is not the wheel of that name in wheels\.lock"):
+        build_extension.check_wheels([tmp_path / name])
 
 
 def test_the_checkout_itself_is_a_valid_extension():

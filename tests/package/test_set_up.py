@@ -1,8 +1,11 @@
 """A system that lacks something is told what, and how to get it, before anything is downloaded."""
 
+import os
+import re
 import subprocess
 import sys
 import tomllib
+import zipfile
 from importlib import metadata
 from pathlib import Path
 
@@ -108,6 +111,43 @@ def test_what_the_pinned_packages_need_is_pinned_too():
 def test_the_installed_versions_are_the_pinned_ones():
     for name, pin in PINS_HERE.items():
         assert metadata.version(name) in pin.specifier, name
+
+
+def test_every_package_that_is_installed_has_its_digest():
+    for group in ("installer", "development", "traffic", "detection", "second-opinion"):
+        pins = [pin for pin in set_up.requirements(group) if pin.split("==")[0] not in set_up.UNLOCKED]
+        lines = set_up.locked(pins)
+        assert len(lines) == len(pins)
+        for line in lines:
+            assert re.search(r" --hash=sha256:[0-9a-f]{64}( |$)", line), line
+
+
+def test_a_package_without_a_digest_is_not_installed():
+    with pytest.raises(SystemExit, match=r"wheels\.lock holds no wheel of shapely 9\.9"):
+        set_up.locked(["shapely==9.9"])
+
+
+def test_pip_refuses_another_package_of_the_same_name_and_version(tmp_path, monkeypatch):
+    """A forged wheel, offered before all others."""
+    name = "zict-3.0.0-py2.py3-none-any.whl"
+    with zipfile.ZipFile(tmp_path / name, "w") as archive:
+        archive.writestr("zict/__init__.py", "forged = True\n")
+        archive.writestr("zict-3.0.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: zict\nVersion: 3.0.0\n")
+        archive.writestr("zict-3.0.0.dist-info/WHEEL", "Wheel-Version: 1.0\nTag: py3-none-any\n")
+        archive.writestr("zict-3.0.0.dist-info/RECORD", "")
+    (tmp_path / "requirements.txt").write_text("\n".join(set_up.locked(["zict==3.0.0"])))
+    command = [sys.executable, "-m", "pip", "install", "--no-index", f"--find-links={tmp_path}", "--require-hashes"]
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PIP_")}
+    done = subprocess.run(  # noqa: S603  # pip, with our own file
+        [*command, "--target", str(tmp_path / "there"), "-r", str(tmp_path / "requirements.txt")],
+        env={**environment, "PIP_CONFIG_FILE": os.devnull},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "DO NOT MATCH THE HASHES" in done.stderr or "No matching distribution" in done.stderr
+    assert not (tmp_path / "there" / "zict").exists()
 
 
 def test_make_knows_every_target_of_its_help():

@@ -1,10 +1,16 @@
 """What is saved opens again, and looks right at once."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import bpy
 import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.scene.blend_file import CLIP_END, CLIP_START, new_file, open_blend, save_blend
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_saved_scene_opens_again_and_leaves_no_other_file(tmp_path):
@@ -32,6 +38,49 @@ def test_views_show_a_whole_site_through_its_camera(tmp_path):
 def test_a_name_that_is_none_of_a_blend_is_refused(tmp_path):
     with pytest.raises(SeipError, match=r"let it end in \.blend"):
         save_blend(tmp_path / "site.txt")
+
+
+def test_scripts_in_a_file_do_not_run(tmp_path):
+    """A text that Blender would register as a module, where files are trusted."""
+    new_file()
+    mark = tmp_path / "mark"
+    text = bpy.data.texts.new("hostile.py")
+    text.write(f"open({str(mark)!r}, 'w').close()\n")
+    text.use_module = True
+    save_blend(tmp_path / "site.blend")
+    trusts = bpy.context.preferences.filepaths
+    trusts.use_scripts_auto_execute, before = True, trusts.use_scripts_auto_execute
+    try:
+        open_blend(tmp_path / "site.blend")
+    finally:
+        trusts.use_scripts_auto_execute = before
+    assert "hostile.py" in bpy.data.texts
+    assert not mark.exists()
+
+
+def test_a_disk_without_room_has_its_sentence_and_keeps_what_was_there(tmp_path):
+    """A limit on the size of files stands for a full disk."""
+    script = (
+        "import resource, sys; from pathlib import Path\n"
+        "import headless.session, bpy\n"
+        "from seip_addon.core.errors import SeipError\n"
+        "from seip_addon.scene.blend_file import new_file, save_blend\n"
+        "new_file()\n"
+        "mesh = bpy.data.meshes.new('much'); mesh.vertices.add(200_000)\n"
+        "mesh.vertices.foreach_set('co', [i * .7919 % 1 for i in range(600_000)])\n"
+        "bpy.context.scene.collection.objects.link(bpy.data.objects.new('much', mesh))\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))\n"
+        "try:\n    save_blend(Path(sys.argv[1]))\n"
+        "except SeipError as error:\n    print(error)\n"
+    )
+    path = tmp_path / "site.blend"
+    path.write_bytes(b"before")
+    command = [sys.executable, "-c", script, str(path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)  # noqa: S603  # ours
+    assert done.returncode == 0, done.stderr
+    assert f"cannot write {path} to its end; make room there" in done.stdout
+    assert [entry.name for entry in tmp_path.iterdir()] == ["site.blend"]
+    assert path.read_bytes() == b"before"
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no blend"])

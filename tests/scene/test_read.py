@@ -338,3 +338,11 @@ def test_a_missing_library_is_named(scene, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     with pytest.raises(SeipError, match=r"is linked from .*library\.blend, which is not there"):
         read_scene(bpy.context.scene)
+
+
+def test_faces_of_vertices_that_are_not_there_are_named(scene):
+    """As in a damaged file: Blender opens it."""
+    mesh = sheet(scene, "torn", (contract.OCCLUDERS,), 1, 1, (0, 20, 0)).data
+    mesh.attributes[".corner_vert"].data.foreach_set("value", [0, 1, 2, 99])
+    with pytest.raises(SeipError, match=r"object 'torn' has a vertex .* repair or delete it"):
+        read_scene(scene)

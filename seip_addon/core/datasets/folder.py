@@ -98,7 +98,7 @@ def load_manifest(folder: str | Path) -> Record:
         complete = not known or manifest.keys() >= PARTS
     except FileNotFoundError as error:
         raise SeipError(f"there is no dataset in {folder}: it has no {MANIFEST}; write one") from error
-    except (OSError, ValueError, TypeError, LookupError) as error:
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         raise SeipError(f"{path} is damaged; delete the folder and write the dataset again") from error
     if not known:
         raise SeipError(f"{path} is not of this version; write the dataset again into another folder")

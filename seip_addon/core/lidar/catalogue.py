@@ -70,7 +70,7 @@ def find_models(catalogue: Mapping[str, LidarModel], keys: Sequence[str]) -> dic
 def _parse(text: str, file: str) -> dict[str, LidarModel]:
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SeipError(f"{file} is not valid TOML: {error}") from error
     return {key: _model(key, table, file) for key, table in tables.items()}
 

@@ -143,7 +143,7 @@ def load_placement_record(path: str | os.PathLike[str]) -> Record:
         record: Record = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SeipError(f"{path} is damaged or no JSON: {error}; place the sensors again") from error
     schema = record.get("schema") if isinstance(record, dict) else None
     if schema != SCHEMA:

@@ -8,11 +8,38 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_file import ArrayFile, ArrayRule, ContentError
 from ..arrays import Boolean, Float, Integer, Text
-from ..storage import ArrayFile
+from ..traffic.trajectories import CATEGORIES
 
-FILE = ArrayFile("seip.frame", 1, "frame of scans", "simulate it again", compressed=False)
-_POINTS = ("points", "sensor", "delay", "intensity", "instance")
+_FARTHEST = 1e7
+"""Metres from the local origin within which all points and boxes lie."""
+
+_ABOUT_ONE = 1.0 + 1e-5
+"""1, as float32 may round it."""
+
+_POINTS = {
+    "points": ArrayRule("f4", ("n", 3), -_FARTHEST, _FARTHEST),
+    "sensor": ArrayRule("i2", ("n",), 0),
+    "delay": ArrayRule("f4", ("n",), -1e3, 1e3),
+    "intensity": ArrayRule("f4", ("n",), 0.0, _ABOUT_ONE),
+    "instance": ArrayRule("i4", ("n",), -1),
+}
+_LABELS = {
+    "labels.user": ArrayRule("i8", ("k",), 0),
+    "labels.category": ArrayRule("U", ("k",)),
+    "labels.centre": ArrayRule("f8", ("k", 3), -_FARTHEST, _FARTHEST),
+    "labels.size": ArrayRule("f8", ("k", 3), 0.0, 1e3),
+    "labels.yaw": ArrayRule("f8", ("k",), -4.0, 4.0),
+    "labels.pitch": ArrayRule("f8", ("k",), -2.0, 2.0),
+    "labels.speed": ArrayRule("f8", ("k",), -1e6, 1e6),
+    "labels.points": ArrayRule("i8", ("k", "s"), 0),
+    "labels.visibility": ArrayRule("f8", ("k",), 0.0, _ABOUT_ONE),
+    "labels.inside": ArrayRule("b1", ("k",)),
+}
+FILE = ArrayFile(
+    "seip.frame", 2, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False, undigested=True
+)
 
 STATIC = -1
 """The instance of a point that is on no road user."""
@@ -106,4 +133,18 @@ class Frame:
         """
         with FILE.reading(path) as (header, arrays):
             labels = Labels(**{part.name: arrays[f"labels.{part.name}"] for part in fields(Labels)})
-            return cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})
+            frame = cls(time=float(header["time"]), labels=labels, **{name: arrays[name] for name in _POINTS})
+            frame._check()  # its own
+            return frame
+
+    def _check(self) -> None:
+        """Raise `ContentError` where parts contradict each other."""
+        labels = self.labels
+        if not set(labels.category.tolist()) <= set(CATEGORIES):
+            raise ContentError("a label has an unknown category")
+        if (np.diff(labels.user) <= 0).any():
+            raise ContentError("road users are labelled twice")
+        if not np.isin(self.instance[self.instance != STATIC], labels.user).all():
+            raise ContentError("points lie on road users without a label")
+        if len(self) and int(self.sensor.max()) >= labels.points.shape[1]:
+            raise ContentError("points are from sensors that the labels do not count")

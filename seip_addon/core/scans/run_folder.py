@@ -163,14 +163,33 @@ def load_manifest(folder: Path) -> Record:
     path = folder / MANIFEST
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-        known = record["schema"] == SCHEMA and isinstance(record["key"], str) and isinstance(record["frames"], list)
+        known = record["schema"] == SCHEMA
+        whole = known and _is_whole(record)
     except FileNotFoundError as error:
         raise SeipError(f"{folder} holds no run of scans: make one with headless/simulate.py") from error
-    except (OSError, ValueError, LookupError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise SeipError(f"{path} is damaged: delete the folder and simulate again") from error
     if not known:
         raise SeipError(f"{path} is not of this version: delete the folder and simulate again")
+    if not whole:
+        raise SeipError(f"{path} is damaged: delete the folder and simulate again")
     return dict(record)
+
+
+def _is_whole(record: Record) -> bool:
+    """Return whether a manifest has what is read of it, and its frames are counted from 0."""
+    sensors = np.array([sensor["local_m"] for sensor in record["sensors"]], dtype=np.float64)
+    texts = [record["key"], record["trajectories"]["source"], *(sensor["sensor"] for sensor in record["sensors"])]
+    texts += [frame["sha256"] for frame in record["frames"]]
+    names = [frame["name"] for frame in record["frames"]]
+    return (
+        isinstance(record["complete"], bool)
+        and sensors.shape == (len(sensors), 3)
+        and bool(np.isfinite(sensors).all())
+        and all(isinstance(text, str) for text in texts)
+        and names == [f"{number:06d}" for number in range(len(names))]
+        and bool(names) >= record["complete"]
+    )
 
 
 def load_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
@@ -185,7 +204,11 @@ def load_frames(folder: Path) -> Iterator[tuple[str, Frame]]:
     if not record["complete"]:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
     for entry in record["frames"]:
-        yield entry["name"], Frame.load(folder / FRAMES / f"{entry['name']}.npz")
+        path = folder / FRAMES / f"{entry['name']}.npz"
+        frame = Frame.load(path)
+        if content_hash(frame) != entry["sha256"]:
+            raise SeipError(f"{path} is a frame of another run: delete {folder} and simulate again")
+        yield entry["name"], frame
 
 
 def frame_path(folder: Path, number: int) -> Path:

@@ -60,7 +60,7 @@ def load_chapter(path: Path, key: str) -> Chapter | None:
             return None
         rows = tuple(Row(**row) for row in kept["rows"])
         return Chapter(kept["title"], rows, tuple(Chart(**chart) for chart in kept["charts"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
 
 

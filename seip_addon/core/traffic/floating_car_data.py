@@ -24,7 +24,7 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from ..storage import digest
-from .sumo_files import Attributes, opened, read_tags
+from .sumo_files import FARTHEST, Attributes, opened, quoted, read_tags, short
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
@@ -168,7 +168,7 @@ def read_trajectories(
 def some(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
     more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return ", ".join(short(name) for name in names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def unwrapped(yaw: Float, first: Integer) -> Float:
@@ -218,7 +218,7 @@ class _Rows:
 
     def begin(self, text: str) -> None:
         """Begin a step of the simulation."""
-        time = self._number(text, "time", "a time step")
+        time = self._number(text, "time", "a time step", 1e11)
         if time < self._time:
             raise SeipError(
                 f"{self._file}: times run backwards, {time:g} s comes after {self._time:g} s; "
@@ -232,8 +232,8 @@ class _Rows:
         if not self._window.begin <= self._time <= self._window.end:
             return
         name = row.get("id", "")
-        x = self._number(row.get("x", ""), "x", name) - self._shift_x
-        y = self._number(row.get("y", ""), "y", name) - self._shift_y
+        x = self._number(row.get("x", ""), "x", name, FARTHEST) - self._shift_x
+        y = self._number(row.get("y", ""), "y", name, FARTHEST) - self._shift_y
         left, low, right, high = self._window.bounds
         key = (name, walks)
         if not (left <= x <= right and low <= y <= high):
@@ -248,9 +248,9 @@ class _Rows:
             self._time,
             x,
             y,
-            math.nan if z == "nan" else self._number(z, "z", name),
-            self._number(row.get("angle", ""), "angle", name),
-            self._number(row.get("speed") or "0", "speed", name),
+            math.nan if z == "nan" else self._number(z, "z", name, FARTHEST),
+            self._number(row.get("angle", ""), "angle", name, 1e4),
+            self._number(row.get("speed") or "0", "speed", name, 1e3),
         )
         for column, value in zip(self._columns, values, strict=True):
             column.append(value)
@@ -269,7 +269,7 @@ class _Rows:
         if twice.any():
             number = int(np.flatnonzero(twice)[0])
             raise SeipError(
-                f"{self._file}: road user {names[user[number]]!r} is there twice at {time[number]:g} s; "
+                f"{self._file}: road user {quoted(names[user[number]])} is there twice at {time[number]:g} s; "
                 "it must be the record of one simulation"
             )
         first = np.searchsorted(user, np.arange(len(names) + 1))
@@ -285,14 +285,17 @@ class _Rows:
             elsewhere=len(self._outside.difference(self._numbers)),
         )
 
-    def _number(self, text: str, what: str, where: str) -> float:
+    def _number(self, text: str, what: str, where: str, most: float) -> float:
         try:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
+        if not abs(value) <= most:
             known = f" at {self._time:g} s" if math.isfinite(self._time) else ""
-            raise SeipError(f"{self._file}: {what}={text!r} of {where!r}{known} is no number; write the file again")
+            fault = f"is beyond {most:g}" if math.isfinite(value) else "is no number"
+            raise SeipError(
+                f"{self._file}: {what}={quoted(text)} of {quoted(where)}{known} {fault}; write the file again"
+            )
         return value
 
 
@@ -309,7 +312,13 @@ def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, 
                     "name what SUMO's --fcd-output or its xml2csv wrote"
                 )
             for number, cells in enumerate(table):
-                _take_line(dict(zip(columns, cells, strict=False)), rows)
+                if len(cells) not in {0, len(columns)}:  # a blank line has none
+                    raise SeipError(
+                        f"{Path(path).name}: line {table.line_num + 1} has {len(cells)} cells under {len(columns)} "
+                        "columns; write the file again"
+                    )
+                if cells:
+                    _take_line(dict(zip(columns, cells, strict=True)), rows)
                 if number % _LINES == 0:
                     yield progress()
         except (UnicodeDecodeError, csv.Error) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import math
 import os
 import zlib
 from collections.abc import Callable, Generator, Iterator
@@ -19,6 +20,10 @@ from ..progress import Progress
 
 Attributes = dict[str, str]
 
+FARTHEST = 1e8
+"""Metres of a coordinate at most: more than the circumference of the Earth."""
+
+_LONGEST = 60  # characters of a file that a message repeats
 _CHUNK = 1 << 20
 _GZIP = b"\x1f\x8b"
 
@@ -86,6 +91,18 @@ def read_tags(
             parser.Parse(b"", True)  # noqa: FBT003  # takes no name
         except expat.ExpatError as error:
             raise SeipError(f"{name} is broken or unfinished XML ({error}); let SUMO finish writing it") from error
+        except (LookupError, ValueError) as error:  # of an encoding that Python knows not, or expat does not take
+            raise SeipError(f"{name} is XML in an encoding that cannot be read ({error}); save it as UTF-8") from error
+
+
+def short(text: str) -> str:
+    """Return a text out of a file as a message repeats it: cut where it is long."""
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
+
+def quoted(text: str) -> str:
+    """Return a text out of a file as a message quotes it: cut where it is long, and on one line."""
+    return repr(short(text))
 
 
 def read_net_offset(path: str | os.PathLike[str]) -> Float:
@@ -107,6 +124,8 @@ def read_net_offset(path: str | os.PathLike[str]) -> Float:
             break
     try:
         x, y = (float(number) for number in found[0].split(","))
-    except (IndexError, ValueError) as error:
-        raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml") from error
+    except (IndexError, ValueError):
+        x = y = math.nan
+    if not (abs(x) <= FARTHEST and abs(y) <= FARTHEST):
+        raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml")
     return np.array([x, y])

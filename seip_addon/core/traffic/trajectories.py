@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ..array_file import ArrayFile, ArrayRule, ContentError
 from ..arrays import Float, Integer
-from ..storage import ArrayFile, digest
+from ..storage import digest
 
-FILE = ArrayFile("seip.trajectories", 1, "file of trajectories", "import or simulate them again")
-_ARRAYS = ("origin", "first", "time", "position", "yaw", "pitch", "speed")
+LARGEST = 100.0
+"""Metres of length, width or height of a road user at most."""
+
+LONGEST = 30.0 * 86400.0
+"""Seconds from the first sample of trajectories to the last at most: 30 days."""
+
+WIDEST = 1e6
+"""Metres from one sample to another at most, along each axis."""
+
+_ARRAYS = {
+    "origin": ArrayRule("f8", (3,), -1e8, 1e8),
+    "first": ArrayRule("i8", ("users + 1",), 0),
+    "time": ArrayRule("f8", ("samples",), -1e11, 1e11),
+    "position": ArrayRule("f8", ("samples", 3), -1e8, 1e8),
+    "yaw": ArrayRule("f8", ("samples",), -1e5, 1e5),
+    "pitch": ArrayRule("f8", ("samples",), -math.pi / 2.0, math.pi / 2.0),
+    "speed": ArrayRule("f8", ("samples",), -1e3, 1e3),
+}
+FILE = ArrayFile(
+    "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
+)
 
 CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")
 """What a road user can be; labels and bodies go by these."""
@@ -177,4 +198,46 @@ class Trajectories:
         """
         with FILE.reading(path) as (header, arrays):
             users = tuple(RoadUser(**user) for user in header["users"])
-            return cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
+            read = cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
+            _check_users(users)
+            _check_samples(read)
+            return read
+
+
+def _check_users(users: tuple[RoadUser, ...]) -> None:
+    """Raise `ContentError` where a road user is none."""
+    for user in users:
+        sizes = (user.length, user.width, user.height)
+        if not isinstance(user.name, str) or user.category not in CATEGORIES:
+            raise ContentError(f"road user {str(user.name)[:40]!r} is {str(user.category)[:40]!r}")
+        if not all(isinstance(size, int | float) and 0.0 < size <= LARGEST for size in sizes):
+            raise ContentError(f"road user {user.name[:40]!r} is {str(sizes)[:80]} m large")
+        if not (isinstance(user.paint, int | float) and 0.0 <= user.paint <= 1.0):
+            raise ContentError(f"the paint of road user {user.name[:40]!r} reflects {str(user.paint)[:40]}")
+
+
+def _check_samples(read: Trajectories) -> None:
+    """Raise `ContentError` where samples contradict each other or the road users."""
+    count, first = len(read.time), read.first
+    if not len(read.users) or len(first) != len(read.users) + 1:
+        raise ContentError(f"it names {len(read.users)} road users and has the samples of {len(first) - 1}")
+    if first[0] != 0 or first[-1] != count or (np.diff(first) < 1).any():
+        raise ContentError("its samples are not those of its road users, one after the other")
+    within = np.ones(max(count - 1, 0), dtype=np.bool_)
+    within[first[1:-1] - 1] = False
+    late = within & (np.diff(read.time) <= 0)
+    if late.any():
+        user = int(np.searchsorted(first, np.flatnonzero(late)[0], side="right")) - 1
+        raise ContentError(f"the times of road user {read.users[user].name[:40]!r} do not ascend")
+    if (within & (np.abs(np.diff(read.yaw)) > math.pi + _ROUNDED)).any():
+        raise ContentError("a heading leaps by more than half a turn")
+    begin, end = read.span
+    if end - begin > LONGEST:
+        raise ContentError(f"it lasts {end - begin:g} s")
+    widest = float(np.ptp(read.position, axis=0).max())
+    if widest > WIDEST:
+        raise ContentError(f"its road users are up to {widest / 1e3:,.0f} km apart")
+
+
+_ROUNDED = 1e-3
+"""Radians by which rounding may widen a turn."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..errors import SeipError
 from ..progress import Progress
-from .sumo_files import Attributes, read_tags
+from .sumo_files import Attributes, quoted, read_tags
 
 
 @dataclass(frozen=True)
@@ -140,5 +140,6 @@ def _size(attributes: Attributes, what: str, usual: float, file: str) -> float:
     except ValueError:
         size = math.nan
     if not 0.0 < size < 100.0:
-        raise SeipError(f"{file}: {what}={text!r} of vType {attributes.get('id')!r} is no size in metres; correct it")
+        kind = quoted(attributes.get("id", ""))
+        raise SeipError(f"{file}: {what}={quoted(text)} of vType {kind} is no size in metres; correct it")
     return size

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_file import ArrayFile, ArrayRule, ContentError
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..lidar import LidarModel, find_models
 from ..progress import Progress
 from ..site import Site
 from ..source_digest import source_digest
-from ..storage import ArrayFile, digest
+from ..storage import digest
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
 from .ray_casting import Engine, RayCaster, engine_name
@@ -31,7 +32,14 @@ from .scanning import Place
 from .sight import seen_by_tilted_full_scan
 from .work_force import ObserverTask, cluster, threads_of
 
-FILE = ArrayFile("seip.visibility", 1, "visibility grid", "delete it and compute it again")
+FILE = ArrayFile(
+    "seip.visibility",
+    2,
+    "visibility grid",
+    "delete it and compute it again",
+    {"packed": ArrayRule("u1", ("poses", "bytes"))},
+    undigested=True,
+)
 
 WIDEST_DELTA = 100.0
 """Metres: a wider one is a slip of the keyboard."""
@@ -124,8 +132,8 @@ class VisibilityGrid:
         with FILE.reading(path) as (header, arrays):
             packed = arrays["packed"]
             shape = (int(header["shape"][0]), int(header["shape"][1]))
-            if packed.dtype != np.uint8 or packed.shape != (shape[0], (shape[1] + 7) // 8):
-                raise ValueError(f"bits of the shape {packed.shape} for a grid of {shape}")
+            if min(shape) < 1 or packed.shape != (shape[0], (shape[1] + 7) // 8):
+                raise ContentError(f"it has bits of the shape {packed.shape} for a grid of {shape}")
             return cls(packed, shape, str(header["key"]), dict(header["parameters"]))
 
 

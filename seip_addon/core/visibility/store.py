@@ -5,20 +5,28 @@ from __future__ import annotations
 import functools
 import re
 import shutil
-import zipfile
 from collections.abc import Generator, Mapping
 from pathlib import Path
 
 import numpy as np
 
+from ..array_file import ArrayFile, ArrayRule
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..progress import Progress
 from ..site import Site
-from ..storage import whole_file
 from .grid import VisibilityGrid, VisibilitySettings, compute_visibility, visibility_key
 from .observer import Rows
 from .ray_casting import Engine, engine_name
+
+_PIECE = ArrayFile(
+    "seip.visibility-piece",
+    1,
+    "piece of a visibility grid",
+    "delete it and compute it again",
+    {"packed": ArrayRule("u1", ("poses", "bytes")), "rays": ArrayRule("i8", (), 0)},
+    compressed=False,
+)
 
 
 class PieceFolder:
@@ -37,25 +45,23 @@ class PieceFolder:
         self._prefix = key[:16]
         for other in self._folder.glob("*.npz"):
             if not other.name.startswith(self._prefix):
-                other.unlink()
+                other.unlink(missing_ok=True)  # another process may be at it too
 
     def load(self, number: int) -> Rows | None:
         """Return a piece, or None where there is none that can be used."""
         try:
-            with self._file(number).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            with _PIECE.reading(self._file(number)) as (_, arrays):
                 return Rows(arrays["packed"], int(arrays["rays"]))
-        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+        except SeipError:
             return None
 
     def save(self, number: int, rows: Rows) -> None:
         """Write a piece."""
-        with whole_file(self._file(number)) as temporary, temporary.open("wb") as file:
-            np.savez(file, packed=rows.packed, rays=np.array(rows.rays))
+        _PIECE.save(self._file(number), {}, {"packed": rows.packed, "rays": np.array(rows.rays)})
 
     def remove(self) -> None:
         """Remove the folder, once the grid is whole."""
-        if self._folder.exists():
-            shutil.rmtree(self._folder)
+        shutil.rmtree(self._folder, ignore_errors=True)  # another process may have, or be at it too
 
     def _file(self, number: int) -> Path:
         return self._folder / f"{self._prefix}-{number:06d}.npz"

@@ -103,7 +103,8 @@ def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
     Parameters
     ----------
     address : str
-        Of the scheduler, like ``tcp://10.0.0.1:8786``. Its workers must be able to import this package.
+        Of the scheduler, like ``tcp://10.0.0.1:8786``, or ``tls://10.0.0.1:8786`` with the certificates that Dask's
+        settings name. Its workers must be able to import this package.
     task : ObserverTask
 
     Raises
@@ -120,6 +121,11 @@ def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
         ) from error
     try:
         client = Client(address, timeout=_SECONDS_FOR_AN_ANSWER, set_as_default=False)
+    except TypeError as error:  # what distributed raises on an address with TLS, and no certificates
+        raise SeipError(
+            f"{address} needs certificates: name them in Dask's settings distributed.comm.tls.ca-file, client.cert and "
+            "client.key"
+        ) from error
     except (OSError, ValueError) as error:
         raise SeipError(f"no Dask scheduler answers at {address}; start one, or check the address") from error
     with client:

@@ -1,0 +1,71 @@
+"""Write `wheels.lock`: the SHA-256 of each wheel that a pin of ``pyproject.toml`` stands for.
+
+    python -m headless.lock_wheels
+
+pip names the wheel that it would take for each pin, Python and platform, and
+its digest; packages are installed, and wheels bundled in the extension, only
+where they are these. To be run after a pin has changed.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from headless.build_extension import PYTHONS, WHEEL_TAGS, pins
+from headless.set_up import LOCK, SUPPORTED, UNLOCKED, requirements
+
+from packaging.requirements import Requirement
+
+GROUPS = ("installer", "development", "traffic", "detection", "second-opinion")
+"""What `headless.set_up` installs; the groups ``benchmark`` and ``readers`` are tried out apart from the rest."""
+
+NEWEST_GLIBC = 36
+"""Of Debian 12, the oldest system that is tried: 2.36."""
+
+
+def main() -> None:
+    """Ask pip for the wheels of all pins and write the lock."""
+    everything = sorted({pin for group in GROUPS for pin in requirements(group) if pin.split("==")[0] not in UNLOCKED})
+    linux = [f"manylinux_2_{minor}_x86_64" for minor in range(NEWEST_GLIBC, 4, -1)]
+    found: dict[str, str] = {}
+    for version in SUPPORTED:
+        found |= wheels(everything, "{}.{}".format(*version), linux)
+    for tags in WHEEL_TAGS.values():
+        for python in PYTHONS:
+            found |= wheels(pins(), python, list(tags))
+    LOCK.write_text("".join(f"{found[name]}  {name}\n" for name in sorted(found)), encoding="utf-8")
+    sys.stdout.write(f"{LOCK.name}: {len(found)} wheels\n")
+
+
+def wheels(wanted: list[str], python: str, platforms: list[str]) -> dict[str, str]:
+    """Return the digests of the wheels that pip takes for a Python and platform, by their names."""
+    fitting = [
+        f"{pin.name}{pin.specifier}"
+        for pin in map(Requirement, wanted)
+        if pin.marker is None or pin.marker.evaluate({"python_version": python})
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.json"
+        command = [
+            *(sys.executable, "-m", "pip", "install", "--dry-run", "--quiet", "--ignore-installed", "--no-deps"),
+            *("--only-binary", ":all:", "--target", folder, "--python-version", python, "--report", str(report)),
+            *(f"--platform={platform}" for platform in platforms),
+            *fitting,
+        ]
+        if subprocess.run(command, check=False, stdin=subprocess.DEVNULL).returncode != 0:  # noqa: S603  # pip, our pins
+            sys.exit(f"pip finds no wheels for Python {python} on {platforms[0]}: see its message above")
+        installed = json.loads(report.read_text(encoding="utf-8"))["install"]
+    sources = [package["download_info"] for package in installed]
+    return {
+        unquote(Path(urlsplit(source["url"]).path).name): source["archive_info"]["hashes"]["sha256"]
+        for source in sources
+    }
+
+
+if __name__ == "__main__":
+    main()

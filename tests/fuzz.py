@@ -1,0 +1,629 @@
+"""Hostile files of each format, seeded: a reader gives a result or a SeipError, and nothing else.
+
+    python -m tests.fuzz --count 1000            # of each format
+    python -m tests.fuzz map npz --count 5000 --seed 7
+
+Inputs are read in a process of their own, so that one that hangs, crashes or fills the memory is counted and named
+like the rest; ``--keep DIR`` writes what was at fault. Crashes within Blender's own reader are counted, and no fault
+of this project. A mutation that makes a file contradict itself says so, and
+then a result is a fault too. Status 1 where there was any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import io
+import json
+import re
+import resource
+import select
+import subprocess
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "core")]
+
+SECONDS = 60.0
+"""After which an input hangs."""
+
+MEMORY = 12 << 30
+"""Bytes of address space that a reader may take."""
+
+Random = np.random.Generator
+
+NUMBERS = ("nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "0", "-0.0", "-1", "1e9", "-1e9", "99999999999999999999")
+WORDS = ("", " ", "x", "\N{SNOWMAN}", "true", "driving", "../../etc/passwd", "a" * 5000, "%s%n", "\x7f", "0x10", "1_0")
+PIECES = (b"\x00", b"\xff\xfe", b"<", b">", b"&", b'"', b"'", b"]]>", b"<!--", b"[", b"{", b"\n", b"\r", b";", b"=")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hostile file, and whether no result may come of it."""
+
+    content: bytes
+    contradicts: bool = False
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: the sound files that are mutated, how, and what reads them."""
+
+    suffixes: tuple[str, ...]
+    samples: Callable[[Path], list[bytes]]
+    mutate: Callable[[Random, bytes], Case]
+    read: Callable[[Path, bytes], None]
+
+
+def mutated_bytes(random: Random, content: bytes) -> bytes:
+    """Flip bits, put in, take out, double, cut: one to four times."""
+    data = bytearray(content)
+    for _ in range(int(random.integers(1, 5))):
+        at = int(random.integers(len(data) + 1))
+        length = int(2 ** random.uniform(0, np.log2(len(data) + 2)))
+        kind = int(random.integers(7))
+        if kind == 0 and data:
+            data[at % len(data)] ^= 1 << int(random.integers(8))
+        elif kind == 1 and data:
+            data[at % len(data)] = int(random.integers(256))
+        elif kind == 2:
+            data[at:at] = PIECES[int(random.integers(len(PIECES)))]
+        elif kind == 3:
+            del data[at : at + length]
+        elif kind == 4:
+            data[at:at] = data[at : at + length]
+        elif kind == 5:
+            other = int(random.integers(len(data) + 1))
+            data[at:at] = data[other : other + length]
+        else:
+            del data[at:]
+    return bytes(data)
+
+
+def mutated_text(random: Random, content: bytes) -> bytes:
+    """Put other numbers and words in place of those of a text; bytes as well, now and then."""
+    if random.random() < 0.2:
+        return mutated_bytes(random, content)
+    text = content.decode("utf-8", "surrogateescape")
+    for _ in range(int(random.integers(1, 4))):
+        kind = random.random() ** 2
+        pattern = (
+            r"-?\d+\.?\d*(?:e[-+]?\d+)?" if kind < 0.6 else r"[A-Za-z_]\w*" if kind < 0.8 else r"<[^<>]*>|[^\n]+\n"
+        )
+        found = list(re.finditer(pattern, text))
+        if not found:
+            break
+        match = found[int(random.integers(len(found)))]
+        text = text[: match.start()] + _in_place_of(random, match[0], kind) + text[match.end() :]
+    return text.encode("utf-8", "surrogateescape")
+
+
+def _in_place_of(random: Random, token: str, kind: float) -> str:
+    if kind >= 0.8:
+        return "" if random.random() < 0.5 else token * int(random.integers(2, 4))
+    if kind >= 0.6 or random.random() < 0.2:
+        return WORDS[int(random.integers(len(WORDS)))]
+    if random.random() < 0.5:
+        return NUMBERS[int(random.integers(len(NUMBERS)))]
+    return repr(float(token) * float(10.0 ** random.uniform(-3, 5)) * (-1.0 if random.random() < 0.3 else 1.0))
+
+
+def _changed(random: Random, text: str, pattern: str, values: tuple[str, ...]) -> bytes:
+    """Return a text with one of the places of a pattern's first group taken by a value."""
+    found = list(re.finditer(pattern, text))
+    match = found[int(random.integers(len(found)))]
+    value = values[int(random.integers(len(values)))]
+    return (text[: match.start(1)] + value + text[match.end(1) :]).encode()
+
+
+NOT_FINITE = ("nan", "inf", "-inf", "1e999", "x", "")
+
+
+# --- maps and site descriptions
+
+
+def _maps(_: Path) -> list[bytes]:
+    from street_map import street_map  # noqa: PLC0415  # each reader loads what it needs
+
+    furniture = (
+        '<object id="1" type="building" s="30" t="20" zOffset="0" length="10" width="8" height="9" hdg="0.1"/>'
+        '<object id="2" type="tree" s="50" t="9" zOffset="0" radius="2" height="9"/>'
+        '<object id="3" type="pole" s="70" t="7" zOffset="0" radius="0.1" height="6"/>'
+        '<object id="4" type="crosswalk" s="90" t="0" length="4" width="7"><outline>'
+        '<cornerLocal u="-2" v="-3.5" z="0"/><cornerLocal u="2" v="-3.5" z="0"/><cornerLocal u="2" v="3.5" z="0"/>'
+        "</outline></object>"
+    )
+    signals = '<signal id="1" s="98" t="-6" type="1000001" subtype="-1" dynamic="yes" zOffset="4" orientation="+"/>'
+    return [
+        street_map(kerb=0.12, furniture=furniture, signals=signals, grade=0.02).encode(),
+        street_map(lane_types=("driving", "biking", "sidewalk")).encode(),
+        street_map(furniture=furniture).encode(),
+    ]
+
+
+def _mutate_map(random: Random, content: bytes) -> Case:
+    if random.random() < 0.15:
+        pattern = r'<geometry [^>]*?(?:x|y|hdg|length)="([^"]*)"'
+        return Case(_changed(random, content.decode(), pattern, NOT_FINITE), contradicts=True)
+    return Case(mutated_text(random, content))
+
+
+def _read_map(path: Path, _: bytes) -> None:
+    from seip_addon.core.opendrive import read_map  # noqa: PLC0415
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.streetscape.description import describe_place  # noqa: PLC0415
+    from seip_addon.core.streetscape.model import site_model  # noqa: PLC0415
+
+    _, description = describe_place(path, near=(0.0, 0.0), radius=30.0)
+    model = finish(site_model(read_map(path), description))
+    for part in model.parts:
+        assert np.isfinite(part.solid.vertices).all(), "a model with coordinates that are not finite"
+        assert np.isfinite([*part.foot, part.yaw]).all(), "a model at no place"
+
+
+def _descriptions(_: Path) -> list[bytes]:
+    return [(ROOT / "scenes" / f"{name}.toml").read_bytes() for name in ("junction", "corridor")]
+
+
+def _mutate_description(random: Random, content: bytes) -> Case:
+    if random.random() < 0.15:
+        values = ("nan", "inf", "-3", '"far"', "[]")
+        return Case(_changed(random, f"radius = 50\n{content.decode()}", r"radius = (\S+)", values), contradicts=True)
+    return Case(mutated_text(random, content))
+
+
+def _read_description(path: Path, _: bytes) -> None:
+    from seip_addon.core.streetscape.description import read_site_description  # noqa: PLC0415
+
+    read_site_description(path)
+
+
+def _catalogues(_: Path) -> list[bytes]:
+    return [(ROOT / "seip_addon" / "core" / "lidar" / "catalogue.toml").read_bytes()]
+
+
+def _mutate_catalogue(random: Random, content: bytes) -> Case:
+    if random.random() < 0.15:
+        pattern = r"(?:points_per_second|rotation_rate_hz) = ([\d.]+)"
+        return Case(_changed(random, content.decode(), pattern, ("nan", "inf", "-1", "0", '"x"')), contradicts=True)
+    return Case(mutated_text(random, content))
+
+
+def _read_catalogue(path: Path, _: bytes) -> None:
+    from seip_addon.core.lidar import load_catalogue  # noqa: PLC0415
+
+    for model in load_catalogue([path]).values():
+        assert np.isfinite([model.max_range, model.points_per_second, model.rotation_rate]).all(), "a model in no range"
+
+
+# --- SUMO's files
+
+
+def _floating_car_data(_: Path) -> list[bytes]:
+    from test_traffic_files import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
+
+    return [text.encode() for text in (FCD, NATIVE_CSV, CONVERTED_CSV)] + [gzip.compress(FCD.encode(), mtime=0)]
+
+
+def _mutate_floating_car_data(random: Random, content: bytes) -> Case:
+    if content.startswith(b"<") and random.random() < 0.15:
+        values = (*NOT_FINITE, "1e300") if random.random() < 0.8 else ("-7",)
+        pattern = r'timestep time="([1-9][\d.]*|0\.[24]0)"' if values == ("-7",) else r'(?:x|y|angle)="([^"]*)"'
+        return Case(_changed(random, content.decode(), pattern, values), contradicts=True)
+    return Case(mutated_bytes(random, content) if content.startswith(b"\x1f") else mutated_text(random, content))
+
+
+def _read_floating_car_data(path: Path, content: bytes) -> None:
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.traffic import Trajectories  # noqa: PLC0415
+    from seip_addon.core.traffic.floating_car_data import read_floating_car_data, read_trajectories  # noqa: PLC0415
+    from seip_addon.core.traffic.vehicle_types import BUILT_IN  # noqa: PLC0415
+
+    table = path.with_suffix(".csv")  # which form it is goes by the name
+    if not content.lstrip().startswith((b"<", b"\x1f")):
+        path = path.rename(table)
+    data = finish(read_floating_car_data(path))
+    got, _ = read_trajectories(data, BUILT_IN, np.zeros(3), "fuzz")
+    ground = replace(got, position=np.where(np.isnan(got.position), 0.0, got.position))
+    ground.save(path.with_suffix(".npz"))
+    assert Trajectories.load(path.with_suffix(".npz")).key == ground.key, "trajectories other than those written"
+
+
+def _routes(_: Path) -> list[bytes]:
+    from test_traffic_files import NET, ROUTES  # noqa: PLC0415
+
+    return [ROUTES.encode(), NET.encode()]
+
+
+def _mutate_routes(random: Random, content: bytes) -> Case:
+    if b"vType " in content and random.random() < 0.15:
+        values = (*NOT_FINITE[:-1], "0", "-1", "1e9")
+        return Case(_changed(random, content.decode(), r'(?:length|width|height)="([^"]*)"', values), contradicts=True)
+    return Case(mutated_text(random, content))
+
+
+def _read_routes(path: Path, content: bytes) -> None:
+    from seip_addon.core.progress import finish  # noqa: PLC0415
+    from seip_addon.core.traffic.sumo_files import read_net_offset  # noqa: PLC0415
+    from seip_addon.core.traffic.vehicle_types import read_vehicle_types  # noqa: PLC0415
+
+    if b"netOffset" in content:
+        assert np.isfinite(read_net_offset(path)).all(), "an offset that is not finite"
+    else:
+        finish(read_vehicle_types([path]))
+
+
+# --- files of arrays
+
+
+def _arrays(folder: Path) -> list[bytes]:
+    from test_array_file import USERS  # noqa: PLC0415
+    from traffic_by_hand import make_trajectories  # noqa: PLC0415
+
+    from seip_addon.core.scans.frame import Frame, Labels  # noqa: PLC0415
+    from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415
+
+    random = np.random.default_rng(0)
+    ways = [[(0.1 * step, step + 9.0 * user, 0.0, 0.0, 0.1 * step, 0.0) for step in range(4)] for user in range(2)]
+    trajectories = make_trajectories(*ways, users=USERS)
+    grid = VisibilityGrid(random.integers(0, 256, (9, 5)).astype(np.uint8), (9, 37), "0" * 64, {"delta": 1.0})
+    labels = Labels(
+        user=np.array([0, 3]),
+        category=np.array(["car", "bus"]),
+        centre=np.zeros((2, 3)),
+        size=np.ones((2, 3)),
+        yaw=np.zeros(2),
+        pitch=np.zeros(2),
+        speed=np.zeros(2),
+        points=np.ones((2, 2), dtype=np.int64),
+        visibility=np.ones(2),
+        inside=np.array([True, False]),
+    )
+    frame = Frame(
+        time=1.0,
+        points=random.normal(size=(50, 3)).astype(np.float32),
+        sensor=np.zeros(50, dtype=np.int16),
+        delay=np.zeros(50, dtype=np.float32),
+        intensity=random.random(50).astype(np.float32),
+        instance=np.where(random.random(50) < 0.5, -1, 3).astype(np.int32),
+        labels=labels,
+    )
+    contents = []
+    for thing in (trajectories, grid, frame):
+        thing.save(folder / "sample.npz")
+        contents.append((folder / "sample.npz").read_bytes())
+    return contents
+
+
+def _mutate_arrays(random: Random, content: bytes) -> Case:
+    if random.random() < 0.4:
+        return Case(mutated_bytes(random, content))
+    with np.load(io.BytesIO(content)) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    header = json.loads(str(arrays.pop("header")))
+    whole = random.random() < 0.5
+    if whole:  # a file of the version without a digest: its content alone is at fault
+        del header["digest"]
+        header["version"] = 1
+    name = sorted(arrays)[int(random.integers(len(arrays)))]
+    arrays[name] = _at_fault(random, arrays[name])
+    file = io.BytesIO()
+    np.savez(file, header=np.array(json.dumps(header)), **arrays)
+    return Case(file.getvalue(), contradicts=True)
+
+
+def _at_fault(random: Random, array: np.ndarray) -> np.ndarray:
+    """Return an array of another shape or type, or with a value that no file may have."""
+    kind = int(random.integers(5))
+    if kind == 0:
+        return np.concatenate([array, array[:1]]) if array.shape[0] else np.zeros((1, *array.shape[1:]))
+    if kind == 1:
+        return array[:-1]
+    if kind == 2:
+        return array.astype("U" if array.dtype.kind != "U" else "S", copy=False)
+    if kind == 3:
+        return array[None]
+    if array.dtype.kind == "f":
+        changed = array.copy()
+        changed.flat[int(random.integers(changed.size))] = (np.nan, np.inf, -np.inf, 1e30)[int(random.integers(4))]
+        return changed
+    return array.astype(np.float16) if array.dtype.kind in "iub" else array.astype(object).astype("S")
+
+
+def _read_arrays(path: Path, content: bytes) -> None:
+    from seip_addon.core.errors import SeipError  # noqa: PLC0415
+    from seip_addon.core.scans import Frame  # noqa: PLC0415
+    from seip_addon.core.traffic import Trajectories  # noqa: PLC0415
+    from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415
+
+    read = 0
+    for kind in (Trajectories, VisibilityGrid, Frame):
+        try:
+            found = kind.load(path)
+        except SeipError as error:
+            _sentence(str(error))
+        else:
+            read += 1
+            found.save(path.with_suffix(".again.npz"))
+            assert _values(path.with_suffix(".again.npz")) == _values(path), "arrays other than those written"
+    if not read:
+        raise SeipError("no kind of array file")
+
+
+def _values(path: Path) -> dict[str, bytes]:
+    with np.load(path) as stored:
+        return {name: stored[name].tobytes() for name in stored.files if name != "header"}
+
+
+# --- manifests
+
+
+def _manifests(_: Path) -> list[bytes]:
+    frame = {"name": "000000", "time_s": 0.0, "points": 5, "road_users": 1, "sha256": "0" * 64}
+    run = {
+        "schema": "seip-run/1",
+        "key": "0" * 64,
+        "complete": True,
+        "sensors": [{"label": "S1", "sensor": "type1", "local_m": [1.0, 2.0, 5.0]}],
+        "trajectories": {"source": "by hand", "road_users": 1},
+        "frames": [frame, {**frame, "name": "000001"}],
+    }
+    return [json.dumps(run, indent=1).encode()]
+
+
+def _mutate_manifest(random: Random, content: bytes) -> Case:
+    if random.random() < 0.15:
+        pattern = r'"(?:name|sensors|local_m|complete|frames)": ("\d+"|\[|true)'
+        return Case(_changed(random, content.decode(), pattern, ("NaN", '"../x"', "null", "7")), contradicts=True)
+    return Case(mutated_text(random, content))
+
+
+def _read_manifest(path: Path, _: bytes) -> None:
+    from seip_addon.core.scans.run_folder import load_manifest  # noqa: PLC0415
+
+    folder = path.parent / "run"
+    folder.mkdir(exist_ok=True)
+    path.replace(folder / "manifest.json")
+    load_manifest(folder)
+
+
+# --- Blender's files and detectors
+
+
+def _blends(folder: Path) -> list[bytes]:
+    import headless.session  # noqa: F401, PLC0415  # names the system libraries that bpy needs
+
+    import bpy  # noqa: PLC0415
+
+    from seip_addon.scene.blend_file import new_file, save_blend  # noqa: PLC0415
+
+    new_file()
+    mesh = bpy.data.meshes.new("square")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
+    for name in ("SEIP Roads", "SEIP Region"):
+        collection = bpy.data.collections.new(name)
+        bpy.context.scene.collection.children.link(collection)
+        collection.objects.link(bpy.data.objects.new(name, mesh))
+    save_blend(folder / "sample.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "plain.blend"), copy=True, compress=False)
+    packed = [folder / "sample.blend", ROOT / "scenes" / "junction.blend"]
+    return [path.read_bytes() for path in (*packed, folder / "plain.blend")]
+
+
+def _mutate_blend(random: Random, content: bytes) -> Case:
+    """Mostly other values in bytes that stay where they are: Blender itself sees what is put in or taken out."""
+    if random.random() < 0.3:
+        return Case(mutated_bytes(random, content))
+    data = np.frombuffer(content, dtype=np.uint8).copy()
+    where = random.integers(len(data), size=int(2 ** random.uniform(0, 8)))
+    data[where] = random.integers(256, size=len(where))
+    return Case(data.tobytes())
+
+
+def _read_blend(path: Path, _: bytes) -> None:
+    import headless.session  # noqa: F401, PLC0415
+
+    import bpy  # noqa: PLC0415
+
+    from seip_addon.scene.blend_file import open_blend  # noqa: PLC0415
+    from seip_addon.scene.read import read_scene  # noqa: PLC0415
+
+    open_blend(path)
+    geometry = read_scene(bpy.context.scene).geometry
+    assert all(np.isfinite(part.triangles).all() for part in geometry.roads), "a road at no place"
+
+
+def _detectors(folder: Path) -> list[bytes]:
+    from headless.detection.detector import Detector, Experience  # noqa: PLC0415
+    from headless.detection.pillars import grid_over  # noqa: PLC0415
+    from headless.detection.settings import NetworkSettings  # noqa: PLC0415
+
+    network = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
+    grid = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), network.pillar)
+    Detector(network, grid, seed=1, experience=Experience(("type1",), ("Junction",))).save(folder / "sample.pt")
+    return [(folder / "sample.pt").read_bytes()]
+
+
+def _mutate_detector(random: Random, content: bytes) -> Case:
+    import torch  # noqa: PLC0415
+
+    if random.random() < 0.5:
+        return Case(mutated_bytes(random, content))
+    state = torch.load(io.BytesIO(content), weights_only=True)
+    if random.random() < 0.7:
+        del state["digest"]
+        state["version"] = 1
+    values = (None, -5, 1e300, "x", float("nan"), [], {}, torch.full((2,), float("nan")))
+    value = values[int(random.integers(len(values)))]
+    table = ("settings", "grid", "weights", "experience", None)[int(random.integers(5))]
+    inner = state if table is None else state[table]
+    names = [name for name in inner if name not in {"version", "digest"}]
+    name = names[int(random.integers(len(names)))]
+    inner[name] = value
+    file = io.BytesIO()
+    torch.save(state, file)
+    empty = isinstance(value, list | dict) and table in {"experience", None}
+    harmless = empty or (value == -5 and name in {"west", "south", "bottom"})
+    return Case(file.getvalue(), contradicts=not harmless)
+
+
+def _read_detector(path: Path, _: bytes) -> None:
+    from headless.detection.detector import Detector  # noqa: PLC0415
+
+    Detector.load(path)
+
+
+FORMATS = {
+    "map": Format((".xodr",), _maps, _mutate_map, _read_map),
+    "site": Format((".toml",), _descriptions, _mutate_description, _read_description),
+    "catalogue": Format((".toml",), _catalogues, _mutate_catalogue, _read_catalogue),
+    "fcd": Format((".xml",), _floating_car_data, _mutate_floating_car_data, _read_floating_car_data),
+    "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),
+    "npz": Format((".npz",), _arrays, _mutate_arrays, _read_arrays),
+    "manifest": Format((".json",), _manifests, _mutate_manifest, _read_manifest),
+    "blend": Format((".blend",), _blends, _mutate_blend, _read_blend),
+    "pt": Format((".pt",), _detectors, _mutate_detector, _read_detector),
+}
+
+
+def is_fault(key: str, line: str) -> bool:
+    """Return whether an outcome is a fault of this project: Blender's own reader falls over some damaged files."""
+    return line not in {"result", "refused"} and not (key == "blend" and line.startswith("crash: status -11"))
+
+
+def _sentence(text: str) -> None:
+    assert text, "an error without a word"
+    assert len(text) < 1500, f"a sentence of {len(text)} characters"
+
+
+def case_of(key: str, samples: list[bytes], seed: int, number: int) -> Case:
+    """Return an input: the same for the same format, seed and number."""
+    random = np.random.default_rng([seed, number, *key.encode()])
+    return FORMATS[key].mutate(random, samples[int(random.integers(len(samples)))])
+
+
+def outcome(key: str, case: Case, folder: Path) -> str:
+    """Read an input; return ``result``, ``refused``, or what is at fault, in one line."""
+    from seip_addon.core.errors import SeipError  # noqa: PLC0415
+
+    path = folder / f"input{FORMATS[key].suffixes[0]}"
+    path.write_bytes(case.content)
+    try:
+        FORMATS[key].read(path, case.content)
+    except SeipError as error:
+        try:
+            _sentence(str(error))
+        except AssertionError as fault:
+            return f"sentence: {fault}"
+        return "refused"
+    except BaseException as error:  # noqa: BLE001  # whatever it is, it is what is looked for
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        what = str(error).replace("\n", " ")[:160]
+        return f"traceback: {type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {what}"
+    return "accepted: a file that contradicts itself" if case.contradicts else "result"
+
+
+def _work(key: str, seed: int, begin: int, count: int) -> None:
+    """Read inputs in this process, and say of each how it went; readers' own words go elsewhere."""
+    import os  # noqa: PLC0415
+
+    said = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
+        samples = FORMATS[key].samples(Path(folder))
+        said.write("ready\n")
+        for number in range(begin, begin + count):
+            said.write(f"{number} {outcome(key, case_of(key, samples, seed, number), Path(folder))}\n")
+    os._exit(0)
+
+
+def fuzz(key: str, seed: int, count: int) -> list[str]:
+    """Return how each of some inputs of a format went."""
+    went: list[str] = []
+    while len(went) < count:
+        command = [
+            sys.executable,
+            "-m",
+            "tests.fuzz",
+            key,
+            "--worker",
+            str(len(went)),
+            "--count",
+            str(count - len(went)),
+        ]
+        process = subprocess.Popen(  # noqa: S603  # this file
+            [*command, "--seed", str(seed)],
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE if not went else subprocess.DEVNULL,
+            text=True,
+            bufsize=1,
+        )
+        assert process.stdout is not None
+        ready = False
+        while True:
+            waited, _, _ = select.select([process.stdout], [], [], SECONDS)
+            line = process.stdout.readline() if waited else ""
+            if not line:
+                break
+            if ready:
+                went.append(line.rstrip("\n").partition(" ")[2])
+            ready = True
+        process.kill()
+        status = process.wait()
+        process.stdout.close()
+        if not ready:
+            raise RuntimeError(f"the reader of {key} does not start: status {status}")
+        if len(went) < count:
+            went.append(f"hang: after {SECONDS:g} s" if not waited else f"crash: status {status}")
+    return went
+
+
+def main(arguments: list[str]) -> int:
+    """Run the formats asked for and print counts."""
+    parser = argparse.ArgumentParser(prog="fuzz", description="Read hostile files of each format.")
+    parser.add_argument("formats", nargs="*", choices=[*FORMATS, []], help="which (all)")
+    parser.add_argument("--count", type=int, default=300, help="inputs of each format (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="folder for inputs that were at fault")
+    parser.add_argument("--worker", type=int, metavar="BEGIN", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.worker is not None:
+        _work(options.formats[0], options.seed, options.worker, options.count)
+    faults = 0
+    for key in options.formats or FORMATS:
+        went = fuzz(key, options.seed, options.count)
+        counts = Counter(line.partition(":")[0] for line in went)
+        wrong = {number: line for number, line in enumerate(went) if line not in {"result", "refused"}}
+        lines = [f"{key}: {options.count} inputs, {', '.join(f'{counts[kind]} {kind}' for kind in sorted(counts))}"]
+        for line, number in Counter(wrong.values()).most_common(20):
+            lines.append(f"  {number} × {line}, first input {next(n for n, other in wrong.items() if other == line)}")
+        sys.stdout.write("\n".join([*lines, ""]))
+        faults += sum(is_fault(key, line) for line in wrong.values())
+        if options.keep is not None:
+            _keep(key, options.seed, list(wrong), options.keep)
+        sys.stdout.flush()
+    return 1 if faults else 0
+
+
+def _keep(key: str, seed: int, numbers: list[int], folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as scratch:
+        samples = FORMATS[key].samples(Path(scratch))
+    for number in numbers:
+        content = case_of(key, samples, seed, number).content
+        (folder / f"{key}-{seed}-{number}{FORMATS[key].suffixes[0]}").write_bytes(content)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,26 @@
+"""Hostile files of each format give a result or one sentence: see `tests/fuzz.py`, which runs any number of them."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from fuzz import FORMATS, case_of, fuzz, is_fault
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", FORMATS)
+def test_hostile_files_give_a_result_or_a_sentence(key):
+    if key == "pt":
+        pytest.importorskip("torch", reason="make detection installs it")
+    went = fuzz(key, seed=1, count=300)
+    assert len(went) == 300
+    assert [line for line in went if is_fault(key, line)] == []
+
+
+def test_inputs_are_the_same_for_the_same_seed():
+    sample = FORMATS["site"].samples(Path())
+    one, other = (case_of("site", sample, 3, 5) for _ in range(2))
+    assert one == other
+    assert one != case_of("site", sample, 3, 6)
