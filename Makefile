@@ -18,6 +18,7 @@ PYTHON ?= python3
 VENV ?= .venv
 PLATFORMS ?= linux-x64
 PY := "$(VENV)/bin/python"
+SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
@@ -34,10 +35,10 @@ demo: environment
 	@echo "pictures: out/junction/"; ls out/junction/*.png
 
 test: environment
-	$(PY) -m pytest -m "not slow"
+	$(PY) -m pytest $(SPREAD) -m "not slow"
 
 test-slow: environment
-	$(PY) -m pytest -m slow
+	$(PY) -m pytest $(SPREAD) -m slow
 
 lint: environment
 	$(PY) -m ruff check
