@@ -565,7 +565,7 @@ def fuzz(key: str, seed: int, count: int) -> list[str]:
             cwd=ROOT,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE if not went else subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
             text=True,
             bufsize=1,
         )
