@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,7 +141,7 @@ class ArrayFile:
             The file is not there, damaged, something else, or of another version.
         """
         try:
-            with Path(path).open("rb") as file, zipfile.ZipFile(file) as archive:
+            with Path(path).open("rb") as file, _archive(file) as archive:
                 header = _read_header(archive)
                 known = header["schema"] == self.schema and header["version"] in self._versions()
                 if known:
@@ -188,6 +188,13 @@ class ArrayFile:
                     raise ContentError(f"{name} has the length {length} in place of {other}")
         if sum(math.prod(shape) * dtype.itemsize for dtype, shape in claims.values()) > LARGEST:
             raise ContentError(f"it holds more than {LARGEST >> 30} GiB")
+
+
+def _archive(file: BinaryIO) -> zipfile.ZipFile:
+    """Open an archive that begins with the file, as NumPy asks for: others may have anything before it."""
+    if file.read(4) != b"PK\x03\x04":
+        raise ContentError("it does not begin with an array")
+    return zipfile.ZipFile(file)
 
 
 def _read_header(archive: zipfile.ZipFile) -> dict[str, Any]:

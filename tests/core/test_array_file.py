@@ -182,6 +182,12 @@ def test_arrays_that_do_not_belong_there_are_refused(stored):
             Trajectories.load(stored)
 
 
+def test_nothing_may_stand_before_the_archive(stored):
+    stored.write_bytes(b"#!/bin/sh\n" + stored.read_bytes())
+    with pytest.raises(SeipError, match="does not begin with an array"):
+        Trajectories.load(stored)
+
+
 @pytest.mark.parametrize("method", [1, 9, 12, 14, 93, 99])
 def test_packings_that_numpy_never_uses_are_refused(stored, method):
     content = bytearray(stored.read_bytes())
