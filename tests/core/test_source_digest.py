@@ -45,6 +45,10 @@ def test_all_that_is_loaded_is_in_the_digest(entry):
 
 def test_imports_within_functions_are_followed():
     assert f"{CORE}.pictures.scan_view" in _sources(f"{CORE}.recording")
+
+
+def test_imports_of_commands_are_followed():
+    pytest.importorskip("torch", reason="torch is not installed: make detection")
     assert "headless.detection.limits_study" in _sources("headless.stability")
 
 

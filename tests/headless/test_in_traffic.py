@@ -56,7 +56,7 @@ def test_traffic_that_is_of_no_use_is_refused(tmp_path):
     with pytest.raises(SeipError, match="traffic of another place"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "there.npz", x=9000.0))
     with pytest.raises(SeipError, match="simulate more traffic"):
-        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", end=1.0))
+        run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "short.npz", x=5.0, end=1.0))
     with pytest.raises(SeipError, match=r"here.npz and .*again.npz are nearly the same traffic"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "again.npz", x=0.5))
     with pytest.raises(SeipError, match="ask for one instant"):
