@@ -35,6 +35,8 @@ def main() -> None:
     found: dict[str, str] = {}
     for version in SUPPORTED:
         found |= wheels(everything, "{}.{}".format(*version), linux)
+    for pin in pins():  # the extension carries wheels without compiled code where there are any
+        found |= wheels([pin], PYTHONS[0], ["any"], pure=True)
     for tags in WHEEL_TAGS.values():
         for python in PYTHONS:
             found |= wheels(pins(), python, list(tags))
@@ -42,8 +44,11 @@ def main() -> None:
     sys.stdout.write(f"{LOCK.name}: {len(found)} wheels\n")
 
 
-def wheels(wanted: list[str], python: str, platforms: list[str]) -> dict[str, str]:
-    """Return the digests of the wheels that pip takes for a Python and platform, by their names."""
+def wheels(wanted: list[str], python: str, platforms: list[str], *, pure: bool = False) -> dict[str, str]:
+    """Return the digests of the wheels that pip takes for a Python and platform, by their names.
+
+    Of ``pure`` ones, without compiled code, there may be none.
+    """
     fitting = [
         f"{pin.name}{pin.specifier}"
         for pin in map(Requirement, wanted)
@@ -55,9 +60,14 @@ def wheels(wanted: list[str], python: str, platforms: list[str]) -> dict[str, st
             *(sys.executable, "-m", "pip", "install", "--dry-run", "--quiet", "--ignore-installed", "--no-deps"),
             *("--only-binary", ":all:", "--target", folder, "--python-version", python, "--report", str(report)),
             *(f"--platform={platform}" for platform in platforms),
+            *(["--abi=none"] if pure else []),
             *fitting,
         ]
-        if subprocess.run(command, check=False, stdin=subprocess.DEVNULL).returncode != 0:  # noqa: S603  # pip, our pins
+        hidden = subprocess.DEVNULL if pure else None
+        outcome = subprocess.run(command, check=False, stdin=subprocess.DEVNULL, stderr=hidden)  # noqa: S603  # pip, our pins
+        if outcome.returncode != 0 and pure:
+            return {}
+        if outcome.returncode != 0:
             sys.exit(f"pip finds no wheels for Python {python} on {platforms[0]}: see its message above")
         installed = json.loads(report.read_text(encoding="utf-8"))["install"]
     sources = [package["download_info"] for package in installed]

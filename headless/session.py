@@ -6,10 +6,15 @@ real program and as ``python -m headless.x arguments`` on the bpy module.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
+
+# Before numpy is loaded: products shared out to threads depend on their number in the last digit, and take many times
+# as long where other work is on the same cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from headless.system_libraries import complaint, missing_libraries
 

@@ -29,7 +29,7 @@ Integer = NDArray[np.int64]
 Boolean = NDArray[np.bool_]
 
 TIE = 1e-9
-"""What the project says counts as equal, as a share of all weight, where weights have no common unit."""
+"""What the project says counts as equal: a share of the budget, and of all weight where that has no common unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,8 @@ def enumerate_subsets(problem: PlacementProblem) -> Subsets:
     if problem.count is not None:
         allowed &= count <= problem.count
     if problem.budget is not None:
-        allowed &= price <= int(Fraction(problem.budget) / price_unit)
+        # prices are decimals, whose sums floats round: a budget is kept but for the stated tolerance
+        allowed &= price <= int(Fraction(problem.budget) * (1 + Fraction(TIE)) / price_unit)
     of_mask = np.zeros(1, np.int64)
     for weight in weights:
         of_mask = np.concatenate([of_mask, of_mask + weight])
