@@ -6,13 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from placement_search import UNDECIDED, WEIGHTS, search, sentence
+from placement_search import UNDECIDED, WEIGHTS, faults, search, sentence
 
 from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, solve
 from seip_addon.core.progress import finish
 
 QUICK = 60
 MANY = 3000
+
+
+@pytest.mark.parametrize("seed", [249, 1_000_194, 100_277])
+def test_problems_that_were_answered_wrongly(seed: int) -> None:
+    assert faults(seed)[1] == []
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -140,9 +140,9 @@ class Search:
         self._weight = instance.weight.astype(self._matrix.dtype)
         self._overlap = (self._matrix * self._weight) @ self._by_target
         self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
-        # sums of gains, each at most the total, are exact below EXACT and may be rounded down beyond
-        most = instance.total * (instance.count + 1)
-        self._rounding = 0.0 if most < EXACT else most * 2.0**-50
+        # running sums of all gains, each at most the total, are exact below EXACT and rounded at each step beyond
+        most = instance.total * (len(instance) + 1)
+        self._rounding = 0.0 if most < EXACT else most * len(instance) / EXACT
         self._queue: list[tuple[tuple[float, int, int], _Node]] = []
         self._stack: list[_Node] = []
         self._serial = self._waiting = self._met = 0
