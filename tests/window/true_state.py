@@ -109,7 +109,9 @@ def _stopped_work_leaves_no_trace(window: Window) -> Steps:
 
 
 def _escape_is_for_the_animation(window: Window) -> Steps:
-    _scene().seip.survey.heights, _scene().seip.survey.grid = "3.5 5.4 8", 1.0  # half a minute
+    survey = _scene().seip.survey
+    before = survey.heights, survey.grid
+    survey.heights, survey.grid = "3:8:0.5", 0.5  # a minute and more
     yield from window.click("seip.compute_visibility(")
     yield from window.until(lambda: state.running is not None, 10)
     work = state.running.work
@@ -119,10 +121,11 @@ def _escape_is_for_the_animation(window: Window) -> Steps:
         yield from window.press("ESC")
         yield 0.5
     assert not window.window.screen.is_animation_playing
-    assert state.running is not None, "Esc stopped the computation"
     assert not work.ended, "the work ended before Esc was pressed"
+    assert state.running is not None, "Esc stopped the computation"
     bpy.ops.seip.stop()
     yield from window.until(lambda: state.running is None, 1)
+    _scene().seip.survey.heights, _scene().seip.survey.grid = before
 
 
 def _changes_show_after_opening(window: Window) -> Steps:
