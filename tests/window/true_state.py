@@ -109,9 +109,7 @@ def _stopped_work_leaves_no_trace(window: Window) -> Steps:
 
 
 def _escape_is_for_the_animation(window: Window) -> Steps:
-    survey = _scene().seip.survey
-    before = survey.heights, survey.grid
-    survey.heights, survey.grid = "3:8:0.5", 0.5  # a minute and more
+    _scene().seip.survey.heights, _scene().seip.survey.grid = "3:8:0.5", 0.5  # a minute and more
     yield from window.click("seip.compute_visibility(")
     yield from window.until(lambda: state.running is not None, 10)
     work = state.running.work
@@ -125,7 +123,6 @@ def _escape_is_for_the_animation(window: Window) -> Steps:
     assert state.running is not None, "Esc stopped the computation"
     bpy.ops.seip.stop()
     yield from window.until(lambda: state.running is None, 1)
-    _scene().seip.survey.heights, _scene().seip.survey.grid = before
 
 
 def _changes_show_after_opening(window: Window) -> Steps:
