@@ -19,6 +19,7 @@ from .goal import Goal, Plan, make_plan, placement_problem, target_weights
 from .lidar import LidarModel, find_models, load_catalogue
 from .obstruction import bareness_warnings
 from .placement import Placement
+from .placement.clock import Clock
 from .placement.integer_program import check_solver
 from .placement.near_best import near_best
 from .progress import Progress
@@ -80,9 +81,10 @@ class SurveySettings:
         Raises
         ------
         SeipError
-            The solver or a type is unknown, or a catalogue cannot be read.
+            The solver or a type is unknown, a limit is no positive number, or a catalogue cannot be read.
         """
         check_solver(self.solver)
+        Clock(self.time_limit, self.effort)  # refuses what is no limit before any ray is cast
         return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
 
     def reach(self) -> float:

@@ -240,3 +240,10 @@ def test_no_file_of_an_earlier_result_stays_beside_a_new_one(folder, tmp_path):
     (tmp_path / "view.png").touch()
     run(tmp_path, "--count", "1")
     assert not (tmp_path / "view.png").exists()
+
+
+@pytest.mark.parametrize("limit", [("--effort", "nan"), ("--effort", "0"), ("--time-limit", "-1")])
+def test_an_impossible_limit_is_refused_before_any_ray_is_cast(tmp_path, limit):
+    with pytest.raises(SeipError, match="give a positive number"):
+        place.main(["scenes/junction.blend", *limit, "-o", str(tmp_path / "out")])
+    assert not list(tmp_path.rglob("visibility.npz"))
