@@ -189,7 +189,7 @@ def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
     content = io.BytesIO()  # to no file: its name would go into the bytes, and a full disk leave it unclosed
     torch.save(_shared_text({**full, "digest": _digest(full)}), content)
     with whole_file(path) as temporary:
-        temporary.write_bytes(content.getbuffer())
+        temporary.write_bytes(content.getvalue())
 
 
 def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:

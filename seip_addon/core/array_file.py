@@ -126,7 +126,7 @@ class ArrayFile:
         content = io.BytesIO()  # NumPy leaves an archive unclosed that the disk had no room for
         write(content, header=np.array(text), **typed)
         with whole_file(path) as temporary:
-            temporary.write_bytes(content.getbuffer())
+            temporary.write_bytes(content.getvalue())
 
     @contextmanager
     def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:

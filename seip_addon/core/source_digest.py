@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 import functools
 import importlib.util
+import sys
 from collections.abc import Iterator
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
 
 from .errors import SeipError
 from .storage import digest
@@ -22,7 +23,7 @@ def source_digest(module: str) -> str:
     """Return a digest of the sources of a module and of all that it imports, directly or not.
 
     What counts are the modules of the core and of `headless`, wherever in a module they are imported, and the
-    packages that hold them. Sources are read through their loaders, so that they may lie in an archive.
+    packages that hold them. Sources are read through their loaders, so that they may lie in an archive; none is run.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def _sources(module: str) -> dict[str, str]:
         name = waiting.pop()
         if name in sources or not _is_ours(name):
             continue
-        spec = importlib.util.find_spec(name)
+        spec = _spec(name)
         read = getattr(spec and spec.loader, "get_source", None)  # of files, archives and folders without a module
         source = read and read(name)
         if spec is None or source is None:
@@ -54,6 +55,18 @@ def _sources(module: str) -> dict[str, str]:
         sources[name] = source
         waiting += [name.rpartition(".")[0], *_imported(spec, source)]
     return sources
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    """Find a module without importing the packages that hold it, as `importlib.util.find_spec` does."""
+    if name in sys.modules:
+        return sys.modules[name].__spec__
+    package = name.rpartition(".")[0]
+    if not package:
+        return PathFinder.find_spec(name)
+    holder = _spec(package)
+    places = holder and holder.submodule_search_locations
+    return PathFinder.find_spec(name, places) if places is not None else None
 
 
 def _is_ours(name: str) -> bool:
@@ -71,7 +84,7 @@ def _imported(spec: ModuleSpec, source: str) -> Iterator[str]:
             if not _is_ours(name):
                 continue
             yield name
-            found = importlib.util.find_spec(name)
+            found = _spec(name)
             if found is not None and found.submodule_search_locations is not None:  # else they are no modules
                 parts = (f"{name}.{alias.name}" for alias in node.names)
-                yield from (part for part in parts if importlib.util.find_spec(part) is not None)
+                yield from (part for part in parts if _spec(part) is not None)

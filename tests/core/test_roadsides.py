@@ -1,5 +1,7 @@
 """Where new posts may stand: on the map's pavements, and on verges where a side of a road has none."""
 
+import math
+
 import numpy as np
 import pytest
 import shapely
@@ -92,14 +94,14 @@ def crossing(paved):
     """Two streets of 7 m with pavements that end at a junction of 10 m; ``paved``: it has some at its own corners."""
     walks = [lane(2, 2.0, "sidewalk"), lane(-2, 2.0, "sidewalk")]
     arms = [
-        road(geometry(length=60.0, x=5 * np.cos(a), y=5 * np.sin(a), hdg=float(a)), section(lane(1), lane(-1), *walks),
-             number=str(n))
-        for n, a in enumerate(np.arange(4) * np.pi / 2)
+        road(geometry(length=60.0, x=5 * math.cos(a), y=5 * math.sin(a), hdg=a),
+             section(lane(1), lane(-1), *walks), number=str(n))
+        for n, a in enumerate((0.0, math.pi / 2, math.pi, 3 * math.pi / 2))
     ]  # fmt: skip
     through = [
-        road(geometry(length=10.0, x=-5 * np.cos(a), y=-5 * np.sin(a), hdg=float(a)), section(lane(1), lane(-1)),
-             number=str(8 + n), junction="7")
-        for n, a in enumerate((0.0, np.pi / 2))
+        road(geometry(length=10.0, x=-5 * math.cos(a), y=-5 * math.sin(a), hdg=a),
+             section(lane(1), lane(-1)), number=str(8 + n), junction="7")
+        for n, a in enumerate((0.0, math.pi / 2))
     ]  # fmt: skip
     corners = [
         road(geometry(length=1.0, x=x, y=y), section(lane(1, 1.0, "sidewalk")), number=str(20 + n), junction="7")

@@ -283,7 +283,7 @@ def _arcs(beams: Beams, patches: Patches) -> _Arcs:
     patch, channel = _channels_at(beams, patches)
     slope, distance, radius = np.tan(beams.elevation)[channel], patches.distance[patch], patches.radius[patch]
     begin, end = _between_heights(slope, patches.bottom[patch], patches.top[patch])
-    begin = np.fmax(begin, np.maximum(distance - radius, 0.0))
+    begin = np.fmax(begin, np.maximum(distance - radius, 0.0)) + 0.0  # of 0.0 and -0.0 the greater may be either
     end = np.fmin(end, distance + radius)
     half_width = _half_width(distance, begin, end, radius)
     depth = np.maximum(np.abs(patches.bottom), np.abs(patches.top))[patch]
