@@ -9,9 +9,9 @@ import argparse
 from pathlib import Path
 
 from headless import session
-from headless.measures.charts import save_charts
-from headless.measures.programme import Scope, measure
-from headless.measures.report import bars, save_json, save_page
+from headless.lab.benchmark.charts import save_charts
+from headless.lab.benchmark.programme import Scope, measure
+from headless.lab.benchmark.report import bars, save_json, save_page
 
 import bpy
 

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from headless import evaluate, session, survey
 from headless.detection import case_study
+from headless.detection.charts import Setting, save_setting_chart
 from headless.detection.detector import Detector
 from headless.detection.inference import detect
 from headless.detection.pillars import grid_of
@@ -24,9 +25,8 @@ from headless.detection.training import deterministic
 
 import numpy as np
 
-from seip_addon.core.pictures.detection_charts import Setting, save_setting_chart
 from seip_addon.core.progress import Progress, side_by_side
-from seip_addon.core.storage import save_json
+from seip_addon.core.storage.files import save_json
 
 DEFAULT = NetworkSettings()
 SETTINGS = {

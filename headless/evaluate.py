@@ -17,6 +17,8 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.coverage_study import NUMBERS
+from headless.coverage_study.tables import save_claims
 from headless.detection import case_study, study_results
 from headless.detection.claims import judge
 from headless.detection.detector import check_device
@@ -27,11 +29,9 @@ from headless.traffic_runs import runs_beside
 
 import bpy
 
-from seip_addon.core.coverage_study import NUMBERS
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, check_goal
+from seip_addon.core.placement.goal import Goal, check_goal
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.results.study_tables import save_claims
 from seip_addon.core.scans import ScanSettings, static_scene
 
 

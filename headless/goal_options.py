@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from seip_addon.core.goal import DEFAULT_COUNT, Goal
+from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal
 
 
 def add_goal_options(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:

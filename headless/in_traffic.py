@@ -16,16 +16,16 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.charts.traffic import save_promise_chart, save_time_map
 from headless.goal_options import add_goal_options, goal_of
 from headless.traffic_runs import load_runs, parted, runs_beside
 
-from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, Plan, check_goal, placement_problem, with_count
-from seip_addon.core.pictures.stability_traffic_charts import save_promise_chart, save_time_map
-from seip_addon.core.stability.traffic_instants import check_runs, spread_instants
-from seip_addon.core.stability.traffic_presence import road_user_seconds
-from seip_addon.core.stability.traffic_study import (
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.goal import Goal, Plan, check_goal, placement_problem, with_count
+from seip_addon.core.robustness.traffic_instants import check_runs, spread_instants
+from seip_addon.core.robustness.traffic_presence import road_user_seconds
+from seip_addon.core.robustness.traffic_study import (
     WHAT,
     InTraffic,
     TrafficStudy,
@@ -33,9 +33,9 @@ from seip_addon.core.stability.traffic_study import (
     traffic_study,
     traffic_warnings,
 )
-from seip_addon.core.survey import surroundings
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
+from seip_addon.core.workflows.survey import surroundings
 
 CHARTS = ("time_seen.png", "traffic.png")
 

@@ -22,9 +22,9 @@ if not __package__:  # run as a file by `blender -P`
 from headless import session, survey
 from headless.goal_options import add_goal_options, goal_of
 
-from seip_addon.core.convergence import coarsest_settings
-from seip_addon.core.goal import Plan, check_goal
-from seip_addon.core.survey import place
+from seip_addon.core.placement.goal import Plan, check_goal
+from seip_addon.core.workflows.convergence import coarsest_settings
+from seip_addon.core.workflows.survey import place
 
 
 def main(argv: list[str]) -> None:

@@ -15,13 +15,13 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
 from headless.goal_options import add_goal_options, goal_of
 
-from seip_addon.core.goal import check_goal
-from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
-from seip_addon.core.robust_plan import Precaution, RobustPlan, place_robustly
-from seip_addon.core.stability.pose_errors import PoseErrors
-from seip_addon.core.stability.risk import Risk
+from seip_addon.core.placement.goal import check_goal
+from seip_addon.core.robustness.pose_errors import PoseErrors
+from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.workflows.robust import Precaution, RobustPlan, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 

@@ -18,8 +18,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from headless.system_libraries import complaint, missing_libraries
 
-from seip_addon.core import storage
 from seip_addon.core.errors import SeipError
+from seip_addon.core.storage import files as storage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -24,11 +24,11 @@ import bpy
 from seip_addon.core.datasets import FORMATS, SPLITS
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
-from seip_addon.core.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.scans.run_folder import Record, Run, check_run_folder
 from seip_addon.core.traffic.source import load_trajectories
+from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 from seip_addon.scene.traffic import read_traffic

@@ -19,30 +19,31 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.charts import robust as robust_charts
+from headless.charts import traffic as traffic_charts
+from headless.lab.stability import charts as limits_charts
+from headless.lab.stability.arithmetic import arithmetic_rows, arithmetic_study
+from headless.lab.stability.criterion import criterion_rows, criterion_study
+from headless.lab.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
+from headless.lab.stability.robustness_rows import pose_rows, robust_rows, traffic_rows
+from headless.lab.stability.solver_limits import solver_rows, solver_study
 from headless.traffic_runs import load_runs, parted, runs_beside
 
-from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
-from seip_addon.core.pictures import stability_limits_charts as limits_charts
-from seip_addon.core.pictures import stability_robust_charts as robust_charts
-from seip_addon.core.pictures import stability_traffic_charts as traffic_charts
 from seip_addon.core.placement import PlacementProblem, solve
-from seip_addon.core.placement.near_best import FlatTop, near_best
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
+from seip_addon.core.placement.near_optimal import FlatTop, near_best
 from seip_addon.core.progress import Progress
-from seip_addon.core.source_digest import source_digest
-from seip_addon.core.stability.arithmetic import arithmetic_rows, arithmetic_study
-from seip_addon.core.stability.criterion import criterion_rows, criterion_study
-from seip_addon.core.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
-from seip_addon.core.stability.pose_study import StudySettings, pose_rows, pose_study
-from seip_addon.core.stability.risk import Risk
-from seip_addon.core.stability.robust_study import RobustSettings, robust_rows, robust_study
-from seip_addon.core.stability.solver_limits import solver_rows, solver_study
-from seip_addon.core.stability.traffic_instants import spread_instants
-from seip_addon.core.stability.traffic_study import look_at_traffic, traffic_rows, traffic_study
-from seip_addon.core.storage import digest
-from seip_addon.core.survey import grid_key, surroundings
+from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.traffic_instants import spread_instants
+from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.traffic import Trajectories
+from seip_addon.core.workflows.survey import grid_key, surroundings
 
 FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
@@ -316,8 +317,9 @@ def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
 
 def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Train detectors, and try them until they fail."""
-    from headless.detection import limit_charts, limit_rows  # noqa: PLC0415 -- torch need not be installed
-    from headless.detector_limits import detector_limits  # noqa: PLC0415 -- as above
+    from headless.lab.detector import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
+    from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
+    from headless.lab.detector.chapter import detector_limits  # noqa: PLC0415 -- as above
 
     study = yield from detector_limits(stage.surveyed, stage.scene, stage.others, stage.work, **stage.scope.detector)
     limit_charts.save_limits_chart(stage.charts / "detector.png", study)

@@ -14,12 +14,12 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_study, judge
+from headless.coverage_study.charts import save_height_chart, save_weight_chart
+from headless.coverage_study.tables import save_claims, save_study_table
 
-from seip_addon.core.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_study, judge
-from seip_addon.core.goal import Goal, check_goal
 from seip_addon.core.pictures.plan_view import save_plan_view
-from seip_addon.core.pictures.study_charts import save_height_chart, save_weight_chart
-from seip_addon.core.results.study_tables import save_claims, save_study_table
+from seip_addon.core.placement.goal import Goal, check_goal
 
 
 def main(argv: list[str]) -> None:

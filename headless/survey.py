@@ -16,20 +16,20 @@ from headless import session
 import bpy
 import numpy as np
 
-from seip_addon.core.candidates import CandidateSettings, heights_of, tilts_of
-from seip_addon.core.convergence import Convergence
-from seip_addon.core.deployment import Sensor
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Plan
+from seip_addon.core.geometry.orientation import tilt_in_words
 from seip_addon.core.lidar import LidarModel
-from seip_addon.core.orientation import tilt_in_words
+from seip_addon.core.placement.deployment import Sensor
+from seip_addon.core.placement.goal import Plan
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.scene_geometry import SceneGeometry
-from seip_addon.core.site import Site
-from seip_addon.core.survey import Circumstances, Layout, SurveySettings, lay_out, record_of, see
+from seip_addon.core.site.candidates import CandidateSettings, heights_of, tilts_of
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
+from seip_addon.core.workflows.convergence import Convergence
+from seip_addon.core.workflows.survey import Circumstances, Layout, SurveySettings, lay_out, record_of, see
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 

@@ -30,7 +30,7 @@ import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.scene_geometry import SceneGeometry
+from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.demand import Demand
 from seip_addon.core.traffic.floating_car_data import Window, some

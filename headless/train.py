@@ -21,6 +21,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.detection.average_precision import evaluate
+from headless.detection.charts import save_training_chart
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
@@ -36,11 +37,10 @@ import bpy
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.pictures.detection_charts import save_training_chart
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.run_folder import load_manifest
-from seip_addon.core.scene_geometry import SceneGeometry
-from seip_addon.core.storage import save_json
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.storage.files import save_json
 from seip_addon.scene.read import read_scene
 
 RULES = {"ap_iou_0.7": Rule(iou=0.7), "ap_iou_0.5": Rule(iou=0.5), "ap_3d_iou_0.7": Rule(iou=0.7, in_space=True)}

@@ -11,8 +11,8 @@ import numpy as np
 
 from . import state
 from .core.arrays import Float
-from .core.by_hand import BY_HAND, recorded_orientation
 from .core.errors import SeipError
+from .core.workflows.by_hand import BY_HAND, recorded_orientation
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of
 

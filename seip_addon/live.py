@@ -15,10 +15,10 @@ import numpy as np
 
 from . import preferences, state
 from .core.arrays import Boolean, Integer
-from .core.deployment import Deployment, Sensor
 from .core.errors import SeipError
+from .core.placement.deployment import Deployment, Sensor
 from .core.scans.sensor import MountedSensor
-from .core.visibility.turned import Onlooker
+from .core.visibility.rotated_sensors import Onlooker
 from .hand import same_pose
 from .scene import contract
 from .scene.sensors import read_sensors

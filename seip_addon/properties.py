@@ -18,19 +18,19 @@ from bpy.props import (
 )
 
 from . import pointing, scans, state
-from .core.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
 from .core.datasets import FORMATS, SPLITS
-from .core.goal import DEFAULT_COUNT, Goal
-from .core.recording import RecordingSettings
-from .core.robust_plan import Precaution
+from .core.placement.goal import DEFAULT_COUNT, Goal
+from .core.robustness.pose_errors import STEEPEST, WIDEST, PoseErrors
+from .core.robustness.risk import Risk
 from .core.scans import ScanSettings
-from .core.scene_geometry import DEFAULT_WEIGHT
-from .core.stability.pose_errors import STEEPEST, WIDEST, PoseErrors
-from .core.stability.risk import Risk
+from .core.site.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
+from .core.site.scene_geometry import DEFAULT_WEIGHT
 from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
-from .core.survey import SurveySettings
 from .core.traffic.source import TrafficFiles
 from .core.visibility.grid import VisibilitySettings
+from .core.workflows.recording import RecordingSettings
+from .core.workflows.robust import Precaution
+from .core.workflows.survey import SurveySettings
 from .preferences import catalogue_files
 from .scene import contract, roles
 

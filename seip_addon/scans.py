@@ -13,11 +13,11 @@ import numpy as np
 
 from . import state
 from .core.arrays import Float
-from .core.recording import frame_number
 from .core.scans import Frame, Simulation
 from .core.scans.run_folder import Run
 from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
+from .core.workflows.recording import frame_number
 from .viewport import layers
 from .viewport.point_cloud import NAME, cloud_overlay
 

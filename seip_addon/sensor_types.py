@@ -9,9 +9,9 @@ from __future__ import annotations
 import bpy
 
 from . import preferences
-from .core.candidates import CandidateSettings
 from .core.errors import SeipError
 from .core.lidar import LidarModel, load_catalogue
+from .core.site.candidates import CandidateSettings
 
 known: dict[str, LidarModel] = {}
 """By catalogue key: the shipped types and those of the user's own files."""

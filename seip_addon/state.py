@@ -19,16 +19,16 @@ from typing import Any
 import bpy
 
 from . import preferences
-from .core.background import Background
-from .core.by_hand import restored_by_hand
+from .background import Background
 from .core.errors import SeipError
-from .core.goal import MOVED, Plan
+from .core.placement.goal import MOVED, Plan
 from .core.progress import Progress
 from .core.results.placement_record import Record
-from .core.storage import check_folder
-from .core.survey import Layout, SurveySettings, inputs_of, lay_out, restored_plan, see
+from .core.storage.files import check_folder
 from .core.visibility.estimate import Estimate
 from .core.visibility.grid import VisibilityGrid
+from .core.workflows.by_hand import restored_by_hand
+from .core.workflows.survey import Layout, SurveySettings, inputs_of, lay_out, restored_plan, see
 from .scene import contract
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene

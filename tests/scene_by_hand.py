@@ -14,7 +14,7 @@ from seip_addon.scene.materials import nodes_of
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from seip_addon.core.scene_geometry import Mesh, SceneGeometry
+    from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 
 
 def make_scene(geometry: SceneGeometry) -> bpy.types.Scene:

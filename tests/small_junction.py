@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from seip_addon.core.deployment import Deployment, deploy
 from seip_addon.core.lidar import LidarModel, load_catalogue
-from seip_addon.core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
-from seip_addon.core.site import Candidates, Site, Targets
+from seip_addon.core.placement.deployment import Deployment, deploy
+from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
+from seip_addon.core.site.site import Candidates, Site, Targets
 
 ORIGIN = np.array([5_000_000.0, -300_000.0, 120.0])
 BUILDINGS = ((-38, -34, -14, -13, 12), (16, -30, 36, -14, 18), (-30, 14, -14, 40, 9), (14, 13, 40, 30, 24))

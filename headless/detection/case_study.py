@@ -15,15 +15,16 @@ from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
+from headless.coverage_study import NUMBERS, Case, Cell, solve_cell
+
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.coverage_study import NUMBERS, Case, Cell, solve_cell
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
-from seip_addon.core.site import Site
+from seip_addon.core.site.site import Site
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.visibility.grid import VisibilityGrid

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from headless.detection.charts import Cell, Curve, Parts
+from headless.detection.error_view import ErrorView
+
 import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.pictures.detection_charts import Cell, Curve, Parts
-from seip_addon.core.pictures.error_view import ErrorView
 
 from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin

@@ -14,10 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
+from headless.coverage_study import NUMBERS, Claim
+from headless.coverage_study.claims import UNDECIDED
 
-from seip_addon.core.coverage_study import NUMBERS, Claim
-from seip_addon.core.coverage_study.claims import UNDECIDED
+import numpy as np
 
 from .intervals import Interval, judge_above, judge_all, judge_within, mean_interval
 

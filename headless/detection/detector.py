@@ -20,7 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import digest, whole_file
+from seip_addon.core.storage.files import digest, whole_file
 
 from .anchor_head import AnchorHead
 from .centre_head import CentreHead

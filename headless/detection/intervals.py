@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from headless.coverage_study.claims import FAILS, HOLDS, UNDECIDED
+
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.coverage_study.claims import FAILS, HOLDS, UNDECIDED
 from seip_addon.core.errors import SeipError
 
 Interval = tuple[float, float]

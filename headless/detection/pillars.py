@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.scene_geometry import SceneGeometry, joined
+from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 
 from .settings import GROUND_ABOVE_BOTTOM, HEADROOM, STRIDE
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
 
+from headless.coverage_study import Case
+
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.coverage_study import Case
 from seip_addon.core.progress import finish
 from seip_addon.core.scans import (
     Frame,
@@ -20,7 +21,7 @@ from seip_addon.core.scans import (
     StaticScene,
     prepare,
 )
-from seip_addon.core.storage import digest
+from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
 

@@ -8,10 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from seip_addon.core.coverage_study import Claim
-from seip_addon.core.pictures.detection_charts import (
+from headless.coverage_study import Claim
+from headless.detection.charts import (
     Parts,
     save_count_chart,
     save_coverage_chart,
@@ -20,8 +18,11 @@ from seip_addon.core.pictures.detection_charts import (
     save_price_chart,
     save_training_chart,
 )
-from seip_addon.core.pictures.error_view import save_error_view
-from seip_addon.core.storage import save_json, whole_file
+from headless.detection.error_view import save_error_view
+
+import numpy as np
+
+from seip_addon.core.storage.files import save_json, whole_file
 
 from .breakdown import (
     ALONG_DENSITY,

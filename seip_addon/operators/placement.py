@@ -12,11 +12,11 @@ import bpy
 
 from .. import pointing, state
 from ..core.errors import SeipError
-from ..core.goal import Goal, check_goal
+from ..core.placement.goal import Goal, check_goal
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
-from ..core.robust_plan import Precaution, check_precaution, place_robustly
-from ..core.survey import Circumstances, place, record_of
+from ..core.workflows.robust import Precaution, check_precaution, place_robustly
+from ..core.workflows.survey import Circumstances, place, record_of
 from ..scene.write import write_result
 from .results import keep_result
 from .work import ForReadyScene, LongWork, Outcome, attempt

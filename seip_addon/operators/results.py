@@ -13,19 +13,19 @@ import numpy as np
 from mathutils import Vector
 
 from .. import hand, live, pointing, preferences, state
-from ..core.by_hand import judge
-from ..core.comparison import compare, packed_counts, unpacked_counts
 from ..core.errors import SeipError
-from ..core.goal import Plan, target_weights
-from ..core.orientation import tilt_in_words
+from ..core.geometry.orientation import tilt_in_words
+from ..core.placement.goal import Plan, target_weights
 from ..core.progress import Progress
-from ..core.ranking import Ranked, rank_added, rank_alone
+from ..core.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.results.placement_record import Record, versions
+from ..core.results.ranking import Ranked, rank_added, rank_alone
 from ..core.scans.sensor import MountedSensor
-from ..core.storage import check_folder, digest
-from ..core.survey import Circumstances, record_of, recorded_goal
+from ..core.storage.files import check_folder, digest
 from ..core.visibility.grid import VisibilityGrid
-from ..core.visibility.turned import Onlooker, onlooker
+from ..core.visibility.rotated_sensors import Onlooker, onlooker
+from ..core.workflows.by_hand import judge
+from ..core.workflows.survey import Circumstances, record_of, recorded_goal
 from ..scene.blend_file import save_blend
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables

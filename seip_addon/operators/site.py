@@ -13,13 +13,13 @@ from ..core.errors import SeipError
 from ..core.opendrive import read_map
 from ..core.opendrive.road_map import RoadMap
 from ..core.progress import Progress, finish
-from ..core.scene_geometry import SceneGeometry
-from ..core.site import Site
-from ..core.site_check import Problem, SiteCheck, check_site
+from ..core.site.check import Problem, SiteCheck, check_site
+from ..core.site.scene_geometry import SceneGeometry
+from ..core.site.site import Site
 from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX, describe_place
 from ..core.streetscape.model import SiteModel, site_model
 from ..core.streetscape.parts import Role
-from ..core.survey import SurveySettings, lay_out
+from ..core.workflows.survey import SurveySettings, lay_out
 from ..properties import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene

@@ -12,18 +12,18 @@ import bpy
 
 from .. import preferences, scans, state
 from ..core.errors import SeipError
-from ..core.goal import target_weights
+from ..core.placement.goal import target_weights
 from ..core.progress import Progress, finish
-from ..core.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.results.placement_record import versions
+from ..core.robustness.traffic_instants import check_runs, spread_instants
+from ..core.robustness.traffic_study import IN_TRAFFIC, tried_in_traffic
 from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
-from ..core.scene_geometry import SceneGeometry
-from ..core.stability.traffic_instants import check_runs, spread_instants
-from ..core.stability.traffic_study import IN_TRAFFIC, tried_in_traffic
-from ..core.survey import surroundings
+from ..core.site.scene_geometry import SceneGeometry
 from ..core.traffic import CATEGORIES, Trajectories
 from ..core.traffic.source import LoadedTraffic, TrafficFiles, load_traffic
+from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
+from ..core.workflows.survey import surroundings
 from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors

@@ -12,9 +12,9 @@ import bpy
 
 from .. import state
 from ..core.errors import SeipError
-from ..core.goal import Plan
+from ..core.placement.goal import Plan
 from ..core.progress import Progress
-from ..core.sight_lines import pose_at, sight_lines
+from ..core.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of

@@ -9,7 +9,7 @@ import bpy
 
 from .. import state
 from ..core.progress import Progress
-from ..core.survey import estimate
+from ..core.workflows.survey import estimate
 from .work import ForReadyScene, LongWork
 
 

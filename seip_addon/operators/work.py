@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 import bpy
 
 from .. import state
-from ..core.background import Background
+from ..background import Background
 from ..core.errors import SeipError
 from ..core.progress import Progress, finish
 

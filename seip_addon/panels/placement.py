@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import hand, state
-from ..core.goal import MOVED, MOVED_SENTENCE
+from ..core.placement.goal import MOVED, MOVED_SENTENCE
 from ..core.results.placement_record import Record
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_judge_sensors, no_placement

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import SeipError
-from ..core.storage import whole_file
+from ..core.storage.files import whole_file
 from .interrupts import held_interrupts
 
 CLIP_START, CLIP_END = 0.5, 5000.0

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from ..core.progress import Progress
-from ..core.storage import digest
+from ..core.storage.files import digest
 from ..core.streetscape.model import VEILS, SiteModel
 from ..core.streetscape.parts import Part, Role
 from . import contract

@@ -13,7 +13,7 @@ from weakref import WeakSet
 
 import bpy
 
-from ..core.storage import digest
+from ..core.storage.files import digest
 from . import contract
 
 

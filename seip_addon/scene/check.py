@@ -9,8 +9,8 @@ import numpy as np
 
 from ..core.arrays import Float
 from ..core.errors import SeipError
-from ..core.scene_geometry import SceneGeometry
-from ..core.site_check import Problem, SceneContents, Surface
+from ..core.site.check import Problem, SceneContents, Surface
+from ..core.site.scene_geometry import SceneGeometry
 from . import contract
 from .read import (
     Shown,

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.errors import SeipError
 from ..core.pictures.palette import INK, rgb
-from ..core.scene_geometry import DEFAULT_REFLECTIVITY
+from ..core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from . import contract
 
 PREFIX = "SEIP "

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..core.arrays import Boolean, Float, Integer
 from ..core.errors import SeipError
-from ..core.plan_geometry import outline
-from ..core.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
+from ..core.geometry.plan import outline
+from ..core.site.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
 from . import contract
 from .materials import reflectivity
 

@@ -20,12 +20,12 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..core.arrays import Boolean, Float
-from ..core.deployment import Deployment
 from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
+from ..core.placement.deployment import Deployment
 from ..core.progress import PAUSE, Progress
-from ..core.site import Site
+from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
 from .interrupts import held_interrupts

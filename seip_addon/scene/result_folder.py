@@ -11,15 +11,15 @@ import bpy
 
 from ..core.arrays import Boolean
 from ..core.errors import SeipError
-from ..core.goal import Plan
 from ..core.lidar import LidarModel
 from ..core.pictures.plan_view import save_plan_view
+from ..core.placement.goal import Plan
 from ..core.progress import Progress, finish
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
 from ..core.results.placement_record import Record, save_placement_record
-from ..core.scene_geometry import SceneGeometry
-from ..core.site import Site
+from ..core.site.scene_geometry import SceneGeometry
+from ..core.site.site import Site
 from .blend_file import save_blend
 from .render import save_rendered_view
 from .write import write_result

@@ -9,14 +9,14 @@ import bpy
 import numpy as np
 
 from ..core.arrays import Integer
-from ..core.colouring import Aspect, Colouring, as_placed, colouring
-from ..core.deployment import Deployment, Sensor
 from ..core.errors import SeipError
-from ..core.orientation import tilt_in_words
-from ..core.site import Site, Targets
+from ..core.geometry.orientation import tilt_in_words
+from ..core.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
+from ..core.placement.deployment import Deployment, Sensor
+from ..core.site.site import Site, Targets
+from ..core.site.target_squares import target_squares
 from ..core.streetscape.model import VEILS
 from ..core.streetscape.street_furniture import Solid, join, prism, tube
-from ..core.target_squares import target_squares
 from . import contract
 from .materials import linear, matt
 from .meshes import mesh_of

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.pictures.palette import INK, rgb
-from ..core.sight_lines import SightLines
+from ..core.visibility.sight_lines import SightLines
 from ..scene.write import LIFT
 from .layers import Layer, Overlay
 from .legend import Block, Colour, Entry

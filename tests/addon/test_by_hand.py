@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from seip_addon import hand, live, pointing, state
-from seip_addon.core.comparison import unpacked_counts
-from seip_addon.core.goal import MOVED, MOVED_SENTENCE
+from seip_addon.core.placement.goal import MOVED, MOVED_SENTENCE
+from seip_addon.core.results.comparison import unpacked_counts
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from seip_addon import live, pointing, state
-from seip_addon.core.comparison import unpacked_counts
 from seip_addon.core.errors import SeipError
+from seip_addon.core.results.comparison import unpacked_counts
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from seip_addon import preferences, sensor_types
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.orientation import orientation
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.ray_casting import MOST_THREADS
 from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.viewport import beam_preview

@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from seip_addon import live, preferences, state
-from seip_addon.core.background import Background
+from seip_addon.background import Background
 from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import results, work
 from seip_addon.panels import incomplete

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
-from seip_addon.core.placement.near_best import near_best
+from seip_addon.core.placement.near_optimal import near_best
 from seip_addon.core.progress import finish
 
 Integer = NDArray[np.int64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import box
 
-from seip_addon.core.site import Candidates, Site, Targets
+from seip_addon.core.site.site import Candidates, Site, Targets
 
 Float = NDArray[np.float64]
 

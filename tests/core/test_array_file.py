@@ -14,8 +14,8 @@ import pytest
 from npz_by_hand import claiming, contents, write
 from traffic_by_hand import make_trajectories
 
-from seip_addon.core import array_file
 from seip_addon.core.errors import SeipError
+from seip_addon.core.storage import array_file
 from seip_addon.core.traffic import RoadUser, Trajectories
 
 ROOT = Path(__file__).resolve().parents[2]

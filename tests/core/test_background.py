@@ -7,7 +7,7 @@ import pytest
 from engines import ANY
 from synthetic_junction import junction_site
 
-from seip_addon.core.background import Background, Pace
+from seip_addon.background import Background, Pace
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import Progress, finish

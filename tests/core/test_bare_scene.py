@@ -7,13 +7,13 @@ import pytest
 from street_map import street_map
 from test_candidates import PLAIN, block, street
 
-from seip_addon.core.obstruction import BARE
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import Mesh, Pole
+from seip_addon.core.site.obstruction import BARE
+from seip_addon.core.site.scene_geometry import Mesh, Pole
 from seip_addon.core.streetscape.description import SiteDescription, Trees
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.survey import SurveySettings, lay_out
+from seip_addon.core.workflows.survey import SurveySettings, lay_out
 
 SETTINGS = SurveySettings(candidates=PLAIN)
 POLE = Pole("mast", np.array((0.0, 9.0, 0.1)), 6.0)

@@ -8,10 +8,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.candidates import CandidateSettings, lay_candidates
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pavement_sampling import spread
-from seip_addon.core.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
+from seip_addon.core.site.candidates import CandidateSettings, lay_candidates
+from seip_addon.core.site.pavement_sampling import spread
+from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole, SceneGeometry
 
 PLAIN = CandidateSettings(sensors=("type1",), heights=(3.5, 8.0), spacing=4.0)
 

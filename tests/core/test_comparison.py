@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.comparison import BOTH, GAINED, LOST, NEITHER, compare, packed_counts, unpacked_counts
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.integer_program import check_solver, is_available, solver_name
-from seip_addon.core.ranking import rank_added, rank_alone
+from seip_addon.core.results.comparison import BOTH, GAINED, LOST, NEITHER, compare, packed_counts, unpacked_counts
+from seip_addon.core.results.ranking import rank_added, rank_alone
 
 
 def test_each_target_is_in_one_class():

@@ -6,21 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
-import numpy as np
-import pytest
-from engines import ANY, needs_any
-from small_junction import make_geometry
-from synthetic_junction import rectangle
-
-from seip_addon.core import convergence
-from seip_addon.core.candidates import CandidateSettings
-from seip_addon.core.convergence import Answer, Judge, coarsest_settings
-from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal
-from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.pictures import stability_limits_charts as charts
-from seip_addon.core.progress import finish
-from seip_addon.core.stability.criterion import (
+from headless.lab.stability import charts
+from headless.lab.stability.criterion import (
     Draws,
     criterion_rows,
     criterion_study,
@@ -28,10 +15,24 @@ from seip_addon.core.stability.criterion import (
     ring_borders,
     turned_targets,
 )
-from seip_addon.core.survey import SurveySettings
+
+import numpy as np
+import pytest
+from engines import ANY, needs_any
+from small_junction import make_geometry
+from synthetic_junction import rectangle
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.placement.goal import Goal
+from seip_addon.core.progress import finish
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.grid import VisibilitySettings
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import unresolved_from
+from seip_addon.core.workflows import convergence
+from seip_addon.core.workflows.convergence import Answer, Judge, coarsest_settings
+from seip_addon.core.workflows.survey import SurveySettings
 
 GEOMETRY = make_geometry(24.0)
 SETTINGS = SurveySettings(candidates=CandidateSettings(sensors=("type2",), heights=(5.4,)), engine=ANY)
@@ -148,9 +149,9 @@ def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
         engine=ANY,
     )
     with (
-        patch("seip_addon.core.stability.criterion.DELTAS", (0.5, 2.0)),
-        patch("seip_addon.core.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
-        patch("seip_addon.core.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
+        patch("headless.lab.stability.criterion.DELTAS", (0.5, 2.0)),
+        patch("headless.lab.stability.criterion.GRID_SPACINGS", (2.0, 1.0)),
+        patch("headless.lab.stability.criterion.CANDIDATE_SPACINGS", (16.0, 8.0)),
     ):
         study = finish(criterion_study(GEOMETRY, settings, 2, tolerance=0.2, draws=8))
     (by_ratio,) = study.by_ratio

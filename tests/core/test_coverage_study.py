@@ -3,16 +3,17 @@
 import csv
 from dataclasses import replace
 
+from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_study, judge
+from headless.coverage_study.charts import save_height_chart, save_weight_chart
+from headless.coverage_study.tables import save_claims, save_study_table
+
 import numpy as np
 import pytest
 from small_junction import make_example
 
-from seip_addon.core.coverage_study import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_study, judge
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.study_charts import save_height_chart, save_weight_chart
 from seip_addon.core.progress import finish
-from seip_addon.core.results.study_tables import save_claims, save_study_table
-from seip_addon.core.site import Site
+from seip_addon.core.site.site import Site
 
 
 @pytest.fixture(scope="module")

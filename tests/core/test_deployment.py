@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.deployment import deploy, weighted_share
+from seip_addon.core.placement.deployment import deploy, weighted_share
 from tests.small_junction import Example, make_example
 
 

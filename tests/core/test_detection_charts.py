@@ -2,15 +2,9 @@
 
 import math
 
-import numpy as np
-import pytest
-import shapely
-from matplotlib.collections import PolyCollection
-from PIL import Image
-
-from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures import detection_charts, error_view
-from seip_addon.core.pictures.detection_charts import (
+from headless.detection import charts as detection_charts
+from headless.detection import error_view
+from headless.detection.charts import (
     Cell,
     Curve,
     Parts,
@@ -23,7 +17,15 @@ from seip_addon.core.pictures.detection_charts import (
     save_setting_chart,
     save_training_chart,
 )
-from seip_addon.core.pictures.error_view import ErrorView, save_error_view
+from headless.detection.error_view import ErrorView, save_error_view
+
+import numpy as np
+import pytest
+import shapely
+from matplotlib.collections import PolyCollection
+from PIL import Image
+
+from seip_addon.core.errors import SeipError
 
 CELLS = (
     Cell("type1", 1, 6_000, 0.2, (0.55, 0.57, 0.59), (0.52, 0.62)),

@@ -5,7 +5,7 @@ import pytest
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, check_goal, make_plan, placement_problem, target_weights
+from seip_addon.core.placement.goal import Goal, check_goal, make_plan, placement_problem, target_weights
 from seip_addon.core.progress import finish
 
 

@@ -10,10 +10,10 @@ from opendrive_text import document, geometry, lane, read_text, road, section
 from street_map import street_map
 from test_candidates import PLAIN, street
 
-from seip_addon.core.candidates import assumed_pole_warnings, lay_candidates
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import ASSUMED, DESCRIBED, FROM_MAP, Pole
+from seip_addon.core.site.candidates import assumed_pole_warnings, lay_candidates
+from seip_addon.core.site.scene_geometry import ASSUMED, DESCRIBED, FROM_MAP, Pole
 from seip_addon.core.streetscape.description import Poles, SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role

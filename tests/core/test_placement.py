@@ -20,10 +20,10 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import (
     PlacementProblem,
     cheapest_for_coverage,
-    exact,
     integer_program,
     solve,
     solve_greedy,
+    solver,
     ties,
 )
 from seip_addon.core.placement.clock import Clock
@@ -270,7 +270,7 @@ def test_a_time_limit_is_positive(limit: float) -> None:
 
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
 def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exact, "is_worthwhile", lambda *_: False)
+    monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
     monkeypatch.setattr(ties, "is_worthwhile", lambda *_: False)
     problem = street_problem(12, 100, blocks=1, count=3)
     placement = finish(solve(problem, solver=solver, time_limit=math.inf))
@@ -280,7 +280,7 @@ def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_long_program_can_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exact, "is_worthwhile", lambda *_: False)
+    monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
     before = set(threading.enumerate())
     steps = solve(street_problem(60, 1000, blocks=2, count=8), time_limit=60.0)
     while "integer program" not in next(steps).what:
@@ -418,14 +418,14 @@ def test_breaking_ties_takes_no_longer_than_the_proof(monkeypatch: pytest.Monkey
     visible = np.random.default_rng(1).random((300, 200)) < 0.5
     problem = replace(street_problem(300, 200, heights=1), visible=visible, count=12)
     clock, proven = Clock(math.inf), []
-    broken = exact.canonical_optimum
+    broken = solver.canonical_optimum
 
     def noted(*arguments: object) -> object:
         proven.append(clock.work)
         return broken(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(exact, "canonical_optimum", noted)
-    placement = finish(exact.solve_within(problem, "highs", clock))
+    monkeypatch.setattr(solver, "canonical_optimum", noted)
+    placement = finish(solver.solve_within(problem, "highs", clock))
     assert placement.status == "optimal"
     assert any("not all ties were broken" in note for note in placement.notes)
-    assert clock.work < proven[0] + 1.1 * max(proven[0], exact.LEAST_FOR_TIES)
+    assert clock.work < proven[0] + 1.1 * max(proven[0], solver.LEAST_FOR_TIES)

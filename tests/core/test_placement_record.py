@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, Plan
 from seip_addon.core.placement import Placement
+from seip_addon.core.placement.goal import Goal, Plan
 from seip_addon.core.results.placement_record import (
     Run,
     comparable,

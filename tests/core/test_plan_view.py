@@ -7,11 +7,11 @@ import shapely
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from seip_addon.core.deployment import deploy
 from seip_addon.core.pictures.drawing import markers_of, percent, summary
 from seip_addon.core.pictures.palette import SEEN_COLOURS
 from seip_addon.core.pictures.plan_view import draw_plan, save_plan_view
-from seip_addon.core.scene_geometry import ASSUMED, Pole
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.site.scene_geometry import ASSUMED, Pole
 from tests.small_junction import make_example
 
 

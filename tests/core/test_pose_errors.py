@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+from headless.lab.stability.robustness_rows import pose_rows
+
 import numpy as np
 import pytest
 from engines import ANY
@@ -11,16 +13,16 @@ from hypothesis import strategies as st
 from scipy import stats
 from synthetic_junction import junction_site, prism
 
-from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.progress import finish
+from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views, draws_for
+from seip_addon.core.robustness.estimates import mean_of, quantile_gain, quantile_of
+from seip_addon.core.robustness.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
+from seip_addon.core.robustness.pose_study import StudySettings, pose_study, pose_warnings
 from seip_addon.core.scans.sensor import level_orientation
-from seip_addon.core.scene_geometry import Mesh
-from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views, draws_for
-from seip_addon.core.stability.estimates import mean_of, quantile_gain, quantile_of
-from seip_addon.core.stability.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
-from seip_addon.core.stability.pose_study import StudySettings, pose_rows, pose_study, pose_warnings
+from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
 FEET = np.array([[0.0, 0, 0], [5, -3, 0.12], [-5, 3, 0.12], [5, -3, 0.12]])

@@ -14,10 +14,10 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, solve
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
-from seip_addon.core.stability.risk import Risk
-from seip_addon.core.stability.robust_placement import allowed_sensors, solve_robust
-from seip_addon.core.stability.robust_search import CountedCover, RobustSearch
-from seip_addon.core.stability.views import Views
+from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.robustness.robust_placement import allowed_sensors, solve_robust
+from seip_addon.core.robustness.robust_search import CountedCover, RobustSearch
+from seip_addon.core.robustness.views import Views
 
 RISKS = [
     Risk(),
@@ -125,7 +125,7 @@ def test_no_placement_is_better_where_branches_are_many(risk, count):
 
 @pytest.mark.parametrize("risk", [risk for risk in RISKS if risk.seen_by == 1])
 def test_without_time_the_bound_still_holds(risk, monkeypatch):
-    monkeypatch.setattr("seip_addon.core.stability.robust_placement.LEAST_SECONDS", 1e-6)
+    monkeypatch.setattr("seip_addon.core.robustness.robust_placement.LEAST_SECONDS", 1e-6)
     for seed in range(4):
         problem, views = crowd(seed, 4)
         answer = finish(solve_robust(problem, pack(views), risk, time_limit=1e-6)).placement
@@ -153,7 +153,7 @@ class Branches:
 @pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
 @pytest.mark.parametrize("open_branches", [10_000, 3])
 def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, open_branches, monkeypatch):
-    monkeypatch.setattr("seip_addon.core.stability.robust_search.OPEN", open_branches)
+    monkeypatch.setattr("seip_addon.core.robustness.robust_search.OPEN", open_branches)
     problem, views = crowd(5, 5)
     instance, scale = make_instance(problem)
     worth = risk.worth(5)

@@ -3,24 +3,26 @@
 import math
 from dataclasses import replace
 
+from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
+from headless.lab.stability.robustness_rows import robust_rows
+
 import numpy as np
 import pytest
 from engines import ANY
 from matplotlib.image import imread
 from synthetic_junction import junction_site
 
-from seip_addon.core.deployment import deploy
-from seip_addon.core.goal import Goal, placement_problem
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.pictures.stability_robust_charts import save_blame_chart, save_frontier_chart, save_spread_chart
 from seip_addon.core.placement import solve
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views, draws_for
-from seip_addon.core.stability.pose_errors import PoseErrors
-from seip_addon.core.stability.pose_study import StudySettings, pose_study
-from seip_addon.core.stability.risk import Risk
-from seip_addon.core.stability.robust_placement import RobustPlacement
-from seip_addon.core.stability.robust_study import RobustSettings, robust_rows, robust_study
+from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views, draws_for
+from seip_addon.core.robustness.pose_errors import PoseErrors
+from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.robustness.robust_placement import RobustPlacement
+from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
 MODELS = load_catalogue()
@@ -63,7 +65,7 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
         short = replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
         return RobustPlacement(risk, short, np.zeros(len(scenarios)))
 
-    monkeypatch.setattr("seip_addon.core.stability.robust_study.solve_robust", poor)
+    monkeypatch.setattr("seip_addon.core.robustness.robust_study.solve_robust", poor)
     found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)]))
     (contender,), (nominal,) = found.robust, found.nominal
     assert contender.placement.chosen.tolist() == nominal.placement.chosen.tolist()

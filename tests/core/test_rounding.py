@@ -6,31 +6,26 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
+from headless.lab.stability.arithmetic import ArithmeticStudy, arithmetic_rows, check_grid, check_hits, tolerance_of
+from headless.lab.stability.charts import save_rounding_chart
+from headless.lab.stability.float64_rays import first_hits
+from headless.lab.stability.hard_scenes import far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray
+from headless.lab.stability.shares import Share
+
 import numpy as np
 import pytest
 import shapely
 from engines import each_engine, needs_embree
 from float64_rays import first_hits as plain_first_hits
 
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.pictures.stability_limits_charts import save_rounding_chart
 from seip_addon.core.scans import MountedSensor, static_scene
-from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
-from seip_addon.core.stability.arithmetic import (
-    ArithmeticStudy,
-    arithmetic_rows,
-    check_grid,
-    check_hits,
-    tolerance_of,
-)
-from seip_addon.core.stability.float64_rays import first_hits
-from seip_addon.core.stability.hard_scenes import far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray
-from seip_addon.core.stability.shares import Share
-from seip_addon.core.survey import SurveySettings, grid_key, lay_out
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.visibility import ray_casting
 from seip_addon.core.visibility.ray_casting import Engine
 from seip_addon.core.visibility.rounding import rounding_warnings
+from seip_addon.core.workflows.survey import SurveySettings, grid_key, lay_out
 
 SCENES = {scene.name: scene for scene in hard_scenes(1500, np.random.default_rng(1))}
 STREET = ordinary_scene(1500, np.random.default_rng(2))

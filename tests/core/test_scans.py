@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 
-from headless.measures.scans import SAME, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
+from headless.lab.benchmark.scans import SAME, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ from seip_addon.core.scans import (
 from seip_addon.core.scans.beam_windows import BeamWindows
 from seip_addon.core.scans.frame import STATIC
 from seip_addon.core.scans.motion import rotations
-from seip_addon.core.scene_geometry import Mesh, SceneGeometry
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.traffic import RoadUser
 
 pytestmark = needs_any

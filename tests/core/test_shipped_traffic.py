@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import joined
+from seip_addon.core.site.scene_geometry import joined
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.overlaps import find_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road

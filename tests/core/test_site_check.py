@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
-from seip_addon.core.plan_geometry import outline
+from seip_addon.core.geometry.plan import outline
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import ASSUMED, Mesh, Pole, SceneGeometry
-from seip_addon.core.site import make_site
-from seip_addon.core.site_check import Problem, SceneContents, Surface, check_site
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.check import Problem, SceneContents, Surface, check_site
+from seip_addon.core.site.scene_geometry import ASSUMED, Mesh, Pole, SceneGeometry
+from seip_addon.core.site.site import make_site
 
 
 def sheet(low_x, low_y, high_x, high_y, z=0.0):

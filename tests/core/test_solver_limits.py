@@ -7,20 +7,9 @@ from itertools import combinations
 from pathlib import Path
 from unittest.mock import patch
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures import stability_limits_charts as charts
-from seip_addon.core.placement import cheapest_for_coverage, near_best, solve, solve_greedy
-from seip_addon.core.placement.near_best import near_best as list_near_best
-from seip_addon.core.placement.problem import TIE
-from seip_addon.core.placement.scale_notes import scale_notes
-from seip_addon.core.progress import finish
-from seip_addon.core.stability.shares import Share
-from seip_addon.core.stability.solver_limits import (
+from headless.lab.stability import charts
+from headless.lab.stability.shares import Share
+from headless.lab.stability.solver_limits import (
     SolverStudy,
     TieCheck,
     TimeCheck,
@@ -32,6 +21,19 @@ from seip_addon.core.stability.solver_limits import (
     solver_study,
     worst_for_greedy,
 )
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement import cheapest_for_coverage, solve, solve_greedy
+from seip_addon.core.placement import near_optimal as near_best
+from seip_addon.core.placement.near_optimal import near_best as list_near_best
+from seip_addon.core.placement.problem import TIE
+from seip_addon.core.placement.scale_notes import scale_notes
+from seip_addon.core.progress import finish
 
 
 def random_problem(seed: int, candidates: int = 9, targets: int = 12, count: int = 3):

@@ -8,11 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from seip_addon.core.source_digest import CORE, _sources
+from seip_addon.core.storage.source_digest import CORE, _sources
 
 ROOT = Path(__file__).resolve().parents[2]
 ENTRIES = ["seip_addon.core.visibility.grid", "seip_addon.core.scans.run_folder"]
-DIGEST = "import sys; from {0}.core.source_digest import source_digest as d; print(d('{0}.core.' + sys.argv[1]))"
+DIGEST = """
+import sys
+from {0}.core.storage.source_digest import source_digest
+print(source_digest("{0}.core." + sys.argv[1]))
+"""
 LOADED = """
 import sys, importlib
 importlib.import_module(sys.argv[1])
@@ -39,19 +43,23 @@ def key(folder, entry="visibility.grid", package="seip_addon", path=""):
 
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_all_that_is_loaded_is_in_the_digest(entry):
-    loaded = set(output(LOADED, entry).split()) - {"seip_addon.core.source_digest"}
-    assert loaded - {"seip_addon.core.source_digest"} <= set(_sources(entry))
+    loaded = set(output(LOADED, entry).split()) - {"seip_addon.core.storage.source_digest"}
+    assert loaded - {"seip_addon.core.storage.source_digest"} <= set(_sources(entry))
 
 
 def test_imports_within_functions_are_followed():
-    assert f"{CORE}.pictures.scan_view" in _sources(f"{CORE}.recording")
+    assert f"{CORE}.pictures.scan_view" in _sources(f"{CORE}.workflows.recording")
 
 
 def test_imports_of_commands_are_followed_and_nothing_is_run():
     """The package of the detector ends the program where PyTorch is missing."""
-    script = "import sys; from seip_addon.core.source_digest import _sources as s; print(*s(sys.argv[1])); "
+    script = """
+import sys
+from seip_addon.core.storage.source_digest import _sources
+print(*_sources(sys.argv[1]))
+"""
     sources = output(script + "print('headless' in sys.modules)", "headless.stability").split()
-    assert "headless.detection.limits_study" in sources
+    assert "headless.lab.detector.study" in sources
     assert sources[-1] == "False"
 
 
@@ -62,7 +70,7 @@ def test_imports_of_commands_are_followed_and_nothing_is_run():
         ("visibility/occlusion.py", True),
         ("lidar/beams.py", True),
         ("lidar/__init__.py", True),
-        ("orientation.py", True),
+        ("geometry/orientation.py", True),
         ("pictures/palette.py", False),
         ("scans/scanner.py", False),
         ("placement/greedy.py", False),

@@ -6,10 +6,10 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
+from headless.lab.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
+from headless.lab.stability.rows import Row
 
-from seip_addon.core.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
-from seip_addon.core.stability.rows import Row
+import pytest
 
 CHAPTER = Chapter(
     "Poses",

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.storage import lock_folder, save_json, whole_file
+from seip_addon.core.storage.files import lock_folder, save_json, whole_file
 
 ROOT = Path(__file__).resolve().parents[2]
-HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage import *; "
+HOLD = "import sys, time; from pathlib import Path; from seip_addon.core.storage.files import *; "
 LOCK = HOLD + "lock_folder(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
 WRITE = HOLD + "part = whole_file(Path(sys.argv[1]) / 'a.json'); print(part.__enter__(), flush=True); time.sleep(60)"
 

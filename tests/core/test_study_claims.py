@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-import pytest
+from headless.coverage_study import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell, judge
 
-from seip_addon.core.coverage_study import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell, judge
+import pytest
 
 TYPES, HEIGHTS, TARGETS = ("type1", "type2", "type3"), (3.5, 5.4, 8.0), 1000
 

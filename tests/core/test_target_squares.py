@@ -1,7 +1,7 @@
 import numpy as np
 
-from seip_addon.core.site import Targets
-from seip_addon.core.target_squares import target_squares
+from seip_addon.core.site.site import Targets
+from seip_addon.core.site.target_squares import target_squares
 
 
 def targets(xyz, spacing):

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.plan_geometry import surface_height
-from seip_addon.core.scene_geometry import NamedArea
-from seip_addon.core.targets import lay_targets
+from seip_addon.core.geometry.plan import surface_height
+from seip_addon.core.site.scene_geometry import NamedArea
+from seip_addon.core.site.targets import lay_targets
 
 
 def rectangle(low_x, low_y, high_x, high_y, slope=0.0):

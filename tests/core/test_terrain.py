@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seip_addon.core.plan_geometry import plane_height
+from seip_addon.core.geometry.plan import plane_height
 from seip_addon.core.streetscape.terrain import Terrain, cut, triangulate
 
 SQUARE = np.array([[[0, 0, 1], [4, 0, 1], [4, 4, 3]], [[0, 0, 1], [4, 4, 3], [0, 4, 3]]], dtype=float)

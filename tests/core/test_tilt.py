@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+from headless.lab.stability.criterion import in_view
+
 import numpy as np
 import pytest
 import shapely
@@ -13,24 +15,20 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
-from seip_addon.core.candidates import CandidateSettings, lay_candidates, tilts_of
-from seip_addon.core.convergence import Judge
-from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal
+from seip_addon.core.geometry.orientation import angles_of, orientation, orientations, tilt_in_words, turned
 from seip_addon.core.lidar import beam_directions, load_catalogue
-from seip_addon.core.orientation import angles_of, orientation, orientations, tilt_in_words, turned
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.goal import Goal
 from seip_addon.core.progress import finish
+from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views
+from seip_addon.core.robustness.pose_errors import PoseDraws
 from seip_addon.core.scans.sensor import level_orientation
-from seip_addon.core.scene_geometry import Mesh, Pole, SceneGeometry
-from seip_addon.core.sight_lines import pose_at
-from seip_addon.core.site import Site, Targets
-from seip_addon.core.source_digest import source_digest
-from seip_addon.core.stability.criterion import in_view
-from seip_addon.core.stability.disturbed_views import Surroundings, disturbed_views
-from seip_addon.core.stability.pose_errors import PoseDraws
-from seip_addon.core.storage import digest
-from seip_addon.core.survey import SurveySettings
+from seip_addon.core.site.candidates import CandidateSettings, lay_candidates, tilts_of
+from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
+from seip_addon.core.site.site import Site, Targets
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.visibility import grid
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import (
@@ -43,7 +41,10 @@ from seip_addon.core.visibility.grid import (
 from seip_addon.core.visibility.observer import pieces_of, places
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import resolution_warnings, unresolved_from
-from seip_addon.core.visibility.turned import Onlooker
+from seip_addon.core.visibility.rotated_sensors import Onlooker
+from seip_addon.core.visibility.sight_lines import pose_at
+from seip_addon.core.workflows.convergence import Judge
+from seip_addon.core.workflows.survey import SurveySettings
 
 MODELS = {key: replace(model, points_per_second=model.points_per_second / 8) for key, model in load_catalogue().items()}
 SIGHT = VisibilitySettings()

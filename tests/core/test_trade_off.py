@@ -1,12 +1,12 @@
 """The front of ways to an answer, and how costs grow."""
 
+from headless.lab.benchmark.pareto_front import Way, front, growth_exponent
+from headless.lab.benchmark.pictures import save_growth_chart, save_trade_off_chart
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from seip_addon.core.pictures.benchmark_charts import save_growth_chart, save_trade_off_chart
-from seip_addon.core.trade_off import Way, front, growth_exponent
 
 WAYS = st.lists(
     st.tuples(st.integers(1, 9), st.integers(0, 9)).map(lambda at: Way("", "", float(at[0]), float(at[1]))), min_size=1

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import Mesh, SceneGeometry
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.overlaps import find_overlaps, footprints, without_overlaps
 from seip_addon.core.traffic.road_fit import TOLERANCE, fit_to_road

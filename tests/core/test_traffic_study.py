@@ -3,6 +3,9 @@
 import math
 from dataclasses import replace
 
+from headless.charts.traffic import negative, save_promise_chart, save_time_map
+from headless.lab.stability.robustness_rows import traffic_rows
+
 import numpy as np
 import pytest
 from engines import ANY, needs_any
@@ -11,25 +14,19 @@ from small_junction import make_geometry
 from synthetic_junction import junction_site
 from traffic_by_hand import make_trajectories, parked
 
-from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
-from seip_addon.core.goal import Goal, placement_problem
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.pictures.stability_traffic_charts import negative, save_promise_chart, save_time_map
 from seip_addon.core.placement import solve
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import finish
-from seip_addon.core.stability.disturbed_views import Surroundings
-from seip_addon.core.stability.estimates import Estimate, mean_of, mean_over_time
-from seip_addon.core.stability.robust_placement import at_least
-from seip_addon.core.stability.traffic_instants import NOBODY, WARM_UP, spread_instants
-from seip_addon.core.stability.traffic_presence import road_user_seconds
-from seip_addon.core.stability.traffic_study import (
-    look_at_traffic,
-    traffic_rows,
-    traffic_study,
-    traffic_warnings,
-)
-from seip_addon.core.stability.traffic_views import traffic_views
+from seip_addon.core.robustness.disturbed_views import Surroundings
+from seip_addon.core.robustness.estimates import Estimate, mean_of, mean_over_time
+from seip_addon.core.robustness.robust_placement import at_least
+from seip_addon.core.robustness.traffic_instants import NOBODY, WARM_UP, spread_instants
+from seip_addon.core.robustness.traffic_presence import road_user_seconds
+from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study, traffic_warnings
+from seip_addon.core.robustness.traffic_views import traffic_views
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 

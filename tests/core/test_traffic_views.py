@@ -17,16 +17,9 @@ from traffic_by_hand import make_model, make_trajectories, parked
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern
 from seip_addon.core.progress import finish
-from seip_addon.core.stability.disturbed_views import Surroundings
-from seip_addon.core.stability.traffic_instants import (
-    NOBODY,
-    STRETCH,
-    WARM_UP,
-    check_runs,
-    spread_instants,
-    standing,
-)
-from seip_addon.core.stability.traffic_views import HEIGHT, traffic_views
+from seip_addon.core.robustness.disturbed_views import Surroundings
+from seip_addon.core.robustness.traffic_instants import NOBODY, STRETCH, WARM_UP, check_runs, spread_instants, standing
+from seip_addon.core.robustness.traffic_views import HEIGHT, traffic_views
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster

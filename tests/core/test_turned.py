@@ -16,8 +16,8 @@ from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.visibility.grid import VisibilitySettings
 from seip_addon.core.visibility.observer import Observer
 from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.visibility.rotated_sensors import Onlooker
 from seip_addon.core.visibility.target_index import TargetIndex
-from seip_addon.core.visibility.turned import Onlooker
 
 MODELS = load_catalogue()
 SITE = junction_site()

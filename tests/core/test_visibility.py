@@ -20,7 +20,7 @@ from synthetic_junction import junction_site, make_candidates, prism, rectangle
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel, load_catalogue
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.site import Site, Targets
+from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.visibility.grid import (
     VisibilityGrid,
     VisibilitySettings,

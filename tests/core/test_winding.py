@@ -6,9 +6,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.obstruction import inside_any, post_blocked
-from seip_addon.core.scene_geometry import Mesh
-from seip_addon.core.winding import Cells, enclosed, winding_number
+from seip_addon.core.geometry.winding_number import Cells, enclosed, winding_number
+from seip_addon.core.site.obstruction import inside_any, post_blocked
+from seip_addon.core.site.scene_geometry import Mesh
 
 TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], dtype=float)
 FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)])

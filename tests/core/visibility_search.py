@@ -19,10 +19,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from seip_addon.core.candidates import Candidates
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import finish
-from seip_addon.core.site import Site, Targets
+from seip_addon.core.site.candidates import Candidates
+from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility, full_scan_visibility
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 

@@ -4,7 +4,9 @@ import math
 from dataclasses import replace
 
 from headless.detection.detector import Detector, keeping_at_most
-from headless.detection.disturbances import (
+from headless.detection.pillars import grid_over
+from headless.detection.settings import NetworkSettings
+from headless.lab.detector.disturbances import (
     DIAGONAL,
     DROP_INTENSITY,
     NEAR,
@@ -21,8 +23,6 @@ from headless.detection.disturbances import (
     Thinned,
     range_in,
 )
-from headless.detection.pillars import grid_over
-from headless.detection.settings import NetworkSettings
 
 import numpy as np
 import pytest

@@ -3,17 +3,17 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from headless.detection import limits_study as study_module
-from headless.detection import trials as trials_module
 from headless.detection.detector import Detector
-from headless.detection.disturbances import Disturbance, DropOff, Lost, Misturned
-from headless.detection.limit_charts import save_foreign_chart, save_limits_chart
-from headless.detection.limit_rows import limit_rows, points_in_words
-from headless.detection.limits_study import Candidates, Curve, Elsewhere, Point, course, limits_study
 from headless.detection.pillars import grid_over
 from headless.detection.recordings import Studio, TrafficRun
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.detection.trials import Entrant, Ground, trials
+from headless.lab.detector import study as study_module
+from headless.lab.detector import trials as trials_module
+from headless.lab.detector.charts import save_foreign_chart, save_limits_chart
+from headless.lab.detector.disturbances import Disturbance, DropOff, Lost, Misturned
+from headless.lab.detector.rows import limit_rows, points_in_words
+from headless.lab.detector.study import Candidates, Curve, Elsewhere, Point, course, limits_study
+from headless.lab.detector.trials import Entrant, Ground, trials
 
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ from matplotlib.image import imread
 from square_by_hand import road, sensors
 
 from seip_addon.core.progress import finish
+from seip_addon.core.robustness.estimates import Estimate
 from seip_addon.core.scans import ScanSettings
-from seip_addon.core.stability.estimates import Estimate
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
 GRID = grid_over((-32.0, -32.0, 32.0, 32.0), (-1.0, 4.5), NETWORK.pillar)

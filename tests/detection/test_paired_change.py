@@ -5,7 +5,7 @@ import math
 from headless.detection.average_precision import evaluate
 from headless.detection.intervals import percentiles, student_quantile
 from headless.detection.matching import Rule
-from headless.detection.paired_change import DRAWS, Sampled, change, level
+from headless.lab.detector.paired_change import DRAWS, Sampled, change, level
 
 import pytest
 from told_frames import box, detected, frame, traffic, truth

@@ -7,8 +7,8 @@ from headless.detection.recordings import Configuration
 
 import numpy as np
 
+from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.orientation import orientation
 
 
 def test_a_tilted_sensor_records_tilted():

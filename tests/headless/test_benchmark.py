@@ -7,25 +7,25 @@ from functools import partial
 from pathlib import Path
 
 from headless import benchmark
-from headless.measures.alone import alone
-from headless.measures.approximations import bounding_box, decimated, every_other_channel, thinner
-from headless.measures.expense import Expense, peak_memory
-from headless.measures.growth import repeated
-from headless.measures.placement import Run, compare
-from headless.measures.programme import Scope
-from headless.measures.report import bars
-from headless.measures.rivals import RIVALS, can_run
-from headless.measures.scans import ScanCost
-from headless.measures.visibility import Cost
+from headless.lab.benchmark.alone import alone
+from headless.lab.benchmark.approximations import bounding_box, decimated, every_other_channel, thinner
+from headless.lab.benchmark.expense import Expense, peak_memory
+from headless.lab.benchmark.growth import repeated
+from headless.lab.benchmark.placement import Run, compare
+from headless.lab.benchmark.programme import Scope
+from headless.lab.benchmark.report import bars
+from headless.lab.benchmark.rivals import RIVALS, can_run
+from headless.lab.benchmark.scans import ScanCost
+from headless.lab.benchmark.visibility import Cost
 from headless.street_visibility import street_problem
 
 import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.scene_geometry import Mesh
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.scene_geometry import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_junction import box_triangles, make_example

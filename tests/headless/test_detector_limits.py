@@ -7,8 +7,9 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: make detection")
 
-from headless import detector_limits, stability
-from headless.detection import limits_study
+from headless import stability
+from headless.lab.detector import chapter as detector_limits
+from headless.lab.detector import study as limits_study
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25"]

@@ -6,14 +6,14 @@ import os
 from pathlib import Path
 
 from headless import build_scene, session
-from headless.measures.visibility import visibility_costs
+from headless.lab.benchmark.visibility import visibility_costs
 
 import bpy
 import pytest
 
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.site import Site, make_site
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.site import Site, make_site
 from seip_addon.core.visibility.grid import VisibilitySettings
 from seip_addon.scene.read import read_scene
 

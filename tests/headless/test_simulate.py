@@ -22,7 +22,7 @@ from small_junction import ORIGIN, make_example
 from seip_addon.core.errors import SeipError
 from seip_addon.core.scans import Frame
 from seip_addon.core.scans.run_folder import load_frames
-from seip_addon.core.storage import lock_folder
+from seip_addon.core.storage.files import lock_folder
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend

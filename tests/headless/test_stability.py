@@ -9,8 +9,8 @@ from headless import stability
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.stability.pose_study import StudySettings
-from seip_addon.core.stability.robust_study import RobustSettings
+from seip_addon.core.robustness.pose_study import StudySettings
+from seip_addon.core.robustness.robust_study import RobustSettings
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 COARSE = [
@@ -38,12 +38,12 @@ LITTLE = stability.Scope(
 
 
 def run(folder):
-    criterion = "seip_addon.core.stability.criterion"
+    criterion = "headless.lab.stability.criterion"
     spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
     with (
         patch.object(stability, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
-        patch.multiple("seip_addon.core.convergence", COARSE_CANDIDATES=25.0, JUDGED_ON=4.0, **spacings),
+        patch.multiple("seip_addon.core.workflows.convergence", COARSE_CANDIDATES=25.0, JUDGED_ON=4.0, **spacings),
     ):
         stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE], LITTLE)
     return (folder / "docs" / "stability.md").read_text(encoding="utf-8")

@@ -4,11 +4,11 @@ import csv
 from pathlib import Path
 
 from headless import study
+from headless.coverage_study import NUMBERS, WEIGHTS
 
 import pytest
 from matplotlib.image import imread
 
-from seip_addon.core.coverage_study import NUMBERS, WEIGHTS
 from seip_addon.core.errors import SeipError
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"

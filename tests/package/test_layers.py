@@ -96,12 +96,18 @@ def test_what_is_imported_is_pinned(path):
     """Torch may be imported by the detector alone, Dask and spopt where they are of use; SciPy is for oracles."""
     own = {"seip_addon", "headless"}
     ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "PIL", "pulp", "shapely", "tqdm"}
-    detector = {"torch"} if "detection" in path.parts else set()
-    cluster = {"dask", "distributed"} if path.name == "work_force.py" else set()
+    detector = {"torch"} if {"detection", "lab"} & set(path.parts) else set()
+    cluster = {"dask", "distributed"} if path.name == "executors.py" else set()
     lock = {"packaging"} if path.name == "lock_wheels.py" else set()
     rival = {"spopt"} if path.name == "rivals.py" else set()
     foreign = {top(name) for name in imported(path)} - set(sys.stdlib_module_names) - own
     assert foreign <= ours | BLENDERS_OWN | detector | cluster | lock | rival
+
+
+@pytest.mark.parametrize("path", modules("headless"), ids=lambda path: str(path.relative_to(ROOT)))
+def test_the_laboratory_serves_its_own_commands_alone(path):
+    own = "lab" in path.parts or path.name in {"benchmark.py", "stability.py"}
+    assert own or not {name for name in imported(path) if name.startswith("headless.lab")}
 
 
 def test_an_import_that_points_up_is_found(tmp_path, monkeypatch):

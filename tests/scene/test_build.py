@@ -7,7 +7,7 @@ import shapely
 from mathutils import Vector
 
 from seip_addon.core.progress import finish
-from seip_addon.core.scene_geometry import ASSUMED
+from seip_addon.core.site.scene_geometry import ASSUMED
 from seip_addon.core.streetscape.model import SiteModel
 from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree

@@ -3,11 +3,11 @@
 import bpy
 import pytest
 
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.site import make_site
-from seip_addon.core.site_check import check_site
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.check import check_site
+from seip_addon.core.site.site import make_site
 from seip_addon.scene import contract
 from seip_addon.scene.check import contents_of
 from seip_addon.scene.read import read_scene

@@ -7,11 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon.core.candidates import CandidateSettings
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.site import make_site
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.site import make_site
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility

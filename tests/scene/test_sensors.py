@@ -15,9 +15,9 @@ from scene_by_hand import make_scene
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation, turned
 from seip_addon.core.lidar import beam_directions, load_catalogue
-from seip_addon.core.orientation import orientation, turned
-from seip_addon.core.scene_geometry import DEFAULT_REFLECTIVITY
+from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.scene import contract
 from seip_addon.scene.materials import REFLECTIVITY, material
 from seip_addon.scene.read import read_scene

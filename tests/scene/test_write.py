@@ -5,9 +5,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from seip_addon.core.colouring import Colouring, colouring
-from seip_addon.core.deployment import deploy
 from seip_addon.core.errors import SeipError
+from seip_addon.core.pictures.coverage_colours import Colouring, colouring
+from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene import contract
 from seip_addon.scene.materials import linear

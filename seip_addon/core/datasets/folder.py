@@ -13,7 +13,7 @@ from ..errors import SeipError
 from ..progress import Progress
 from ..results.placement_record import versions
 from ..scans.frame import Frame
-from ..storage import digest, save_json, whole_file
+from ..storage.files import digest, save_json, whole_file
 from .format import Format
 from .sample import FATES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
 

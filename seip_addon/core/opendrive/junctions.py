@@ -10,7 +10,7 @@ from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import SeipError
-from ..plan_geometry import closed
+from ..geometry.plan import closed
 from .lanes import LaneSurface
 from .road_map import Junction, RoadMap
 

@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image
 
 from ..arrays import Boolean, Float
-from ..orientation import tilt_in_words
-from ..storage import whole_file
+from ..geometry.orientation import tilt_in_words
+from ..storage.files import whole_file
 from .callouts import place_callouts
 from .palette import INK, PAPER, SOFT_INK
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..deployment import Deployment
-    from ..site import Site
+    from ..placement.deployment import Deployment
+    from ..site.site import Site
 
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")

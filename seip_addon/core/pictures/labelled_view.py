@@ -18,8 +18,8 @@ from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 if TYPE_CHECKING:
     import os
 
-    from ..deployment import Deployment
-    from ..site import Site
+    from ..placement.deployment import Deployment
+    from ..site.site import Site
 
 
 DPI = 160

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from ..scene_geometry import ASSUMED, FROM_MAP
+from ..site.scene_geometry import ASSUMED, FROM_MAP
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Normalize
 
-    from ..deployment import Deployment
-    from ..scene_geometry import SceneGeometry
-    from ..site import Site
+    from ..placement.deployment import Deployment
+    from ..site.scene_geometry import SceneGeometry
+    from ..site.site import Site
 
 LEGEND_WIDTH = 3.7  # inches
 ROW, LINE, SMALL_LINE = 0.42, 0.24, 0.15  # inches that a sensor, a line and a line of small text take

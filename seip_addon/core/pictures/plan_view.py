@@ -15,9 +15,9 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
 from ..arrays import Float
-from ..plan_geometry import closed, outline
-from ..scene_geometry import ASSUMED
-from ..target_squares import target_squares
+from ..geometry.plan import closed, outline
+from ..site.scene_geometry import ASSUMED
+from ..site.target_squares import target_squares
 from .drawing import draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
 from .plan_legend import LEGEND_WIDTH, PlanLegend
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from shapely.geometry.base import BaseGeometry
 
-    from ..deployment import Deployment
-    from ..scene_geometry import Mesh, SceneGeometry
-    from ..site import Site
+    from ..placement.deployment import Deployment
+    from ..site.scene_geometry import Mesh, SceneGeometry
+    from ..site.site import Site
 
 DPI = 160
 MARGIN, HEAD = 0.3, 0.95  # inches

@@ -6,7 +6,7 @@ import os
 
 from PIL import Image
 
-from ..storage import whole_file
+from ..storage.files import whole_file
 from .palette import PAPER
 
 GAP = 24

@@ -1,7 +1,7 @@
 """Which candidates to choose: maximal covering with a certificate."""
 
-from .exact import solve, solve_greedy
+from .cheapest import cheapest_for_coverage
 from .problem import Placement, PlacementProblem
-from .reverse import cheapest_for_coverage
+from .solver import solve, solve_greedy
 
 __all__ = ["Placement", "PlacementProblem", "cheapest_for_coverage", "solve", "solve_greedy"]

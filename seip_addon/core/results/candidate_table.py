@@ -9,10 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deployment import Deployment, Sensor, sensor_at, weighted_share
 from ..lidar import LidarModel
-from ..site import Site
-from ..storage import whole_file
+from ..placement.deployment import Deployment, Sensor, sensor_at, weighted_share
+from ..site.site import Site
+from ..storage.files import whole_file
 from .headings import degrees, tilt_degrees
 
 COLUMNS = (

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deployment import Deployment, Sensor
 from ..lidar import LidarModel
-from ..storage import save_json
+from ..placement.deployment import Deployment, Sensor
+from ..storage.files import save_json
 from .headings import clockwise_degrees, tilt_degrees
 
 BLUEPRINT = "sensor.lidar.ray_cast"

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Float
-from ..deployment import Sensor
 from ..errors import SeipError
-from ..goal import Plan
 from ..placement import Placement
-from ..site import Site
-from ..storage import save_json
+from ..placement.deployment import Sensor
+from ..placement.goal import Plan
+from ..site.site import Site
+from ..storage.files import save_json
 from .headings import degrees, tilt_degrees
 
 Record = dict[str, Any]

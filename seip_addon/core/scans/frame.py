@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_file import ArrayFile, ArrayRule, ContentError
 from ..arrays import Boolean, Float, Integer, Text
+from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..traffic.trajectories import CATEGORIES
 
 _FARTHEST = 1e7

@@ -14,8 +14,8 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..progress import Progress
-from ..source_digest import source_digest
-from ..storage import digest, save_json
+from ..storage.files import digest, save_json
+from ..storage.source_digest import source_digest
 from ..traffic import Trajectories
 from .frame import Frame, Labels
 from .scanner import Shape

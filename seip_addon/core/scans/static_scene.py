@@ -10,8 +10,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
-from ..far_objects import without_far_objects
-from ..scene_geometry import DEFAULT_REFLECTIVITY, SceneGeometry, joined
+from ..site.far_objects import without_far_objects
+from ..site.scene_geometry import DEFAULT_REFLECTIVITY, SceneGeometry, joined
 from .sensor import MountedSensor
 
 

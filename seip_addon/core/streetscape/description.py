@@ -20,7 +20,7 @@ from shapely.validation import explain_validity
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..scene_geometry import DEFAULT_WEIGHT
+from ..site.scene_geometry import DEFAULT_WEIGHT
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..opendrive import Outline, PlacedObject
-from ..scene_geometry import FROM_MAP
+from ..site.scene_geometry import FROM_MAP
 from . import street_furniture
 from .object_kinds import SIGN_WORDS, THIN, VAGUE, Kind, Post, height_of, kind_of, post_of, size_of
 from .parts import Part, Role

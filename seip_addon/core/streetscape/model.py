@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..obstruction import BARE, can_hide
+from ..geometry.plan import outline, signed_area, without
 from ..opendrive import (
     LaneSurface,
     PlacedObject,
@@ -23,9 +23,9 @@ from ..opendrive import (
     placed_objects,
     placed_signals,
 )
-from ..plan_geometry import outline, signed_area, without
 from ..progress import Progress
-from ..scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
+from ..site.obstruction import BARE, can_hide
+from ..site.scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
 from . import road_surface, street_furniture
 from .approaches import approach_lanes
 from .degrees import in_metres, looks_like_degrees

@@ -12,8 +12,8 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from ..arrays import Float
+from ..geometry.plan import closed, outline, without
 from ..opendrive import LaneSurface
-from ..plan_geometry import closed, outline, without
 from .terrain import Terrain, cut
 
 GROUPS = {

@@ -11,7 +11,7 @@ import shapely
 
 from ..arrays import Float
 from ..opendrive import PlacedObject, PlacedSignal
-from ..scene_geometry import ASSUMED, FROM_MAP
+from ..site.scene_geometry import ASSUMED, FROM_MAP
 from . import street_furniture
 from .map_furniture import arm_heading, can_carry
 from .object_kinds import OF_WORD, SIGNAL_WORDS, Kind, Post, post_of, words_of

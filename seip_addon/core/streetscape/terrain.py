@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..plan_geometry import plane_height, signed_area
+from ..geometry.plan import plane_height, signed_area
 
 LEAST_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""

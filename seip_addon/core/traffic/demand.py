@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import SeipError
-from ..storage import whole_file
+from ..storage.files import whole_file
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, Edge, Lane, StreetNetwork
 
 _LONGEST_ROUTE = 40  # edges; in a network without ends a vehicle leaves after so many

@@ -23,7 +23,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
-from ..storage import digest
+from ..storage.files import digest
 from .sumo_files import FARTHEST, Attributes, opened, quoted, read_tags, short
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType

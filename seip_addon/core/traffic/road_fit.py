@@ -10,8 +10,8 @@ import shapely
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from ..plan_geometry import LEAST_AREA, heights_over, plane_height, signed_area
-from ..scene_geometry import SceneGeometry, joined
+from ..geometry.plan import LEAST_AREA, heights_over, plane_height, signed_area
+from ..site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import some, unwrapped
 from .smooth_walks import put_elsewhere
 from .trajectories import RoadUser, Trajectories

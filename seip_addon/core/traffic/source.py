@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Float
 from ..errors import SeipError
 from ..progress import Progress
-from ..scene_geometry import SceneGeometry, joined
+from ..site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import Window, read_floating_car_data, read_trajectories
 from .overlaps import find_overlaps
 from .road_fit import fit_to_road

@@ -19,7 +19,7 @@ from ..errors import SeipError
 from ..opendrive import read_map
 from ..opendrive.road_map import RoadMap
 from ..progress import Progress, in_thread
-from ..storage import whole_file
+from ..storage.files import whole_file
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 

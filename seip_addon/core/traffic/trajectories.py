@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..array_file import ArrayFile, ArrayRule, ContentError
 from ..arrays import Float, Integer
-from ..storage import digest
+from ..storage.array_file import ArrayFile, ArrayRule, ContentError
+from ..storage.files import digest
 
 LARGEST = 100.0
 """Metres of length, width or height of a road user at most."""

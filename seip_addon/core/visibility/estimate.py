@@ -19,12 +19,12 @@ import numpy as np
 from ..arrays import Integer
 from ..lidar import LidarModel, find_models
 from ..progress import PAUSE, Progress
-from ..site import Site
+from ..site.site import Site
+from .executors import ObserverTask, threads_of
 from .grid import VisibilitySettings
 from .needed_triangles import needed_triangles
 from .observer import Rows, places
 from .ray_casting import Engine, engine_name
-from .work_force import ObserverTask, threads_of
 
 SAMPLING = 0.8
 """Seconds that sample places may take, beyond the first of each thread."""

@@ -17,20 +17,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_file import ArrayFile, ArrayRule, ContentError
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..lidar import LidarModel, find_models
 from ..progress import Progress
-from ..site import Site
-from ..source_digest import source_digest
-from ..storage import digest
+from ..site.site import Site
+from ..storage.array_file import ArrayFile, ArrayRule, ContentError
+from ..storage.files import digest
+from ..storage.source_digest import source_digest
+from .executors import ObserverTask, cluster, threads_of
 from .needed_triangles import needed_triangles
 from .observer import KeptPieces, pieces_of, see_pieces
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import Place
 from .sight import seen_by_tilted_full_scan
-from .work_force import ObserverTask, cluster, threads_of
 
 FILE = ArrayFile(
     "seip.visibility",

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Float, Integer
-from ..orientation import turned
+from ..geometry.orientation import turned
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..arrays import Boolean, Float, Integer
 from ..lidar import LidarModel
 from ..progress import PAUSE, Progress
-from ..site import Site
+from ..site.site import Site
 from .near_surfaces import near_surfaces
 from .ray_casting import RayCaster
 from .sight import Sight

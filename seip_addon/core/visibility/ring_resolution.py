@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float
 from ..lidar import LidarModel, find_models
-from ..site import Site
+from ..site.site import Site
 from .grid import VisibilitySettings
 
 

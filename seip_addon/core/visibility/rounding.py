@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Float
-from ..scene_geometry import Mesh, SceneGeometry
+from ..site.scene_geometry import Mesh, SceneGeometry
 
 NOTICEABLE = 1e-3
 """Metres: coarser steps move returns at a grazing incidence by as much as a sensor's own noise of 2 to 3 cm."""

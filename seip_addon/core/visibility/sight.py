@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
+from ..geometry.orientation import orientation as orientation_of
+from ..geometry.orientation import turned
 from ..lidar import LidarModel
-from ..orientation import orientation as orientation_of
-from ..orientation import turned
 from .near_surfaces import NearSurfaces, turned_surfaces
 from .scanning import Caster, Place, seen_by_all_rays, seen_by_near_rays
 

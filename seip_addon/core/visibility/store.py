@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..array_file import ArrayFile, ArrayRule
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..progress import Progress
-from ..site import Site
+from ..site.site import Site
+from ..storage.array_file import ArrayFile, ArrayRule
 from .grid import VisibilityGrid, VisibilitySettings, compute_visibility, visibility_key
 from .observer import Rows
 from .ray_casting import Engine, engine_name

@@ -1,0 +1,1 @@
+"""Charts of robust placement and of placement in traffic."""

@@ -1,0 +1,143 @@
+"""Charts of what traffic hides from a placement, and of what placing on traffic wins back."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from headless.coverage_study.charts import SERIES
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.geometry.plan import closed, outline
+from seip_addon.core.pictures.drawing import draw_sensors, save_png
+from seip_addon.core.pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
+from seip_addon.core.pictures.plan_view import CRACK, draw_area
+from seip_addon.core.placement.deployment import Deployment
+from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.traffic_study import WHAT, InTraffic, TrafficStudy
+from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.site.site import Site
+from seip_addon.core.site.target_squares import target_squares
+
+TIME = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae", *SEEN_COLOURS[1:]))
+"""From never seen to always seen: from the colour of targets that no sensor sees to that of those that two see."""
+
+OBSTACLE = "#8b9285"
+SIDE = 6.4  # inches
+AROUND = 0.04  # of the region's size, shown around it
+THIRD = 0.26  # of the step from one group of bars to the next
+
+
+def save_time_map(  # what is drawn, and where
+    path: str | os.PathLike[str],
+    geometry: SceneGeometry,
+    site: Site,
+    deployment: Deployment,
+    placed: InTraffic,
+    title: str,
+) -> None:
+    """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
+    left, bottom, right, top = site.region.bounds
+    around = AROUND * max(right - left, top - bottom)
+    shape = (top - bottom + 2 * around) / (right - left + 2 * around)
+    figure = Figure((SIDE * len(placed.seen) + 0.9, SIDE * shape + 0.9), dpi=160, facecolor=PAPER, layout="constrained")
+    panels = figure.subplots(1, len(placed.seen), squeeze=False)[0]
+    for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
+        panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
+        panel.set_title(f"{WHAT[layer]}: {seen.held.in_words(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
+        panel.set(xticks=(), yticks=())
+        _draw_shares(panel, site, seen.time)
+        _draw_place(panel, geometry)
+    for panel in panels:  # after the last change of the layout that moves data on the page
+        figure.draw_without_rendering()
+        where = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
+        draw_sensors(panel, deployment, where, site.targets.xyz[:, :2], zorder=4)
+    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME), ax=list(panels), shrink=0.7, pad=0.01)
+    bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+    bar.set_label("share of time for which it is seen", color=INK)
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+    save_png(path, figure)
+
+
+def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
+    """Draw what placements for the empty road promise and hold in traffic beside those chosen on traffic, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    studies : sequence of (str, TrafficStudy)
+        With what tells one from another, like ``2 × type1``.
+    title : str
+    """
+    figure = Figure((11.5, 4.6), dpi=160, facecolor=PAPER, layout="constrained")
+    shares, changes = figure.subplots(1, 2)
+    rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
+    _bars(shares, -1, [Estimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "promised, empty road")
+    _bars(shares, 0, [empty.held for empty, _ in rows], "held in traffic")
+    _bars(shares, 1, [traffic.held for _, traffic in rows], "held, placed on traffic")
+    shares.set_ylabel(f"share of the {WHAT[studies[0][1].layer]} seen", color=INK)
+    _dots(changes, -0.5, [negative(empty.lost) for empty, _ in rows], 1, "lost to traffic")
+    _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "won by placing on traffic")
+    changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
+    changes.set_ylabel("change, 95 % interval", color=INK)
+    for axes, decimals in ((shares, 0), (changes, 1)):
+        axes.set_xticks(range(len(studies)), [name for name, _ in studies])
+        axes.set_xlim(-0.6, len(studies) - 0.4)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=decimals))
+        axes.grid(axis="y", color="#e3e6e8", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.tick_params(colors=SOFT_INK)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+        axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+    save_png(path, figure)
+
+
+def negative(estimate: Estimate) -> Estimate:
+    """Return the estimate of what has the opposite sign."""
+    return Estimate(-estimate.value, -estimate.high, -estimate.low)
+
+
+def _draw_shares(panel: Axes, site: Site, time: Float) -> None:
+    squares = list(target_squares(site.targets)[:, :, :2])
+    panel.add_collection(
+        PolyCollection(squares, facecolors=TIME(time), edgecolors="none", antialiaseds=False, zorder=1), autolim=False
+    )
+
+
+def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
+    """Draw what stands in the way and the region's border."""
+    shown = shapely.box(*panel.get_xlim()[:1], *panel.get_ylim()[:1], *panel.get_xlim()[1:], *panel.get_ylim()[1:])
+    standing = shapely.intersection(outline(joined(geometry.occluders)), shown)
+    draw_area(panel, standing, facecolor=OBSTACLE, edgecolor="#3d4542", linewidth=0.4, alpha=0.75, zorder=2)
+    draw_area(panel, closed(geometry.region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
+
+
+def _bars(axes: Axes, place: int, estimates: Sequence[Estimate], label: str) -> None:
+    at = np.arange(len(estimates)) + place * THIRD
+    values = np.array([estimate.value for estimate in estimates])
+    axes.bar(at, values, width=0.9 * THIRD, color=(SEEN_COLOURS[1], SERIES[1], SERIES[2])[place + 1], label=label)
+    for x, estimate in zip(at, estimates, strict=True):
+        axes.plot([x, x], _ends(estimate), color=INK, linewidth=1.4)
+
+
+def _dots(axes: Axes, place: float, estimates: Sequence[Estimate], colour: int, label: str) -> None:
+    at = np.arange(len(estimates)) + place * THIRD
+    for x, estimate in zip(at, estimates, strict=True):
+        axes.plot([x, x], _ends(estimate), color=SERIES[colour], linewidth=2.4)
+    axes.plot(at, [each.value for each in estimates], "o", color=SERIES[colour], label=label)
+
+
+def _ends(estimate: Estimate) -> list[float]:
+    """Return the ends of an interval; where it is open it ends at the value."""
+    return [end if np.isfinite(end) else estimate.value for end in (estimate.low, estimate.high)]

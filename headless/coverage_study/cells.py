@@ -1,0 +1,221 @@
+"""The cells of the study: the best placement for each type, height, number and central weight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.placement import Placement, solve, solve_greedy
+from seip_addon.core.placement.deployment import Deployment, deploy
+from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.site.site import Site
+
+NUMBERS = (1, 2, 4)
+WEIGHTS = (2.0, 4.0, 8.0, 16.0)
+WEIGHT_SHOWN = WEIGHTS[1]
+"""Central weight of the plans that stand beside the vanilla ones."""
+
+
+Span = tuple[float, float]
+"""Least and largest possible value of something that the solver may not have settled."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What one cell of the study allows.
+
+    Parameters
+    ----------
+    sensor : str
+        Catalogue key of the one type allowed.
+    height : float or None, metres
+        The one height allowed; None where heights are free.
+    count : int
+        N, the largest number of sensors.
+    weight : float
+        Weight of central targets; 1 is the vanilla problem.
+    """
+
+    sensor: str
+    height: float | None
+    count: int
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Case(Cell):
+    """A solved cell.
+
+    Parameters
+    ----------
+    placement, greedy : Placement
+        The integer program's and the greedy algorithm's answer.
+    deployment : Deployment
+        What the integer program's sensors see.
+    """
+
+    placement: Placement
+    greedy: Placement
+    deployment: Deployment
+
+    @property
+    def span(self) -> Span:
+        """Least and largest possible best objective: they meet where the optimum is proven."""
+        return self.placement.objective, max(self.placement.objective, self.placement.bound)
+
+
+@dataclass(frozen=True)
+class EmptyCell(Cell):
+    """A cell that has no placement.
+
+    Parameters
+    ----------
+    note : str
+        Why: the sentence that a user would read who asked for this placement alone.
+    """
+
+    note: str
+
+
+@dataclass(frozen=True, eq=False)
+class CoverageStudy:
+    """All cells of the study on one site.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Catalogue keys, from the simplest type to the best.
+    heights : tuple of float, metres
+    cells : tuple of Case or EmptyCell
+        In the order in which they were solved.
+    targets : int
+        Number of targets, the unit of vanilla objectives.
+    """
+
+    sensors: tuple[str, ...]
+    heights: tuple[float, ...]
+    cells: tuple[Case | EmptyCell, ...]
+    targets: int
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The cells that have a placement."""
+        return tuple(cell for cell in self.cells if isinstance(cell, Case))
+
+    def find(self, sensor: str, count: int, height: float | None = None, weight: float = 1.0) -> Case | None:
+        """Return one cell, or None where it has no placement."""
+        wanted = (sensor, count, height, weight)
+        return next((c for c in self.cases if (c.sensor, c.count, c.height, c.weight) == wanted), None)
+
+    def case(self, sensor: str, count: int, height: float | None = None, weight: float = 1.0) -> Case:
+        """Return one cell that has a placement.
+
+        Raises
+        ------
+        SeipError
+            It has none.
+        """
+        found = self.find(sensor, count, height, weight)
+        if found is None:
+            at = "any height" if height is None else f"{height:g} m"
+            raise SeipError(f"the study has no placement of {sensor} at {at}, N = {count}, central weight {weight:g}")
+        return found
+
+    def possible(self, sensor: str, count: int, height: float | None = None) -> Span | None:
+        """Return the least and largest possible best coverage of a vanilla cell, or None where it has no placement."""
+        found = self.find(sensor, count, height)
+        if found is None:
+            return None
+        low, high = found.span
+        return low / self.targets, min(high / self.targets, 1.0)
+
+
+def coverage_study(
+    site: Site,
+    models: Mapping[str, LidarModel],
+    visible: NDArray[np.bool_],
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
+) -> Generator[Progress, None, CoverageStudy]:
+    """Solve every cell: each type, each height alone and all together, N = 1, 2, 4; then a sweep of central weights.
+
+    A cell that has no placement (more sensors than positions, a type that sees
+    nothing from one height) is recorded with the reason, and the others go on.
+
+    Parameters
+    ----------
+    site : Site
+        With poses of every type and height to be studied.
+    models : mapping of str to LidarModel
+    visible : (c, t) bool
+        The visibility grid.
+    solver : str
+    time_limit : float, seconds
+        For each cell.
+    effort : float, units of work
+        As for `placement.solve`.
+
+    Returns
+    -------
+    CoverageStudy
+
+    Raises
+    ------
+    SeipError
+        No cell has a placement; the first one's reason.
+    """
+    sensors = tuple(dict.fromkeys(site.candidates.sensor.tolist()))
+    heights = tuple(sorted(set(site.candidates.height.tolist())))
+    plan = [Cell(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in NUMBERS]
+    if site.targets.central.any():
+        plan += [Cell(s, None, n, w) for s in sensors for n in NUMBERS for w in WEIGHTS]
+    cells: list[Case | EmptyCell] = []
+    for done, cell in enumerate(plan):
+        at = "any height" if cell.height is None else f"{cell.height:g} m"
+        progress = Progress(done, len(plan), f"{cell.sensor}, {at}, N = {cell.count}, central weight {cell.weight:g}")
+        yield progress
+        try:
+            steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit, effort=effort)
+            cells.append((yield from within(progress, steps)))
+        except SeipError as error:
+            cells.append(EmptyCell(**vars(cell), note=str(error)))
+    yield Progress(len(plan), len(plan), "all cells solved")
+    if all(isinstance(cell, EmptyCell) for cell in cells):
+        raise SeipError(next(cell.note for cell in cells if isinstance(cell, EmptyCell)))
+    return CoverageStudy(sensors, heights, tuple(cells), len(site.targets))
+
+
+def solve_cell(  # noqa: PLR0913 -- a problem, and the limits of its solution
+    site: Site,
+    models: Mapping[str, LidarModel],
+    visible: NDArray[np.bool_],
+    cell: Cell,
+    *,
+    solver: str,
+    time_limit: float,
+    effort: float,
+) -> Generator[Progress, None, Case]:
+    """Solve one cell; the arguments are those of `coverage_study`.
+
+    Raises
+    ------
+    SeipError
+        It has no placement.
+    """
+    allowed = site.candidates.sensor == cell.sensor
+    if cell.height is not None:
+        allowed &= site.candidates.height == cell.height
+    goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
+    problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
+    placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+    deployment = deploy(site, models, visible, placement.chosen)
+    return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

@@ -1,0 +1,87 @@
+"""Tables of a coverage study: every cell as CSV, the claims as Markdown."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+
+from seip_addon.core.results.headings import tilt_degrees
+from seip_addon.core.storage.files import whole_file
+
+from . import Case, Claim, CoverageStudy, EmptyCell
+
+COLUMNS = (
+    "sensor",
+    "height_m",
+    "count",
+    "central_weight",
+    "sensors_used",
+    "heights_used_m",
+    "tilts_used_deg",
+    "coverage",
+    "central_coverage",
+    "seen_twice",
+    "objective",
+    "bound",
+    "gap",
+    "status",
+    "greedy_objective",
+    "price_usd",
+    "note",
+)
+
+
+def save_study_table(path: str | os.PathLike[str], study: CoverageStudy) -> None:
+    """Write one row for each cell as CSV; one without a placement has its reason in the column ``note``."""
+    with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+        writer.writeheader()
+        for cell in study.cells:
+            writer.writerow(_key(cell) | (_figures(cell) if isinstance(cell, Case) else {"note": cell.note}))
+
+
+def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: str) -> None:
+    """Write the claims with their verdicts and figures as a Markdown table."""
+    lines = [
+        f"# {title}: claims of the study on this site",
+        "",
+        "| # | claim | verdict | figures |",
+        "|---|---|---|---|",
+    ]
+    lines += [f"| {c.number} | {_cell(c.text)} | **{c.verdict}** | {_cell(c.evidence)} |" for c in claims]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _key(cell: Case | EmptyCell) -> dict[str, str]:
+    return {
+        "sensor": cell.sensor,
+        "height_m": "free" if cell.height is None else f"{cell.height:g}",
+        "count": f"{cell.count}",
+        "central_weight": f"{cell.weight:g}",
+    }
+
+
+def _figures(case: Case) -> dict[str, str]:
+    placement, deployment = case.placement, case.deployment
+    return {
+        "sensors_used": f"{len(deployment.sensors)}",
+        "heights_used_m": " ".join(f"{sensor.height:g}" for sensor in deployment.sensors),
+        "tilts_used_deg": " ".join(f"{tilt_degrees(sensor.tilt):g}" for sensor in deployment.sensors),
+        "coverage": f"{deployment.coverage:.6f}",
+        "central_coverage": "" if deployment.central is None else f"{deployment.central:.6f}",
+        "seen_twice": f"{deployment.seen_twice:.6f}",
+        "objective": f"{placement.objective:.12g}",
+        "bound": f"{placement.bound:.12g}",
+        "gap": f"{placement.gap:.6g}",
+        "status": placement.status,
+        "greedy_objective": f"{case.greedy.objective:.12g}",
+        "price_usd": f"{deployment.price:.2f}",
+        "note": "; ".join(placement.notes),
+    }
+
+
+def _cell(words: str) -> str:
+    """Return text that a Markdown table takes as one cell."""
+    return words.replace("|", "\\|")

@@ -1,0 +1,515 @@
+"""Charts of how well vehicles are detected, and what that costs."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from headless.coverage_study.charts import MARKS, SERIES
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.pictures.callouts import place_callouts
+from seip_addon.core.pictures.drawing import save_png
+from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+
+GRID, FAINT = "#e3e6e8", "#c3c9ce"
+PANEL = (6.0, 4.4)  # inches
+DPI = 160
+BESIDE, ASIDE = 0.09, 0.035  # of the step between two numbers of sensors: from type to type, from mark to seeds
+SEED_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.4, "alpha": 0.55, "mew": 0.0, "zorder": 2}
+NAME: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
+
+STROKES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
+
+PRECISION = "average precision"
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What was reached with one type and number of sensors.
+
+    Parameters
+    ----------
+    sensor : str
+        Catalogue key.
+    count : int
+        N, the number of sensors that were allowed.
+    price : float, US dollars
+    coverage : float, 0 to 1
+    values : tuple of float
+        Average precision by seed.
+    interval : (float, float) or None
+        95 % interval of their mean, where there is one.
+    """
+
+    sensor: str
+    count: int
+    price: float
+    coverage: float
+    values: tuple[float, ...]
+    interval: Interval | None = None
+
+    @property
+    def mean(self) -> float:
+        """Mean over the seeds."""
+        return float(np.mean(self.values))
+
+    @property
+    def name(self) -> str:
+        """What it is called in a chart."""
+        return _named(self.count, self.sensor)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Precision and recall of one type and number of sensors.
+
+    Parameters
+    ----------
+    sensor, count
+        As in `Cell`.
+    recall, precision : (s,) float64, 0 to 1
+        At each score, the highest first.
+    average_precision : float
+    """
+
+    sensor: str
+    count: int
+    recall: Float
+    precision: Float
+    average_precision: float
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A figure in parts of the road users, one line for each series.
+
+    Parameters
+    ----------
+    what, figure : str
+        What the parts go by, and what is drawn, with units.
+    edges : sequence of float
+        Each part is from one edge to below the next; the last may be infinite.
+    lines : mapping of str to sequence of float
+        A value for each part, NaN where there is none.
+    road_users : sequence of int
+        In each part, drawn behind the lines; empty where they mean nothing.
+    """
+
+    what: str
+    figure: str
+    edges: Sequence[float]
+    lines: Mapping[str, Sequence[float]]
+    road_users: Sequence[int] = ()
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting of the detector and what it costs.
+
+    Parameters
+    ----------
+    name : str
+        What differs from the default: ``pillars 0.32 m``.
+    family : str
+        Settings of one family look alike.
+    training : float, seconds
+    inference : float, milliseconds
+        For one merged frame.
+    average_precision : float, 0 to 1
+    interval : (float, float) or None
+    default : bool
+    """
+
+    name: str
+    family: str
+    training: float
+    inference: float
+    average_precision: float
+    interval: Interval | None = None
+    default: bool = False
+
+
+def save_count_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title: str) -> None:
+    """Draw average precision against the number of sensors, a line for each type, as PNG.
+
+    Small dots are single seeds, marks their means, bars the intervals of the means.
+    """
+    _check(cells, "average precision against the number of sensors")
+    figure, (panel,) = _figure()
+    counts = sorted({cell.count for cell in cells})
+    sensors = _sensors(cells)
+    for row, sensor in enumerate(sensors):
+        own = sorted((cell for cell in cells if cell.sensor == sensor), key=lambda cell: cell.count)
+        x = [counts.index(cell.count) + BESIDE * (row - (len(sensors) - 1) / 2) for cell in own]
+        panel.plot(x, [cell.mean for cell in own], label=sensor, linewidth=1.6, **_mark(row))
+        for place, cell in zip(x, own, strict=True):
+            _bar(panel, place, cell.interval, row)
+            panel.plot([place + ASIDE] * len(cell.values), cell.values, color=_colour(row), marker="o", **SEED_MARK)
+    panel.set_xticks(range(len(counts)), [f"{count}" for count in counts])
+    panel.set_xlim(-0.4, len(counts) - 0.6)
+    panel.set_xlabel("number of sensors N", color=INK)
+    _precision_axis(panel, _reached(cells))
+    _finish(figure, panel, title)
+    save_png(path, figure)
+
+
+def save_price_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title: str) -> None:
+    """Draw average precision against price, with the front named, as PNG."""
+    _check(cells, "average precision against price")
+    figure, (panel,) = _figure(PANEL[0] * 1.25)
+    best = _front(cells)
+    _scatter(panel, cells, [cell.price for cell in cells])
+    panel.step(
+        [cell.price for cell in best],
+        [cell.mean for cell in best],
+        where="post",  # what is bought for less is at hand for more
+        color=SOFT_INK,
+        linewidth=1.1,
+        linestyle=(0, (4, 2)),
+        zorder=1,
+        label="front: nothing cheaper detects as well",
+    )
+    panel.set_xscale("log")
+    panel.margins(x=0.12)
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda price, _: f"${price / 1000:,.0f}k"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    prices = [cell.price for cell in cells]
+    panel.set_xticks([tick for tick in _round_prices() if min(prices) / 1.5 <= tick <= max(prices) * 1.5])
+    panel.set_xlabel("price of all sensors", color=INK)
+    _precision_axis(panel, _reached(cells))
+    _finish(figure, panel, title)
+    _name(figure, panel, [(cell.price, cell.mean, cell.name, cell in best) for cell in cells])
+    save_png(path, figure)
+
+
+def save_coverage_chart(
+    path: str | os.PathLike[str], cells: Sequence[Cell], correlation: float, interval: Interval | None, title: str
+) -> None:
+    """Draw average precision against coverage, with their rank correlation, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    cells : sequence of Cell
+    correlation : float
+        Spearman's rank correlation of coverage and mean average precision.
+    interval : (float, float) or None
+        Its 95 % interval, where there is one.
+    title : str
+    """
+    _check(cells, "average precision against coverage")
+    figure, (panel,) = _figure()
+    _scatter(panel, cells, [cell.coverage for cell in cells])
+    panel.margins(x=0.1)
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.0f} %"))
+    panel.set_xlabel("coverage: share of the road that the placement sees", color=INK)
+    _precision_axis(panel, _reached(cells))
+    between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
+    panel.set_title(f"rank correlation ρ = {correlation:.2f}{between}", color=SOFT_INK, fontsize=9.5)
+    _finish(figure, panel, title)
+    _name(figure, panel, [(cell.coverage, cell.mean, cell.name, False) for cell in cells])
+    save_png(path, figure)
+
+
+def save_precision_recall_chart(path: str | os.PathLike[str], curves: Sequence[Curve], title: str) -> None:
+    """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
+    _check(curves, "precision against recall")
+    figure, (panel,) = _figure()
+    sensors = list(dict.fromkeys(curve.sensor for curve in curves))
+    counts = sorted({curve.count for curve in curves}, reverse=True)
+    for curve in curves:
+        stroke = STROKES[counts.index(curve.count) % len(STROKES)]
+        label = f"{_named(curve.count, curve.sensor)}: AP {curve.average_precision:.2f}"
+        colour = _colour(sensors.index(curve.sensor))
+        panel.plot(curve.recall, curve.precision, color=colour, linestyle=stroke, linewidth=1.6, label=label)
+    panel.set(xlim=(0, 1.01), ylim=(0, 1.02))
+    panel.set_xlabel("recall", color=INK)
+    panel.set_ylabel("precision", color=INK)
+    _dress(panel)
+    _finish(figure, panel, title)
+    save_png(path, figure)
+
+
+def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[Parts], title: str) -> None:
+    """Draw figures in parts of the road users, a panel for each way to part them, as PNG."""
+    _check(panels, "detection by parts of the road users")
+    figure, axes = _figure(PANEL[0] * 0.85, count=len(panels))
+    for panel, parts in zip(axes, panels, strict=True):
+        places = range(len(parts.edges) - 1)
+        if parts.road_users:
+            _draw_road_users(panel, parts.road_users)
+        for row, (name, values) in enumerate(parts.lines.items()):
+            panel.plot(places, values, label=name, linewidth=1.6, **_mark(row))
+        panel.set_xticks(places, _spans(parts.edges), fontsize=8)
+        panel.set_xlim(-0.5, len(places) - 0.5)
+        panel.set_ylim(bottom=0)
+        if parts.road_users:
+            panel.set_ylim(0, 1.03)
+        panel.set_xlabel(parts.what, color=INK)
+        panel.set_ylabel(parts.figure, color=INK)
+        _dress(panel)
+    _finish(figure, axes[0], title)
+    save_png(path, figure)
+
+
+def save_training_chart(
+    path: str | os.PathLike[str], loss: Sequence[float], validation: Mapping[int, float], title: str
+) -> None:
+    """Draw the loss and the average precision on validation frames over the steps of a training, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    loss : sequence of float
+        Of each step.
+    validation : mapping of int to float
+        Average precision after so many steps; the best is marked.
+    title : str
+    """
+    _check(loss, "a training")
+    figure, (panel,) = _figure(PANEL[0] * 1.25)
+    steps = np.arange(1, len(loss) + 1)
+    panel.plot(steps, loss, color=FAINT, linewidth=0.7, label="loss")
+    panel.plot(steps, _smoothed(np.asarray(loss, dtype=np.float64)), color=SERIES[0], linewidth=1.6, label="smoothed")
+    panel.set_yscale("log")
+    panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.yaxis.set_minor_formatter(NullFormatter())
+    panel.set_xlim(0, len(loss))
+    panel.set_xlabel("step", color=INK)
+    panel.set_ylabel("loss", color=INK)
+    _dress(panel)
+    handles, labels = panel.get_legend_handles_labels()
+    if validation:
+        beside = panel.twinx()
+        beside.plot(
+            list(validation),
+            list(validation.values()),
+            color=SERIES[1],
+            marker="s",
+            markersize=4,
+            label="validation AP",
+        )
+        best = max(validation, key=lambda step: validation[step])
+        style: dict[str, Any] = {
+            "linestyle": "none",
+            "marker": "o",
+            "markersize": 12,
+            "mfc": "none",
+            "mec": INK,
+            "mew": 1.3,
+        }
+        beside.plot([best], [validation[best]], label=f"best: {validation[best]:.2f} after {best} steps", **style)
+        beside.set_ylim(0, 1.02)
+        beside.set_ylabel(f"{PRECISION} on validation frames", color=INK)
+        beside.tick_params(colors=SOFT_INK)
+        for side in ("top", "left"):
+            beside.spines[side].set_visible(False)
+        more_handles, more_labels = beside.get_legend_handles_labels()
+        handles, labels = handles + more_handles, labels + more_labels
+    _legend(figure, handles, labels)
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+    save_png(path, figure)
+
+
+def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Setting], title: str) -> None:
+    """Draw average precision against training seconds and inference milliseconds, the default marked, as PNG."""
+    _check(settings, "settings of the detector")
+    figure, axes = _figure(PANEL[0] * 1.1, count=2)
+    families = list(dict.fromkeys(setting.family for setting in settings))
+    costs = [[one.training for one in settings], [one.inference for one in settings]]
+    for panel, cost, what in zip(
+        axes, costs, ("training, one core (s)", "inference on one merged frame, one core (ms)"), strict=True
+    ):
+        for row, family in enumerate(families):
+            own = [(x, one) for x, one in zip(cost, settings, strict=True) if one.family == family]
+            for x, one in own:
+                _bar(panel, x, one.interval, row)
+            values = [one.average_precision for _, one in own]
+            panel.plot([x for x, _ in own], values, label=family, linestyle="none", **_mark(row))
+        chosen = [(x, one.average_precision) for x, one in zip(cost, settings, strict=True) if one.default]
+        style: dict[str, Any] = {
+            "linestyle": "none",
+            "marker": "o",
+            "markersize": 14,
+            "mfc": "none",
+            "mec": INK,
+            "mew": 1.4,
+        }
+        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", **style)
+        panel.margins(x=0.15)
+        panel.set_xlim(left=0)
+        panel.set_xlabel(what, color=INK)
+        _precision_axis(panel, [v for one in settings for v in (one.average_precision, *(one.interval or ()))])
+    _finish(figure, axes[0], title)
+    for panel, cost in zip(axes, costs, strict=True):
+        named = [(x, one.average_precision, one.name, one.default) for x, one in zip(cost, settings, strict=True)]
+        _name(figure, panel, named)
+    save_png(path, figure)
+
+
+def _check(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
+    if not drawn:
+        raise SeipError(f"there is nothing to draw a chart of {what} from: evaluate a detector first")
+
+
+def _figure(width: float = PANEL[0], *, count: int = 1) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure with that many panels side by side."""
+    figure = Figure((width * count, PANEL[1]), dpi=DPI, facecolor=PAPER, layout="constrained")
+    FigureCanvasAgg(figure)  # measures text
+    return figure, figure.subplots(1, count, squeeze=False)[0]
+
+
+def _finish(figure: Figure, panel: Axes, title: str) -> None:
+    """Write the title, and below all panels the legend that they share."""
+    _legend(figure, *panel.get_legend_handles_labels())
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+
+
+def _legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    widths = [0.6 + 0.07 * len(label) for label in labels]  # inches, about
+    room = figure.get_figwidth()
+    columns = len(labels) if sum(widths) < room else max(1, int(room // max(widths)))
+    legend = figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+
+
+def _named(count: int, sensor: str) -> str:
+    return f"{count} × {sensor}"
+
+
+def _sensors(cells: Sequence[Cell]) -> list[str]:
+    return list(dict.fromkeys(cell.sensor for cell in cells))
+
+
+def _scatter(panel: Axes, cells: Sequence[Cell], x: Sequence[float]) -> None:
+    """Mark each cell's mean with its interval, a colour and a mark for each type."""
+    for row, sensor in enumerate(_sensors(cells)):
+        own = [(place, cell) for place, cell in zip(x, cells, strict=True) if cell.sensor == sensor]
+        for place, cell in own:
+            _bar(panel, place, cell.interval, row)
+        places, means = [place for place, _ in own], [cell.mean for _, cell in own]
+        panel.plot(places, means, label=sensor, linestyle="none", **_mark(row))
+
+
+def _bar(panel: Axes, x: float, interval: Interval | None, row: int) -> None:
+    if interval is not None:
+        panel.plot((x, x), interval, color=_colour(row), linewidth=1.1, marker="_", markersize=5, zorder=3)
+
+
+def _mark(row: int) -> dict[str, Any]:
+    return {
+        "color": _colour(row),
+        "marker": MARKS[row % len(MARKS)],
+        "markersize": 6,
+        "mec": PAPER,
+        "mew": 0.7,
+        "zorder": 4,
+    }
+
+
+def _colour(row: int) -> str:
+    return SERIES[row % len(SERIES)]
+
+
+def _front(cells: Sequence[Cell]) -> list[Cell]:
+    """Return the cells than which none costs no more and detects better (Pareto front), the cheapest first."""
+    best: list[Cell] = []
+    for cell in sorted(cells, key=lambda cell: (cell.price, -cell.mean)):
+        if not best or cell.mean > best[-1].mean:
+            best.append(cell)
+    return best
+
+
+def _reached(cells: Sequence[Cell]) -> list[float]:
+    return [value for cell in cells for value in (*cell.values, *(cell.interval or ()))]
+
+
+def _precision_axis(panel: Axes, reached: Sequence[float]) -> None:
+    """Show what was reached: differences near 1 would not be seen on an axis from 0."""
+    lowest = min(value for value in reached if math.isfinite(value))
+    panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
+    panel.set_ylabel(PRECISION, color=INK)
+    _dress(panel)
+
+
+def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
+    """Draw behind the lines how many road users each part has, the most of them half as high as the panel."""
+    heights = 0.5 * np.asarray(counts) / max(1, *counts)
+    panel.bar(range(len(counts)), heights, width=0.86, color="#eef0f2", zorder=0, label="road users")
+    for place, (count, height) in enumerate(zip(counts, heights, strict=True)):
+        panel.text(place, height + 0.012, f"{count}", ha="center", va="bottom", size=6.5, color=SOFT_INK, zorder=1)
+
+
+def _spans(edges: Sequence[float]) -> list[str]:
+    """Return the words for each part: ``0–10``, or ``60 +`` for the last one without an end."""
+    return [f"{low:g}–{high:g}" if math.isfinite(high) else f"{low:g} +" for low, high in pairwise(edges)]
+
+
+def _smoothed(values: Float) -> Float:
+    """Return the running mean over a fiftieth of the values, as many on either side as there are."""
+    reach = len(values) // 100
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    places = np.arange(len(values))
+    first, last = np.maximum(places - reach, 0), np.minimum(places + reach + 1, len(values))
+    mean: Float = (total[last] - total[first]) / (last - first)
+    return mean
+
+
+def _round_prices() -> list[float]:
+    return [step * 10.0**decade for decade in range(7) for step in (1, 2, 5)]
+
+
+def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, bool]]) -> None:
+    """Write names (x, y, name, whether it stands out) beside their marks, none on another or on a mark."""
+    figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
+    figure.set_layout_engine("none")
+    texts = [panel.text(x, y, words, weight="bold" if out else "normal", **NAME) for x, y, words, out in named]
+    extents = [text.get_window_extent() for text in texts]
+    sizes = np.array([(extent.width, extent.height) for extent in extents])
+    points = panel.transData.transform([(x, y) for x, y, _, _ in named])
+    radius, frame = 4.0 * DPI / 72, panel.get_window_extent()
+    lines = np.concatenate([_along(panel, line) for line in panel.get_lines()])
+    centres = place_callouts(points, sizes, frame.extents, radius, lines)
+    back = panel.transData.inverted()
+    for text, point, centre, size in zip(texts, points, centres, sizes, strict=True):
+        text.set(x=back.transform(centre)[0], y=back.transform(centre)[1])
+        gap = np.maximum(np.abs(point - centre) - size / 2, 0)
+        if np.hypot(*gap) > 2.5 * radius:  # far enough to be taken for another's
+            panel.plot(*back.transform([point, centre]).T, color=FAINT, linewidth=0.7, zorder=1)
+            text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
+
+
+def _along(panel: Axes, line: Line2D) -> Float:
+    """Return points along a drawn line in pixels, (n, 2) float64."""
+    corners: Float = panel.transData.transform(line.get_xydata())
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    if len(corners) < 2:
+        return corners
+    along: Float = np.linspace(corners[:-1], corners[1:], 20).reshape(-1, 2)
+    return along
+
+
+def _dress(panel: Axes) -> None:
+    panel.grid(axis="y", color=GRID, linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.tick_params(which="both", colors=SOFT_INK)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)

@@ -1,0 +1,174 @@
+"""Where detections and road users differ, from above."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.path import Path
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.pictures.drawing import SENSOR_MARK, save_png
+from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+
+TRUTH, DETECTED, OTHER = "#00875a", "#d1242f", "#a9b1b8"
+WASH = TRUTH + "22"
+RETURN, GROUND = "#9aa3ab", "#f1f3f4"
+SIDE, DPI = 5.6, 200  # inches
+AROUND = 0.03  # of the region's size, shown around it
+MOST_POINTS = 150_000
+"""Returns that are drawn of each cloud, evenly chosen: more hide each other."""
+
+RING = 4.0  # metres, radius of the rings about errors
+SHORTEST_NOSE = 0.3  # metres, of the stroke that shows where a box's front is
+
+CLOUD, REGION, IGNORED, WANTED, FOUND, ERROR, SENSOR = range(7)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorView:
+    """One frame and what was made of it.
+
+    Parameters
+    ----------
+    name : str
+        Heads the panel.
+    cloud : (n, 2) float array, metres
+        Returns in plan.
+    region : shapely geometry
+        Region of interest in plan.
+    sensors : (s, 2) float64, metres
+    truth : (g, 5) float64
+        Road users in plan: x, y of the middle, length, width (metres), yaw (radians, counter-clockwise from +x).
+    wanted, missed : (g,) bool
+        Whether each had to be found, and of these, whether none found it.
+    detected : (k, 5) float64
+        Detections in plan.
+    false : (k,) bool
+        Whether each is false.
+    """
+
+    name: str
+    cloud: Float
+    region: BaseGeometry
+    sensors: Float
+    truth: Float
+    wanted: Boolean
+    missed: Boolean
+    detected: Float
+    false: Boolean
+
+
+def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], title: str) -> None:
+    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    views : sequence of ErrorView
+        Side by side.
+    title : str
+    """
+    if not views:
+        raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")
+    left, bottom, right, top = shapely.total_bounds([view.region for view in views])
+    around = AROUND * max(right - left, top - bottom)
+    shape = (top - bottom + 2 * around) / (right - left + 2 * around)
+    figure = Figure((SIDE * len(views), SIDE * shape + 1.1), dpi=DPI, facecolor=PAPER, layout="constrained")
+    for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
+        _draw(panel, view)
+    legend = figure.legend(handles=_legend(), frameon=False, fontsize=9, loc="outside lower center", ncols=7)
+    for text in legend.get_texts():
+        text.set_color(INK)
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+    save_png(path, figure)
+
+
+def _draw(panel: Axes, view: ErrorView) -> None:
+    cloud = view.cloud[:: max(1, -(-len(view.cloud) // MOST_POINTS))]
+    panel.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=",", color=RETURN, zorder=CLOUD, rasterized=True)
+    for part in shapely.get_parts(view.region):
+        ring = np.asarray(part.exterior.coords)
+        panel.fill(ring[:, 0], ring[:, 1], facecolor=GROUND, edgecolor="none", zorder=CLOUD - 1)
+        panel.plot(ring[:, 0], ring[:, 1], color=INK, linewidth=0.9, zorder=REGION)
+    _boxes(panel, view.truth[~view.wanted], OTHER, IGNORED, linewidth=0.7)
+    _boxes(panel, view.truth[view.wanted], TRUTH, WANTED, linewidth=1.2, facecolor=WASH)
+    _boxes(panel, view.detected, DETECTED, FOUND, linewidth=0.9)
+    _rings(panel, view.truth[view.missed], TRUTH, dashed=True)
+    _rings(panel, view.detected[view.false], DETECTED, dashed=False)
+    panel.plot(*view.sensors.T, zorder=SENSOR, marker="o", **SENSOR_MARK | {"markersize": 8.0})
+    panel.set(xticks=(), yticks=())
+    for spine in panel.spines.values():
+        spine.set(color=SOFT_INK, linewidth=0.6)
+    words = f"{_count(view.missed, 'missed')} of {int(view.wanted.sum())}, {_count(view.false, 'false')}"
+    panel.set_title(view.name, color=INK, fontsize=10.5, parse_math=False, loc="left")
+    panel.set_title(words, color=SOFT_INK, fontsize=9, loc="right")
+
+
+def _boxes(panel: Axes, boxes: Float, colour: str, zorder: int, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+    """Draw boxes, each with a stroke from its middle to where its front is."""
+    panel.add_collection(
+        PolyCollection(list(corners(boxes)), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder),
+        autolim=False,
+    )
+    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * np.maximum(boxes[:, 2:3] / 2, SHORTEST_NOSE)
+    strokes = np.stack([boxes[:, :2], boxes[:, :2] + ahead], axis=1)
+    panel.add_collection(
+        PolyCollection(list(strokes), closed=False, edgecolor=colour, facecolor="none", linewidth=0.7, zorder=zorder),
+        autolim=False,
+    )
+
+
+def corners(boxes: Float) -> Float:
+    """Return the corners (k, 4, 2) of boxes in plan (k, 5), counter-clockwise from the front left one."""
+    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * boxes[:, 2:3] / 2
+    left = np.column_stack([-np.sin(boxes[:, 4]), np.cos(boxes[:, 4])]) * boxes[:, 3:4] / 2
+    around = np.stack([ahead + left, left - ahead, -ahead - left, ahead - left], axis=1)
+    placed: Float = boxes[:, None, :2] + around
+    return placed
+
+
+def _rings(panel: Axes, boxes: Float, colour: str, *, dashed: bool) -> None:
+    angle = np.linspace(0, 2 * np.pi, 49)
+    radius = np.maximum(RING, 0.62 * boxes[:, 2])[:, None]
+    rings = boxes[:, None, :2] + radius[..., None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    panel.add_collection(
+        PolyCollection(
+            list(rings),
+            facecolor="none",
+            edgecolor=colour,
+            linewidth=1.3,
+            linestyle=(0, (3, 1.6)) if dashed else "-",
+            zorder=ERROR,
+        ),
+        autolim=False,
+    )
+
+
+def _count(which: Boolean, word: str) -> str:
+    return f"{int(which.sum())} {word}"
+
+
+def _legend() -> list[Patch | Line2D]:
+    ring: dict[str, Any] = {"linestyle": "none", "markersize": 11, "mfc": "none", "mew": 1.3}
+    dashes = Path.make_compound_path(*(Path.arc(start, start + 27) for start in range(0, 360, 45)))
+    return [
+        Patch(facecolor=WASH, edgecolor=TRUTH, label="road user"),
+        Patch(facecolor="none", edgecolor=DETECTED, label="detection"),
+        Line2D([], [], mec=TRUTH, label="missed", marker=dashes, **ring),
+        Line2D([], [], mec=DETECTED, label="false", marker="o", **ring),
+        Patch(facecolor="none", edgecolor=OTHER, label="does not count"),
+        Line2D([], [], marker="o", label="sensor", **SENSOR_MARK | {"markersize": 8.0}),
+    ]

@@ -1,0 +1,38 @@
+"""Run work in a fresh process, whose memory nothing else has touched.
+
+Not by `multiprocessing`: that hands on the search path, in which bpy has put Blender's scripts before itself.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+_ROOT = Path(__file__).resolve().parents[3]
+
+
+def alone(work: Callable[[], Result]) -> Result:
+    """Return what ``work``, which must be possible to pickle, returns in a process of its own."""
+    command = [sys.executable, "-m", __name__]
+    outcome = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True, cwd=_ROOT)  # noqa: S603 - our own interpreter and module
+    result: Result = pickle.loads(outcome.stdout)  # noqa: S301 - written by this very module
+    return result
+
+
+def _main() -> None:
+    answer = os.dup(1)
+    os.dup2(2, 1)  # what libraries print must not get into the answer
+    result = pickle.load(sys.stdin.buffer)()  # noqa: S301 - written by this very module
+    with os.fdopen(answer, "wb") as file:
+        pickle.dump(result, file)
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,80 @@
+"""The benchmark's charts: what the findings have to do with each axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from headless.lab.benchmark.pareto_front import Way
+from headless.lab.benchmark.pictures import save_growth_chart, save_trade_off_chart
+from headless.lab.benchmark.placement import Run
+from headless.lab.benchmark.report import Findings
+from headless.lab.benchmark.visibility import ENGINES, Cost, Harm
+
+DEFAULT_WAY = "lazy embree"
+ENGINE_NAMES = {"bvh": "BVHTree", "embree": "Embree"}
+
+
+def save_charts(pictures: Path, findings: Findings) -> None:
+    """Draw visibility, placement and growth into a folder, as PNG."""
+    harm, setting = findings.harms, findings.setting
+    save_trade_off_chart(
+        pictures / "visibility.png",
+        {
+            "wrong pairs of pose and target, per seen pair": [
+                _way(n, c, _harm(harm, n).wrong) for n, c in findings.costs.items()
+            ],
+            "coverage lost by the placement (share of targets)": [
+                _way(n, c, max(0.0, harm["exact"].coverage - _harm(harm, n).coverage))
+                for n, c in findings.costs.items()
+            ],
+        },
+        f"Visibility of {setting['scene']}: processor time of {setting['places']} sampled places against error",
+        "full: every ray cast · lazy: only rays that can matter, the same grid as the full scan's, bit for bit",
+        nought=1e-3,
+    )
+    instances = dict.fromkeys(run.instance for run in findings.runs)
+    save_trade_off_chart(
+        pictures / "placement.png",
+        {f"gap: {name}": _ways_to_place(findings.runs, name) for name in instances},
+        f"Placement: processor time against the gap to the best bound, {setting['time_limit']:g} s for each",
+        "the largest instance: twice that",
+        nought=1e-4,
+    )
+    lines = [(f"{g.what}, {g.size_of}", g) for g in findings.growths]
+    save_growth_chart(
+        pictures / "growth.png",
+        {
+            "processor time (s)": [(name, g.size, g.seconds) for name, g in lines],
+            "memory (MB)": [
+                (name, g.size, [m for m in g.memory if m]) for name, g in lines if g.memory_exponent is not None
+            ],
+        },
+        "Growth of time and memory with size",
+    )
+
+
+def _way(name: str, cost: Cost, error: float) -> Way:
+    scan, _, what = name.partition(" ")
+    family = f"{'exact' if what in ENGINES else 'simplified, Embree'}, {scan}"
+    return Way(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_WAY)
+
+
+def _harm(harm: Mapping[str, Harm], way: str) -> Harm:
+    what = way.partition(" ")[2]
+    return harm["exact"] if what in ENGINES else harm[what]
+
+
+def _proof(run: Run) -> str:
+    if run.proven:
+        return "proves by itself that nothing is better"
+    return "has a bound of its own" if math.isfinite(run.bound) else "has no bound of its own"
+
+
+def _ways_to_place(runs: Sequence[Run], instance: str) -> list[Way]:
+    return [
+        Way(run.way, _proof(run), run.expense.cpu, run.gap, default=run.way == "ours")
+        for run in runs
+        if run.instance == instance and run.objective > 0
+    ]

@@ -1,0 +1,165 @@
+"""Charts of what is gained and what is lost by each way to an answer, and of how costs grow."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.pictures.callouts import place_callouts
+from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.storage.files import whole_file
+
+from .pareto_front import Way, front, growth_exponent
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
+"""Told apart by colour-blind people (Okabe and Ito 2008), and by their marks on grey paper."""
+
+COLUMNS = 2
+MARKS = ("D", "o", "s", "^", "v", "P", "*", "X")
+
+
+def save_trade_off_chart(
+    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Way]], title: str, subtitle: str, nought: float
+) -> None:
+    """Draw processor time against error, with the front and the default, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    panels : mapping of str to sequence of Way
+        What the error is, over each panel; the same families in all.
+    title, subtitle : str
+    nought : float
+        Errors up to this are drawn apart from those above, on a linear piece of the axis.
+    """
+    rows = math.ceil(len(panels) / COLUMNS)
+    figure = Figure((12.5, 5.0 * rows + 1.2), dpi=150, facecolor=PAPER, layout="constrained")
+    families = list(dict.fromkeys(way.family for ways in panels.values() for way in ways))
+    axes = [figure.add_subplot(rows, COLUMNS, number + 1) for number in range(len(panels))]
+    for panel, (what, ways) in zip(axes, panels.items(), strict=True):
+        _draw_front(panel, ways)
+        for family, colour, mark in zip(families, COLOURS, MARKS, strict=False):  # there are marks to spare
+            own = [way for way in ways if way.family == family]
+            style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "markersize": 7, "zorder": 4}
+            panel.plot([way.error for way in own], [way.seconds for way in own], label=family, **style)
+        _mark_default(panel, ways)
+        panel.set_yscale("log")
+        panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
+        panel.set_xlim(-0.35 * nought, 2.5 * max(nought, *(way.error for way in ways)))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
+        panel.set_xlabel(what, color=INK)
+        _dress(panel)
+        panel.set_ylabel("processor time (s)", color=INK)
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=6)
+    figure.suptitle(f"{title}\n{subtitle}", color=INK, fontsize=11)
+    figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
+    figure.set_layout_engine("none")
+    for panel, ways in zip(axes, panels.values(), strict=True):
+        _name(panel, ways)
+    _save(figure, path)
+
+
+def save_growth_chart(
+    path: str | os.PathLike[str],
+    panels: Mapping[str, Sequence[tuple[str, Sequence[float], Sequence[float]]]],
+    title: str,
+) -> None:
+    """Draw costs against sizes on logarithmic axes, with the exponents, as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+    panels : mapping of str to sequence of (name, sizes, costs)
+        By what is measured. Sizes are drawn as multiples of the smallest.
+    title : str
+    """
+    figure = Figure((12.5, 6.4), dpi=150, facecolor=PAPER, layout="constrained")
+    for panel, (what, lines) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+        for row, (name, size, cost) in enumerate(lines):
+            label = f"{name}: exponent {growth_exponent(size, cost):.2f}"
+            times = [value / size[0] for value in size]
+            panel.plot(times, cost, color=COLOURS[row], marker=MARKS[row], markersize=6, linewidth=1.4, label=label)
+        panel.set_xscale("log", base=2)
+        panel.set_yscale("log")
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda times, _: f"× {times:g}"))
+        panel.set_xlabel("size, in multiples of the smallest", color=INK)
+        panel.set_ylabel(what, color=INK)
+        panel.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+        _dress(panel)
+    figure.suptitle(title, color=INK, fontsize=11)
+    _save(figure, path)
+
+
+def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
+    best = front(ways)
+    panel.step(
+        [way.error for way in best],
+        [way.seconds for way in best],
+        where="pre",  # what costs no more and errs no more is at hand everywhere above the front
+        color=SOFT_INK,
+        linewidth=1.2,
+        linestyle=(0, (4, 2)),
+        label="front: nothing is both quicker and nearer",
+    )
+
+
+def _along_front(panel: Axes, ways: Sequence[Way]) -> Float:
+    """Return points along the drawn front in pixels, (n, 2) float64."""
+    corners = panel.transData.transform([(way.error, way.seconds) for way in front(ways)])
+    bends = np.column_stack([corners[:-1, 0], corners[1:, 1]])
+    path = np.insert(corners, np.arange(1, len(corners)), bends, axis=0)
+    along: Float = np.linspace(path[:-1], path[1:], 50).reshape(-1, 2)
+    return along
+
+
+def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
+    own = [way for way in ways if way.default]
+    panel.plot(
+        [way.error for way in own],
+        [way.seconds for way in own],
+        marker="o",
+        linestyle="none",
+        markersize=15,
+        mfc="none",
+        mec=INK,
+        mew=1.6,
+        label="default",
+    )
+
+
+def _name(panel: Axes, ways: Sequence[Way]) -> None:
+    """Write each way's name beside it, no name on another or on a mark, and off the front where there is room."""
+    style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
+    box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
+    texts = [panel.text(0, 0, way.name, bbox=box, **style) for way in ways]
+    extents = [text.get_window_extent() for text in texts]
+    sizes = np.array([(extent.width, extent.height) for extent in extents])
+    points = np.array([(way.error, way.seconds) for way in ways])
+    anchors, radius = panel.transData.transform(points), 4.5 * panel.figure.dpi / 72
+    frame = panel.get_window_extent()
+    centres = place_callouts(anchors, sizes, frame.extents, radius, _along_front(panel, ways))
+    for text, point, centre in zip(texts, points, panel.transData.inverted().transform(centres), strict=True):
+        text.set_position(centre)
+        panel.plot(*zip(point, centre, strict=True), color="#c3c9ce", linewidth=0.7, zorder=1)
+
+
+def _dress(panel: Axes) -> None:
+    panel.grid(color="#e3e6e8", linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.tick_params(which="both", colors=SOFT_INK)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})

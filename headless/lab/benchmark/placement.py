@@ -1,0 +1,87 @@
+"""Time and gap of ways to place sensors, on one instance after the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from headless.lab.benchmark.expense import Expense, peak_memory
+from headless.lab.benchmark.rivals import RIVALS
+
+from seip_addon.core.placement import PlacementProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What one way did with one instance.
+
+    Parameters
+    ----------
+    instance, way : str
+    expense : Expense
+    memory : float or None, MB
+    objective : float
+        Covered weight; 0 where nothing was found.
+    bound : float
+        Its own proof; infinite where it gives none.
+    best_bound : float
+        The least bound that any way proved.
+    note : str
+    """
+
+    instance: str
+    way: str
+    expense: Expense
+    memory: float | None
+    objective: float
+    bound: float
+    best_bound: float
+    note: str
+
+    @property
+    def gap(self) -> float:
+        """How far below the best bound it is, as a share of it."""
+        return max(0.0, 1 - self.objective / self.best_bound)
+
+    @property
+    def own_gap(self) -> float:
+        """The gap that it can prove by itself; infinite where it gives no bound."""
+        return max(0.0, 1 - self.objective / self.bound) if math.isfinite(self.bound) else math.inf
+
+    @property
+    def proven(self) -> bool:
+        """Whether it proved by itself that none is better."""
+        return self.own_gap < 1e-6
+
+
+def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float) -> list[Run]:
+    """Solve an instance in several ways in turn, each with the same time limit.
+
+    Parameters
+    ----------
+    name : str
+        Of the instance.
+    problem : PlacementProblem
+    ways : sequence of str
+        Keys of `RIVALS`.
+    seconds : float
+
+    Returns
+    -------
+    list of Run
+    """
+    rows = []
+    for way in ways:
+        expense = Expense()
+        found, memory = peak_memory(partial(expense.time, partial(RIVALS[way], problem, seconds)))
+        seen = problem.visible[found.chosen].any(axis=0) if found.chosen is not None else problem.weights < 0
+        objective = float(problem.weights[seen].sum())
+        rows.append((way, expense, memory, objective, found))
+    least = min((found.bound for *_, found in rows), default=math.inf)
+    best = least if math.isfinite(least) else float(problem.weights.sum())
+    return [
+        Run(name, way, expense, memory, objective, found.bound, best, found.note)
+        for way, expense, memory, objective, found in rows
+    ]

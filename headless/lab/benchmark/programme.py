@@ -1,0 +1,201 @@
+"""What the benchmark measures of a scene and of synthetic streets, and in which order."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from headless import session
+from headless.lab.benchmark.alone import alone
+from headless.lab.benchmark.approximations import approximations
+from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
+from headless.lab.benchmark.placement import Run, compare
+from headless.lab.benchmark.report import Findings
+from headless.lab.benchmark.rivals import RIVALS, can_run
+from headless.lab.benchmark.scans import scan_costs
+from headless.lab.benchmark.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
+from headless.street_visibility import street_problem
+
+import numpy as np
+
+from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
+from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.progress import finish
+from seip_addon.core.scans import static_scene
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.site.site import Site, make_site
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.ray_casting import make_ray_caster
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What is measured: how the scene is laid out, how large synthetic instances and the steps of growth are.
+
+    Parameters
+    ----------
+    layout : CandidateSettings
+    street : tuple of int
+        Positions (three poses at each), targets, blocks along a side.
+    counts : tuple of int
+        Few and many sensors there.
+    largest : tuple of int
+        As ``street``, with many sensors.
+    places : int
+        From so many places growth is looked at.
+    multiples : tuple of int
+        Of the places, and of what grows in the streets.
+    copies : tuple of int
+        Of the scene, in a row.
+    spacings : tuple of float, metres
+        Of the targets.
+    scanned_by : str
+        Type of the sensors that scan traffic.
+    frames : int
+        Of scans.
+    """
+
+    layout: CandidateSettings = field(default_factory=CandidateSettings)
+    street: tuple[int, int, int] = (333, 5000, 3)
+    counts: tuple[int, int] = (4, 16)
+    largest: tuple[int, int, int] = (1000, 20000, 8)
+    places: int = 8
+    multiples: tuple[int, ...] = (1, 2, 4, 8)
+    copies: tuple[int, ...] = (1, 2, 4, 8, 16)
+    spacings: tuple[float, ...] = (4.0, 2.0, 1.0, 0.5)
+    scanned_by: str = "type2"
+    frames: int = 10
+
+
+def measure(
+    geometry: SceneGeometry, samples: int, time_limit: float, scope: Scope
+) -> tuple[Findings, tuple[str, str, str]]:
+    """Measure everything; return the findings and the names of the synthetic instances."""
+    layout, settings = scope.layout, VisibilitySettings()
+    site = make_site(geometry, layout)
+    models = find_models(load_catalogue(), layout.sensors)
+    simpler = approximations(geometry, site, models, layout)
+    session.say(f"{site.name}: full scans and lazy ones from {samples} places")
+    costs = visibility_costs(site, models, settings, samples, simpler)
+    for way, cost in costs.items():
+        session.say(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
+    session.say("whole grids, exact and simplified, and a placement by each")
+    harm = harms(site, models, settings, simpler, time_limit)
+    rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
+    limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
+    runs, names = placements(site, models, settings, time_limit, scope)
+    growths = growth(geometry, settings, time_limit, scope)
+    session.say("scans of traffic")
+    scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
+    setting = {
+        "scene": site.name,
+        "targets": len(site.targets),
+        "poses": len(site.candidates),
+        "triangles": len(site.triangles),
+        "places": len(sampled_places(site, samples)),
+        "sensor": layout.sensors[0],
+        "count": COUNT,
+        "scanned_by": scope.scanned_by,
+        "time_limit": time_limit,
+        "cores": os.cpu_count(),
+        "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
+    }
+    return Findings(setting, costs, harm, limits, runs, growths, scans), names
+
+
+def placements(
+    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, time_limit: float, scope: Scope
+) -> tuple[list[Run], tuple[str, str, str]]:
+    """Compare ways to place sensors at the scene's site and in synthetic streets."""
+    own = site.candidates.sensor == site.candidates.sensor[0]
+    visible = finish(compute_visibility(site, models, settings)).visible
+    problem = placement_problem(site, visible, models, Goal(count=COUNT))
+    problem = replace(
+        problem,
+        visible=visible[own],
+        prices=problem.prices[own],
+        positions=problem.positions[own],
+        xyz=problem.xyz[own],
+        labels=problem.labels[own],
+        mandatory=None,
+        mandatory_names=None,
+        forbidden=None,
+    )
+    ways = [way for way in RIVALS if can_run(way)]
+    for way in set(RIVALS).difference(ways):
+        session.say(f"{way} is left out: the group 'benchmark' of pyproject.toml is not installed")
+    runs = _told(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {COUNT}", problem, ways, time_limit))
+    names = []
+    for count in scope.counts:
+        names.append(_street_name(scope.street, count))
+        positions, targets, blocks = scope.street
+        street = street_problem(positions, targets, blocks=blocks, count=count)
+        runs += _told(compare(names[-1], street, ways, time_limit))
+    names.append(_street_name(scope.largest, scope.counts[-1]))
+    positions, targets, blocks = scope.largest
+    street = street_problem(positions, targets, blocks=blocks, count=scope.counts[-1])
+    quick = ("greedy", "local search", "ours")
+    # in a process of its own: its memory is asked for
+    runs += _told(alone(partial(compare, names[-1], street, quick, 2 * time_limit)))
+    return runs, (names[0], names[1], names[2])
+
+
+def growth(geometry: SceneGeometry, settings: VisibilitySettings, time_limit: float, scope: Scope) -> list[Growth]:
+    """Let one thing grow at a time, then all together: the scene set side by side to a corridor."""
+    session.say("growth, each size in a process of its own")
+    models = find_models(load_catalogue(), scope.layout.sensors)
+    site = make_site(geometry, scope.layout)
+    rows = {copies: repeated(site, copies) for copies in scope.copies}
+    pitch = float(np.ptp(site.triangles[:, :, 0])) / 1000
+    every = len(sampled_places(site, len(site.candidates)))
+    finer = [make_site(geometry, scope.layout, spacing) for spacing in scope.spacings]
+    positions, targets, blocks = scope.street
+    posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
+    points = [targets * times // 2 for times in scope.multiples]
+    found = [
+        visibility_growth(
+            "visibility",
+            "places",
+            [Scaled(n, site, n) for n in (scope.places * times for times in scope.multiples)],
+            models,
+            settings,
+        ),
+        visibility_growth(
+            "visibility", "targets", [Scaled(len(s.targets), s, scope.places) for s in finer], models, settings
+        ),
+        visibility_growth(
+            "visibility",
+            "triangles",
+            [Scaled(len(r.triangles), replace(site, triangles=r.triangles), scope.places) for r in rows.values()],
+            models,
+            settings,
+        ),
+        visibility_growth(
+            "visibility of a corridor",
+            "kilometres (poses, targets, triangles)",
+            [Scaled(c * pitch, row, scope.places, c * every / scope.places) for c, row in rows.items()],
+            models,
+            settings,
+        ),
+        placement_growth("poses", [3 * n for n in posts], [(n, targets, blocks) for n in posts], time_limit),
+        placement_growth("targets", points, [(positions, n, blocks) for n in points], time_limit),
+    ]
+    for one in found:
+        session.say(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")
+    return found
+
+
+def _told(runs: list[Run]) -> list[Run]:
+    for run in runs:
+        session.say(
+            f"{run.instance}: {run.way:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{run.expense.cpu:>8.2f} s of CPU"
+            f"  {run.note}"
+        )
+    return runs
+
+
+def _street_name(street: tuple[int, int, int], count: int) -> str:
+    return f"{3 * street[0]:,} × {street[1]:,}, N = {count}"

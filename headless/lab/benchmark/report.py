@@ -1,0 +1,293 @@
+"""The benchmark's findings as one JSON file and one page of Markdown."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from headless.lab.benchmark.growth import Growth
+from headless.lab.benchmark.placement import Run
+from headless.lab.benchmark.scans import ROAD_USERS, SENSORS, ScanCost
+from headless.lab.benchmark.visibility import ENGINES, Cost, Harm
+
+from seip_addon.core.storage.files import whole_file
+
+
+@dataclass(frozen=True)
+class Bar:
+    """What the project holds itself to.
+
+    Parameters
+    ----------
+    what : str
+    asked : str
+    measured : str
+    met : bool
+    """
+
+    what: str
+    asked: str
+    measured: str
+    met: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """All that the benchmark measured.
+
+    Parameters
+    ----------
+    setting : dict
+        What was measured, on how many cores, with which versions.
+    costs : dict of str to Cost
+    harms : dict of str to Harm
+    limits : dict of str to float
+        By engine, how many times the time of one cast per seen target the lazy engine takes.
+    runs : sequence of Run
+    growths : sequence of Growth
+    scans : dict of str to ScanCost
+    """
+
+    setting: dict[str, Any]
+    costs: Mapping[str, Cost]
+    harms: Mapping[str, Harm]
+    limits: Mapping[str, float]
+    runs: Sequence[Run]
+    growths: Sequence[Growth]
+    scans: Mapping[str, ScanCost]
+
+
+def bars(
+    costs: Mapping[str, Cost], runs: Sequence[Run], names: Sequence[str], scans: Mapping[str, ScanCost]
+) -> list[Bar]:
+    """Hold the measurements against what was asked for.
+
+    Parameters
+    ----------
+    costs : mapping of str to Cost
+    runs : sequence of Run
+    names : three str
+        Instances: the one with few sensors, the one with many, the largest.
+    scans : mapping of str to ScanCost
+    """
+    pairs = (("lazy bvh", "full bvh", 20), ("lazy embree", "full bvh", 100), ("lazy embree", "full embree", 10))
+    held = [_ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs]
+    by_name = {(run.instance, run.way): run for run in runs}
+    few, many, largest = names
+    us, cbc = by_name[few, "ours"], by_name[few, "PuLP + CBC"]
+    same = us.proven and us.objective >= cbc.objective
+    ratio = cbc.expense.cpu / us.expense.cpu
+    stopped = "" if cbc.proven else ", CBC stopped at the time limit"
+    held.append(_ratio(f"ours against plain PuLP + CBC, {few}", ratio, 20, holds=same, note=stopped))
+    held += [_small_gap(by_name[many, "ours"], 0.01, 60, None), _small_gap(by_name[largest, "ours"], 0.015, 120, 4096)]
+    plain = scans["anew bvh"]
+    for engine in ENGINES:
+        times = scans[f"kept {engine}"].rate / plain.rate
+        held.append(_ratio(f"frames of scans, {engine} against the whole scene anew with bvh", times, 15))
+    most = max(cost.differing / cost.rays for cost in scans.values())
+    few_differ = f"{most * 1e6:.2g} in a million, each grazes something"
+    return [*held, Bar("returns of scans elsewhere than the full scan's", "1 in a million", few_differ, most <= 1e-6)]
+
+
+def save_json(path: str | os.PathLike[str], findings: Findings, held: Sequence[Bar]) -> None:
+    """Write all figures; what is not finite is null."""
+    runs = [asdict(run) | {"gap": run.gap, "own_gap": run.own_gap, "proven": run.proven} for run in findings.runs]
+    growths = [
+        asdict(g) | {"time_exponent": g.time_exponent, "memory_exponent": g.memory_exponent} for g in findings.growths
+    ]
+    record = {
+        "setting": findings.setting,
+        "bars": [asdict(bar) for bar in held],
+        "visibility": {way: asdict(cost) for way, cost in findings.costs.items()},
+        "harm": {name: asdict(harm) for name, harm in findings.harms.items()},
+        "times_the_limit": dict(findings.limits),
+        "placement": runs,
+        "growth": growths,
+        "scans": {way: asdict(cost) | {"rate": cost.rate} for way, cost in findings.scans.items()},
+    }
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(_finite(record), indent=1) + "\n", encoding="utf-8")
+
+
+def save_page(path: str | os.PathLike[str], findings: Findings, held: Sequence[Bar], pictures: str) -> None:
+    """Write the page; ``pictures`` is the folder of the charts, as seen from the page."""
+    parts = [
+        *_summary(findings.setting, held),
+        *_about_visibility(findings, pictures),
+        *_about_placement(findings, pictures),
+        *_about_growth(findings, pictures),
+        *_about_scans(findings),
+    ]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def _summary(setting: Mapping[str, Any], held: Sequence[Bar]) -> list[str]:
+    versions = ", ".join(f"{name} {version}" for name, version in setting["versions"].items())
+    text = (
+        "Written by `make benchmark`. Seconds are of processor time and differ from machine to machine; ratios hardly "
+        "do: what is compared ran in turn in one process. "
+        f"Here: {setting['cores']} cores, {versions}."
+    )
+    rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in held]
+    return ["# Benchmark", text, _table(("", "asked", "measured", ""), rows)]
+
+
+def _about_visibility(findings: Findings, pictures: str) -> list[str]:
+    setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.harms["exact"]
+    text = (
+        f"{setting['scene']}: {setting['targets']:,} targets, {setting['poses']:,} poses, {setting['triangles']:,} "
+        f"triangles. Times are of {setting['places']} places spread evenly over the site, every type at each: the "
+        "plain loop would take hours for all. At each of them each lazy result was compared with its full scan's, bit "
+        "for bit. Errors are of the whole grid: pairs of pose and target that come out wrong, per pair that is seen "
+        f"in truth. The placement is of {setting['count']} {setting['sensor']} sensors, chosen by the simplified grid "
+        "and judged by the exact one."
+    )
+    costs = _table(
+        ("way", "times as quick as the plain loop", "s", "s on the clock", "rays", "rays per seen target"),
+        [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
+    )
+    harm = _table(
+        ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept", ""),
+        [_harm_row(name, harm, exact) for name, harm in findings.harms.items()],
+    )
+    times = "; ".join(f"with {engine} it takes {n:.1f} times that" for engine, n in findings.limits.items())
+    limit = f"The least that any method can do is to cast one ray for each seen target. Of the lazy engine: {times}."
+    picture = f"![processor time against error of visibility]({pictures}/visibility.png)"
+    return ["## Visibility", text, picture, costs, harm, limit]
+
+
+def _about_placement(findings: Findings, pictures: str) -> list[str]:
+    text = (
+        f"Every way had {findings.setting['time_limit']:g} s on the clock, the largest instance twice that. The gap is "
+        "to the least bound that any way proved for the instance; the own gap is what the way proves by itself. A "
+        "plain program has one binary variable for each pose and each target, as in "
+        "textbooks. Memory is what the process grew by, beyond what it had kept from before; that of CBC, a program of "
+        "its own, is not in it."
+    )
+    head = ("instance", "way", "ours is … times as quick", "s", "s on the clock", "MB", "covers", "gap", "own gap", "")
+    picture = f"![processor time against gap of placement]({pictures}/placement.png)"
+    return ["## Placement", text, picture, _table(head, _run_rows(findings.runs))]
+
+
+def _about_growth(findings: Findings, pictures: str) -> list[str]:
+    text = (
+        "Each size ran in a process of its own. A corridor was looked at from some of its places, which stand for all. "
+        "An exponent b says that twice the size costs 2^b times as much, by least squares over all sizes; "
+        "work that is done once whatever the size makes it smaller."
+    )
+    head = ("work", "what grows", "sizes", "s", "exponent", "MB", "exponent of memory")
+    picture = f"![growth of time and memory]({pictures}/growth.png)"
+    return ["## Growth", text, picture, _table(head, [_growth_row(growth) for growth in findings.growths])]
+
+
+def _about_scans(findings: Findings) -> list[str]:
+    plain = findings.scans["anew bvh"]
+    text = (
+        f"Frames of {SENSORS} {findings.setting['scanned_by']} sensors among {ROAD_USERS} road users that all drive, "
+        "noise and labels included. *Anew*: a tree of everything for each frame, and every ray cast. *Kept*: static "
+        "returns are kept, and road users cast in their own axes by the rays that pass their bounding boxes. (Who "
+        "stands still is not cast again either, of which nothing shows here.) Returns are the same to 0.1 mm but for "
+        "rays that graze an edge, or a surface so edge-on that single precision of the full scan's corners moves its "
+        "return."
+    )
+    rows = [
+        (
+            way,
+            f"{cost.rate:.3g}",
+            f"{cost.rate / plain.rate:.3g}",
+            f"{cost.frames / cost.expense.wall:.3g}",
+            f"{cost.differing} of {cost.rays:,}",
+        )
+        for way, cost in findings.scans.items()
+    ]
+    head = ("way", "frames per second", "times as many as anew with bvh", "on the clock", "rays that end elsewhere")
+    return ["## Scans of traffic", text, _table(head, rows)]
+
+
+def _ratio(what: str, ratio: float, asked: float, *, holds: bool = True, note: str = "") -> Bar:
+    measured = f"{ratio:.3g}×{note}" + ("" if holds else ", not the same optimum")
+    return Bar(what, f"{asked:g}×", measured, holds and ratio >= asked)
+
+
+def _small_gap(run: Run, gap: float, seconds: float, memory: float | None) -> Bar:
+    asked = f"proven, or a gap under {gap:.1%} in {seconds:g} s" + (f" and {memory / 1024:g} GB" if memory else "")
+    wall = run.expense.wall
+    measured = f"{'proven' if run.proven else f'gap {run.own_gap:.2%}'} in {wall:.0f} s"
+    met = run.own_gap < gap and wall < seconds * 1.1  # the limit is looked at between steps
+    if memory and run.memory:
+        measured += f" and {run.memory / 1024:.1f} GB"
+        met &= run.memory < memory
+    return Bar(f"ours, {run.instance}", asked, measured, met)
+
+
+def _cost_row(way: str, cost: Cost, plain: Cost) -> tuple[str, ...]:
+    return (
+        way,
+        f"{plain.seconds / cost.seconds:.3g}",
+        f"{cost.seconds:.3g}",
+        f"{cost.expense.wall:.3g}",
+        f"{cost.rays:,}",
+        f"{cost.rays / cost.seen:.1f}" if cost.seen else "–",
+    )
+
+
+def _harm_row(name: str, harm: Harm, exact: Harm) -> tuple[str, ...]:
+    return (
+        name,
+        f"{harm.wrong:.2%}",
+        f"{harm.claimed:.2%}",
+        f"{harm.coverage:.2%}",
+        f"{exact.coverage - harm.coverage:.2%}",
+        f"{harm.kept} of {exact.kept}",
+        "" if harm.proven else "placement not proven the best",
+    )
+
+
+def _run_rows(runs: Sequence[Run]) -> list[tuple[str, ...]]:
+    us = {run.instance: run.expense.cpu for run in runs if run.way == "ours"}
+    return [
+        (
+            run.instance,
+            run.way,
+            f"{run.expense.cpu / us[run.instance]:.3g}",
+            f"{run.expense.cpu:.3g}",
+            f"{run.expense.wall:.3g}",
+            "–" if run.memory is None else f"{run.memory:.0f}",
+            f"{run.objective:.0f}" if run.objective else "–",
+            f"{run.gap:.2%}" if run.objective else "–",
+            "proven" if run.proven else f"{run.own_gap:.2%}" if math.isfinite(run.own_gap) else "no bound",
+            run.note,
+        )
+        for run in runs
+    ]
+
+
+def _growth_row(growth: Growth) -> tuple[str, ...]:
+    memory, exponent = growth.memory, growth.memory_exponent
+    return (
+        growth.what,
+        growth.size_of,
+        " ".join(f"{size:,.0f}" if size > 100 else f"{size:.3g}" for size in growth.size),
+        " ".join(f"{seconds:.3g}" for seconds in growth.seconds),
+        f"{growth.time_exponent:.2f}",
+        " ".join("–" if mega is None else f"{mega:.0f}" for mega in memory),
+        "–" if exponent is None else f"{exponent:.2f}",
+    )
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

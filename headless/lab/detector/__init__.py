@@ -1,0 +1,1 @@
+"""Where the detector fails: disturbances, trials, charts."""

@@ -1,0 +1,150 @@
+"""Where the detector fails on a scene: trained as an evaluation trains it, and tried until it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from headless import session, survey
+from headless.detection import case_study
+from headless.detection.average_precision import balanced_score
+from headless.detection.detector import on_grid
+from headless.detection.pillars import grid_of
+from headless.detection.recordings import Configuration, Studio, TrafficRun
+from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.detection.training import Trained
+from headless.lab.detector.disturbances import Disturbance
+from headless.lab.detector.study import Course, Elsewhere, LimitsStudy, course, limits_study
+from headless.lab.detector.trials import Entrant, Ground, trials
+from headless.traffic_runs import runs_beside
+
+import bpy
+
+from seip_addon.core.progress import Progress
+from seip_addon.core.scans import ScanSettings, static_scene
+from seip_addon.core.workflows.survey import Layout, lay_out, see
+from seip_addon.scene.read import read_scene
+
+EVERY = 2.5
+"""Seconds between frames to learn from."""
+
+TRIED = 2
+"""Of the test frames every so many-th is tried: neighbouring ones show nearly the same."""
+
+
+def detector_limits(
+    surveyed: survey.Survey,
+    scene: Path | None,
+    others: Sequence[Path],
+    folder: Path,
+    *,
+    seeds: int = 3,
+    steps: int = TrainingSettings().steps,
+) -> Generator[Progress, None, LimitsStudy]:
+    """Train detectors on a scene and try them until they fail.
+
+    Parameters
+    ----------
+    surveyed : Survey
+    scene : path or None
+        Its file; its runs of traffic stand beside it, and denser ones too, if there are any.
+    others : sequence of path
+        Other scenes with traffic beside them, to try the detectors on.
+    folder : path
+        Of the detectors and of all that was tried: an interrupted study goes on from there.
+    seeds : int
+        How many detectors are alike but for their seeds.
+    steps : int
+        Of each training.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    LimitsStudy
+    """
+    layout, network = surveyed.layout, NetworkSettings()
+    origin = layout.geometry.origin
+    traffic = case_study.read_traffic(runs_beside(scene), origin, EVERY)
+    configurations = yield from _placed(surveyed)
+    studio = _studio(layout)
+    asked = course(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
+    trained = yield from _trained(asked, studio, configurations, traffic, layout, folder)
+    candidates = asked.candidates([one.detector for one in trained])
+
+    main = _most(configurations)
+    home = Ground(studio.site, studio, _thinned(traffic.test))
+    practice = Ground(studio.site, studio, _thinned(traffic.validation))
+    (tried,) = yield from trials(practice, main, Disturbance(), candidates.entrants[:1], folder)
+    elsewhere = []
+    dense = case_study.read_runs(runs_beside(scene, "_dense"), origin, EVERY)
+    if dense:
+        elsewhere.append(Elsewhere(Ground("denser traffic", studio, _thinned(dense)), (main,), candidates.entrants))
+    for other in others:
+        there = yield from _on_other_scene(other, surveyed, main, candidates.entrants, folder)
+        elsewhere.append(there)
+    return (
+        yield from limits_study(home, [main], candidates, elsewhere, folder, score=balanced_score(tried.evaluation))
+    )
+
+
+def _trained(
+    asked: Course,
+    studio: Studio,
+    configurations: Sequence[Configuration],
+    traffic: case_study.Traffic,
+    layout: Layout,
+    folder: Path,
+) -> Generator[Progress, None, list[Trained]]:
+    network = NetworkSettings()
+    grid = grid_of(layout.geometry, network.pillar)
+    lessons = yield from case_study.simulate_lessons(studio, configurations, traffic, grid, network.most_points)
+    return (yield from case_study.train_all(asked.pupils, lessons, folder, device="cpu"))
+
+
+def _on_other_scene(
+    scene: Path, surveyed: survey.Survey, main: Configuration, entrants: Sequence[Entrant], folder: Path
+) -> Generator[Progress, None, Elsewhere]:
+    """Place as many sensors of the same type there, and bring the detectors."""
+    settings = surveyed.layout.settings
+    session.open_scene(scene)
+    reading = read_scene(bpy.context.scene)
+    candidates = replace(settings.candidates, sensors=(main.case.sensor,))
+    layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
+    grid = yield from see(layout, folder / f"visibility_{scene.stem}.npz")
+    there = yield from _placed(survey.Survey(layout, grid, surveyed.stopwatch))
+    runs = case_study.read_runs(runs_beside(scene), layout.geometry.origin, EVERY)
+    pillars = grid_of(layout.geometry, entrants[0].detector.grid.pillar)
+    moved = tuple(Entrant(one.name, on_grid(one.detector, pillars)) for one in entrants)
+    return Elsewhere(Ground(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
+
+
+def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[Configuration, ...]]:
+    layout = surveyed.layout
+    settings = layout.settings
+    return case_study.place_all(
+        layout.site,
+        layout.models,
+        surveyed.grid,
+        solver=settings.solver,
+        time_limit=settings.time_limit,
+        effort=settings.effort,
+    )
+
+
+def _studio(layout: Layout) -> Studio:
+    return Studio(static_scene(layout.geometry), ScanSettings(engine=layout.settings.engine), layout.site.name)
+
+
+def _most(configurations: Sequence[Configuration]) -> Configuration:
+    """Return the most sensors of the type in the middle: those that have something to lose, and to be lost."""
+    types = list(dict.fromkeys(one.case.sensor for one in configurations))
+    own = [one for one in configurations if one.case.sensor == types[len(types) // 2]]
+    return max(own, key=lambda one: one.case.count)
+
+
+def _thinned(runs: Sequence[TrafficRun]) -> tuple[TrafficRun, ...]:
+    return tuple(replace(run, times=run.times[::TRIED]) for run in runs)

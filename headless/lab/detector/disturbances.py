@@ -1,0 +1,336 @@
+"""What may be wrong with measurements when a detector is used: each a kind, with a size.
+
+A disturbance changes what hangs there, who is on the road, how a frame is
+taken, what a frame shows, or how a detector looks at it, and leaves the rest as
+it is. At size 0 nothing changes, bit for bit. Whatever is random follows from
+the frame's number and a seed; a larger loss takes what a smaller one takes, and
+more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from headless.detection.detector import Detector, keeping_at_most
+
+import numpy as np
+
+from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.scans import Frame, MountedSensor, Simulation
+from seip_addon.core.scans.frame import STATIC
+from seip_addon.core.traffic import Trajectories
+
+DIAGONAL = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
+"""Unit vector along which a sensor is misplaced and about which it is tilted: no street's own direction."""
+
+NEAR = 10.0
+"""Metres from a sensor within which a drop may return enough to be taken for something."""
+
+DROP_INTENSITY = 0.05
+"""Intensity of a drop's return: at the dark end of what surfaces return."""
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Nothing is wrong; what is, overrides one of these methods.
+
+    Parameters
+    ----------
+    size : float
+        In `unit`.
+    """
+
+    size: float = 0.0
+    name: ClassVar[str] = "undisturbed"
+    unit: ClassVar[str] = ""
+
+    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+        """Return the sensors as they are instead."""
+        return tuple(sensors)
+
+    def on_the_road(self, trajectories: Trajectories) -> Trajectories:
+        """Return the traffic as it is instead."""
+        return trajectories
+
+    def taken(self, simulation: Simulation, number: int, time: float) -> Frame:
+        """Return a frame as it is taken instead."""
+        return simulation.frame(number, time)
+
+    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
+        """Return what the frame shows instead."""
+        return frame
+
+    def looked_at(self, detector: Detector) -> Detector:
+        """Return the detector as it looks at frames instead."""
+        return detector
+
+
+@dataclass(frozen=True)
+class RangeNoise(Disturbance):
+    """Ranges are noisier: normally distributed errors of this standard deviation on top of the sensor's own."""
+
+    name: ClassVar[str] = "more range noise"
+    unit: ClassVar[str] = "m"
+
+    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+        """Return the sensors with both errors: independent, so their variances add."""
+
+        def noisier(model: LidarModel) -> LidarModel:
+            return replace(model, range_noise_std=math.hypot(model.range_noise_std, self.size))
+
+        return _with_models(sensors, noisier)
+
+
+@dataclass(frozen=True)
+class DropOff(Disturbance):
+    """A share of the returns is lost, whatever they are."""
+
+    name: ClassVar[str] = "returns lost"
+    unit: ClassVar[str] = "of the returns"
+
+    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+        """Return the sensors with a larger general drop-off."""
+
+        def lossy(model: LidarModel) -> LidarModel:
+            general = model.dropoff_general
+            return replace(model, dropoff_general=general + (1 - general) * self.size)
+
+        return _with_models(sensors, lossy)
+
+
+@dataclass(frozen=True)
+class Rain(Disturbance):
+    r"""Rain or fog of some extinction coefficient α, in 1/km.
+
+    Light is lost on the way there and back (Beer and Lambert): the LiDAR
+    equation, :math:`P \propto e^{-2αr} / r^2`, as for example in C. Goodin, D.
+    Carruth, M. Doude, C. Hudson: Predicting the influence of rain on LIDAR in
+    ADAS. Electronics 8 (2019), 89. So returns are darker, and the range is
+    shorter, at which they are as strong as from the sensor's range in clear air.
+
+    Of the rays as many as a share :math:`1 - e^{-α · 10 m}` return from a drop
+    near the sensor instead of what they would have met: all light that drops
+    scatter there counts as seen, which is the worst case.
+
+    Rain of R mm/h has α = 0.248 R^0.67 per km (1.076 R^0.67 dB/km, Carbonneau
+    and Wisely 1998, in ITU-R P.1814): 2.1 at 25 mm/h, 5.4 at 100 mm/h. Beyond
+    that it is fog, in which a person sees 3/α far (WMO: meteorological optical range).
+    """
+
+    name: ClassVar[str] = "rain or fog"
+    unit: ClassVar[str] = "extinction per km"
+
+    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+        """Return the sensors with what the air between takes from them."""
+
+        def dimmed(model: LidarModel) -> LidarModel:
+            lost = 2 * self.size / 1000.0
+            return replace(model, attenuation=model.attenuation + lost, max_range=range_in(model.max_range, lost))
+
+        return _with_models(sensors, dimmed)
+
+    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
+        """Return the frame with drops where rays ended on them."""
+        wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * NEAR)
+        near = random.random(len(frame))
+        places = np.array([sensor.xyz for sensor in sensors])[frame.sensor]
+        way = frame.points - places
+        distance = np.linalg.norm(way, axis=1)
+        drop = places + way * (near * np.minimum(NEAR, distance) / np.maximum(distance, 1e-9))[:, None]
+        return _recounted(
+            replace(
+                frame,
+                points=np.where(wet[:, None], drop, frame.points).astype(np.float32),
+                intensity=np.where(wet, np.float32(DROP_INTENSITY), frame.intensity),
+                instance=np.where(wet, np.int32(STATIC), frame.instance),
+            )
+        )
+
+
+def range_in(clear: float, lost: float) -> float:
+    """Return the range (metres) in air that takes ``lost`` per metre there and back, from that in clear air.
+
+    It solves exp(−lost · r) / r² = 1 / clear² by halving: the left side falls with r.
+    """
+    low, high = 0.0, clear
+    if lost == 0.0:
+        return clear
+    for _ in range(60):
+        middle = (low + high) / 2
+        if math.exp(-lost * middle) * clear**2 > middle**2:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@dataclass(frozen=True)
+class OfOneSensor(Disturbance):
+    """Something is wrong with one sensor.
+
+    Parameters
+    ----------
+    size : float
+    sensor : int
+        Its number in the placement, from 0.
+    """
+
+    sensor: int = 0
+
+
+@dataclass(frozen=True)
+class Misplaced(OfOneSensor):
+    """A sensor is not where it is believed to be: its points lie beside what they are of, along `DIAGONAL`."""
+
+    name: ClassVar[str] = "sensor misplaced"
+    unit: ClassVar[str] = "m"
+
+    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+        """Return the frame with this sensor's points moved."""
+        return _moved(frame, self.sensor, sensors[self.sensor].xyz, np.eye(3), self.size * DIAGONAL)
+
+
+@dataclass(frozen=True)
+class Misturned(OfOneSensor):
+    """A sensor's yaw is not what it is believed to be, in degrees."""
+
+    name: ClassVar[str] = "yaw wrong"
+    unit: ClassVar[str] = "°"
+
+    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+        """Return the frame with this sensor's points turned about its own place."""
+        return _turned(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
+
+
+@dataclass(frozen=True)
+class Mistilted(OfOneSensor):
+    """A sensor leans where it is believed to be upright, in degrees about `DIAGONAL`."""
+
+    name: ClassVar[str] = "tilt wrong"
+    unit: ClassVar[str] = "°"
+
+    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+        """Return the frame with this sensor's points turned about its own place."""
+        return _turned(frame, self, sensors, DIAGONAL)
+
+
+@dataclass(frozen=True)
+class ClockOff(OfOneSensor):
+    """A sensor's clock is late: its points are of the street so many seconds ago."""
+
+    name: ClassVar[str] = "clock late"
+    unit: ClassVar[str] = "s"
+
+    def taken(self, simulation: Simulation, number: int, time: float) -> Frame:
+        """Return the frame with this sensor's points from an earlier one."""
+        now, before = simulation.frame(number, time), simulation.frame(number, time - self.size)
+        return _merged(now, now.sensor != self.sensor, before, before.sensor == self.sensor)
+
+
+@dataclass(frozen=True)
+class Lost(OfOneSensor):
+    """A sensor is silent. Its number is the size, so that each in turn makes a series; they count from 1."""
+
+    name: ClassVar[str] = "sensor lost"
+    unit: ClassVar[str] = "number of the sensor"
+
+    @classmethod
+    def each(cls, sensor: int) -> Lost:
+        """Return the loss of a sensor by its number from 0."""
+        return cls(sensor + 1.0, sensor)
+
+    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+        """Return the frame without this sensor's points."""
+        return _recounted(_some(frame, frame.sensor != self.sensor))
+
+
+@dataclass(frozen=True)
+class Thinned(Disturbance):
+    """A share of the road users stays at home."""
+
+    seed: int = 0
+    name: ClassVar[str] = "thinner traffic"
+    unit: ClassVar[str] = "of the road users missing"
+
+    def on_the_road(self, trajectories: Trajectories) -> Trajectories:
+        """Return the motion of the others."""
+        stays = np.random.default_rng(self.seed).random(len(trajectories)) >= self.size
+        counts = np.diff(trajectories.first)
+        samples = np.repeat(stays, counts)
+        return replace(
+            trajectories,
+            users=tuple(user for user, here in zip(trajectories.users, stays.tolist(), strict=True) if here),
+            first=np.concatenate([[0], np.cumsum(counts[stays])]).astype(np.int64),
+            **{name: getattr(trajectories, name)[samples] for name in ("time", "position", "yaw", "pitch", "speed")},
+        )
+
+
+@dataclass(frozen=True)
+class Capped(Disturbance):
+    """Pillars keep fewer points than they were learnt with; the size is how many they keep, 0 for no other cap."""
+
+    name: ClassVar[str] = "fuller pillars cut"
+    unit: ClassVar[str] = "points that a pillar keeps"
+
+    def looked_at(self, detector: Detector) -> Detector:
+        """Return the detector with smaller pillars."""
+        return keeping_at_most(detector, round(self.size)) if self.size else detector
+
+
+def _with_models(
+    sensors: Sequence[MountedSensor], change: Callable[[LidarModel], LidarModel]
+) -> tuple[MountedSensor, ...]:
+    return tuple(replace(sensor, model=change(sensor.model)) for sensor in sensors)
+
+
+def _turned(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor], axis: Float) -> Frame:
+    return _moved(
+        frame, wrong.sensor, sensors[wrong.sensor].xyz, _rotation(axis, math.radians(wrong.size)), np.zeros(3)
+    )
+
+
+def _rotation(axis: Float, angle: float) -> Float:
+    """Return the matrix of a turn about a unit vector (Rodrigues)."""
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn: Float = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
+    return turn
+
+
+def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> Frame:
+    """Return the frame with one sensor's points turned about a place and moved."""
+    own = frame.sensor == sensor
+    points = frame.points.copy()
+    points[own] = ((points[own] - about) @ turn.T + about + by).astype(np.float32)
+    return replace(frame, points=points)
+
+
+POINTS = ("points", "sensor", "delay", "intensity", "instance")
+
+
+def _some(frame: Frame, kept: Boolean) -> Frame:
+    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINTS})
+
+
+def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Frame:
+    """Return some points of two frames, sensor after sensor, with the road users of the first."""
+    kept = [_some(one, of_one), _some(other, of_other)]
+    sensor = np.concatenate([part.sensor for part in kept])
+    order = np.argsort(sensor, kind="stable")
+    points = {name: np.concatenate([getattr(part, name) for part in kept])[order] for name in POINTS}
+    return _recounted(replace(one, **points))
+
+
+def _recounted(frame: Frame) -> Frame:
+    """Return the frame with the labels' returns counted anew."""
+    labels = frame.labels
+    most = max(int(labels.user.max(initial=0)), int(frame.instance.max(initial=0))) + 1
+    on_users = frame.instance != STATIC
+    sensors = labels.points.shape[1]
+    cell = frame.instance[on_users].astype(np.int64) * sensors + frame.sensor[on_users]
+    counts = np.bincount(cell, minlength=most * sensors).reshape(most, sensors)
+    return replace(frame, labels=replace(labels, points=counts[labels.user]))

@@ -1,0 +1,78 @@
+"""Average precision of several trainings, and by how much it changes, with intervals over traffic and trainings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from headless.detection.average_precision import FEWEST_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
+from headless.detection.intervals import percentiles, student_quantile
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.robustness.estimates import Estimate
+
+DRAWS = 2 * RESAMPLES
+"""Resamples of the blocks of traffic; what the first half of them says must be what all say."""
+
+
+class Sampled:
+    """One detector's average precision on some frames, with resamples of their traffic.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    seed : int
+        Of the resamples: what is compared pair by pair has the same, and the same frames.
+    """
+
+    def __init__(self, evaluation: Evaluation, seed: int = 0) -> None:
+        self.value = evaluation.average_precision
+        self.blocks = int(evaluation.block.max()) + 1
+        self.draws = resampled_average_precisions(evaluation, seed, DRAWS)
+
+
+def level(those: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+    """Return the mean average precision of detectors that differ in their seeds alone."""
+    return _estimate([one.value for one in those], [one.draws[:draws] for one in those], those[0].blocks)
+
+
+def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+    """Return by how much the mean average precision changes from one trial to another of the same detectors.
+
+    Differences are taken detector by detector and, where both had the same
+    frames and seed, resample by resample: what makes traffic hard makes it hard
+    for both. So a change can be told that is far smaller than the interval of
+    either average precision.
+
+    Parameters
+    ----------
+    to, of : sequence of Sampled
+        In the same order of detectors.
+    draws : int
+        Resamples that count.
+    """
+    pairs = list(zip(to, of, strict=True))
+    return _estimate(
+        [after.value - before.value for after, before in pairs],
+        [after.draws[:draws] - before.draws[:draws] for after, before in pairs],
+        min(min(after.blocks, before.blocks) for after, before in pairs),
+    )
+
+
+def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> Estimate:
+    """Return the mean over detectors; its 95 % interval is over other traffic and over other trainings.
+
+    Over traffic it is that of the bootstrap, over trainings Student's. Of two
+    independent errors the distances from the value to the ends add up as
+    squares (G. Y. Zou, A. Donner: Construction of confidence limits about
+    effect measures. Statistics in Medicine 27 (2008), 1693-1702).
+    """
+    value = float(np.mean(values))
+    if blocks < FEWEST_BLOCKS:
+        return Estimate(value, -math.inf, math.inf)
+    low, high = percentiles(np.mean(draws, axis=0))
+    count = len(values)
+    reach = student_quantile(count - 1) * float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
+    return Estimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))

@@ -1,0 +1,252 @@
+"""Detectors tried under disturbances: what each makes of the test frames, kept so that nothing is done twice."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+
+from headless.detection.average_precision import Evaluation, Judged, Wanted, evaluate
+from headless.detection.cloud_in_plan import CloudInPlan
+from headless.detection.detector import Detector
+from headless.detection.frame_results import FrameResult, frame_result
+from headless.detection.inference import detect
+from headless.detection.matching import Rule
+from headless.detection.recordings import Configuration, Studio, TrafficRun
+from headless.detection.settings import GROUPS
+from headless.detection.training import deterministic
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.scans import Frame, prepare
+from seip_addon.core.scans.run_folder import Run
+from seip_addon.core.storage.array_file import ArrayFile, ArrayRule, ContentError
+from seip_addon.core.storage.files import digest
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.traffic.bodies import fitted_body
+
+from .disturbances import Disturbance
+
+FILE = ArrayFile(
+    "seip.trial",
+    2,
+    "trial of a detector",
+    "delete it, and it is tried again",
+    {
+        "detections.score": ArrayRule("f8", ("d",), 0.0, 1.0),
+        "detections.hit": ArrayRule("b1", ("d",)),
+        "detections.frame": ArrayRule("i8", ("d",), 0),
+        "detections.density": ArrayRule("f8", ("d",), 0.0),
+        "detections.points": ArrayRule("i8", ("d",), 0),
+        "detections.distance": ArrayRule("f8", ("d",), 0.0),
+        "detections.border": ArrayRule("f8", ("d",), 0.0),
+        "wanted.score": ArrayRule("f8", ("t",), most=1.0),
+        "wanted.frame": ArrayRule("i8", ("t",), 0),
+        "wanted.category": ArrayRule("U", ("t",)),
+        "wanted.points": ArrayRule("i8", ("t",), 0),
+        "wanted.visibility": ArrayRule("f8", ("t",), 0.0, 1.0),
+        "wanted.distance": ArrayRule("f8", ("t",), 0.0),
+        "wanted.border": ArrayRule("f8", ("t",), 0.0),
+        "block": ArrayRule("i8", ("f",), 0),
+    },
+)
+
+RULE = Rule()
+"""How average precision is taken: the evaluation's own."""
+
+TABLES = {"detections": Judged, "wanted": Wanted}
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Where detectors are tried.
+
+    Parameters
+    ----------
+    name : str
+    studio : Studio
+    runs : tuple of TrafficRun
+        That no detector has seen.
+    """
+
+    name: str
+    studio: Studio
+    runs: tuple[TrafficRun, ...]
+
+    def key(self, configuration: Configuration) -> str:
+        """Return a digest of all that undisturbed frames follow from."""
+        studio = self.studio
+        runs = (
+            Run(
+                static=studio.static,
+                origin=run.trajectories.origin,
+                sensors=configuration.sensors,
+                trajectories=run.trajectories,
+                bodies=[fitted_body(user) for user in run.trajectories.users],
+                times=run.times,
+                settings=studio.settings,
+                versions=versions(),
+            )
+            for run in self.runs
+        )
+        return digest(*(run.key for run in runs))
+
+
+@dataclass(frozen=True, eq=False)
+class Entrant:
+    """A detector that is tried.
+
+    Parameters
+    ----------
+    name : str
+    detector : Detector
+    """
+
+    name: str
+    detector: Detector
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of its weights, its settings and its grid."""
+        weights = [part for name, value in self.detector.state_dict().items() for part in (name, value.cpu().numpy())]
+        return digest(repr(self.detector.settings), repr(self.detector.grid), *weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What one detector made of the test frames.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        With distances to the nearest sensor.
+    from_border : Evaluation
+        The same with distances to the border of the region of interest.
+    """
+
+    evaluation: Evaluation
+    from_border: Evaluation
+
+
+def trials(
+    ground: Ground, configuration: Configuration, disturbance: Disturbance, entrants: Sequence[Entrant], store: Path
+) -> Generator[Progress, None, list[Trial]]:
+    """Try detectors with a placement under a disturbance; a frame is simulated once for all of them.
+
+    Parameters
+    ----------
+    ground : Ground
+    configuration : Configuration
+    disturbance : Disturbance
+    entrants : sequence of Entrant
+        With pillars on the ground's own grid.
+    store : path
+        Folder of what was tried before.
+
+    Returns
+    -------
+    list of Trial
+        One for each detector.
+    """
+    setting = digest(source_digest(__name__), ground.key(configuration), repr(RULE), repr(disturbance))
+    paths = [store / f"{digest(setting, entrant.key)[:32]}.npz" for entrant in entrants]
+    missing = [(entrant, path) for entrant, path in zip(entrants, paths, strict=True) if not path.exists()]
+    if missing:
+        detectors = [disturbance.looked_at(entrant.detector) for entrant, _ in missing]
+        results = yield from _results(ground, configuration, disturbance, detectors)
+        for (entrant, path), frames in zip(missing, results, strict=True):
+            header = {"ground": ground.name, "configuration": configuration.name, "detector": entrant.name}
+            _save(path, header | {"disturbance": repr(disturbance)}, trial_of(frames, ground.studio.static.region))
+    return [_load(path) for path in paths]
+
+
+def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> Trial:
+    """Judge what a detector made of some frames."""
+
+    def from_border(boxes: Float) -> Float:
+        distance: Float = shapely.distance(region.boundary, shapely.points(boxes[:, :2]))
+        return distance
+
+    measured = [
+        replace(
+            frame,
+            truth=replace(frame.truth, distance=from_border(frame.truth.boxes)),
+            detected=replace(frame.detected, distance=from_border(frame.detected.boxes)),
+        )
+        for frame in frames
+    ]
+    return Trial(evaluate(frames, RULE), evaluate(measured, RULE))
+
+
+def disturbed_frames(
+    ground: Ground, configuration: Configuration, disturbance: Disturbance
+) -> Generator[tuple[TrafficRun, Frame], None, None]:
+    """Simulate the test frames as they are under a disturbance."""
+    studio = ground.studio
+    sensors = disturbance.hung(configuration.sensors)
+    for run in ground.runs:
+        trajectories = disturbance.on_the_road(run.trajectories)
+        bodies = [fitted_body(user) for user in trajectories.users]
+        simulation = finish(prepare(studio.static, sensors, trajectories, bodies, studio.settings))
+        for number, time in enumerate(run.times.tolist()):
+            random = np.random.default_rng([studio.settings.seed, int(run.key, 16), number])
+            yield run, disturbance.shown(disturbance.taken(simulation, number, time), sensors, random)
+
+
+def _results(
+    ground: Ground, configuration: Configuration, disturbance: Disturbance, detectors: Sequence[Detector]
+) -> Generator[Progress, None, list[list[FrameResult]]]:
+    results: list[list[FrameResult]] = [[] for _ in detectors]
+    total = sum(len(run.times) for run in ground.runs)
+    for done, (run, frame) in enumerate(disturbed_frames(ground, configuration, disturbance)):
+        yield Progress(done, total, f"{configuration.name}, {disturbance.name} {disturbance.size:g}")
+        cloud = CloudInPlan(frame.points)
+        for detector, own in zip(detectors, results, strict=True):
+            with deterministic(1):
+                found = detect(detector, frame.points, frame.intensity)
+            own.append(
+                frame_result(
+                    frame,
+                    cloud,
+                    found,
+                    classes=tuple(GROUPS.values()),
+                    region=ground.studio.static.region,
+                    sensors=configuration.places,
+                    run=run.name,
+                )
+            )
+    return results
+
+
+def _save(path: Path, header: dict[str, str], trial: Trial) -> None:
+    evaluation, beside = trial.evaluation, trial.from_border
+    arrays = {
+        f"{table}.{part.name}": getattr(getattr(evaluation, table), part.name)
+        for table, kind in TABLES.items()
+        for part in fields(kind)
+    }
+    border = {f"{table}.border": getattr(beside, table).distance for table in TABLES}
+    FILE.save(path, header, arrays | border | {"block": evaluation.block})
+
+
+def _load(path: Path) -> Trial:
+    with FILE.reading(path) as (_, arrays):
+        tables = {
+            table: kind(**{part.name: arrays[f"{table}.{part.name}"] for part in fields(kind)})
+            for table, kind in TABLES.items()
+        }
+        frames = len(arrays["block"])
+        if any((arrays[f"{table}.frame"] >= frames).any() for table in TABLES):
+            raise ContentError("it has detections of frames that are not in it")
+        evaluation = Evaluation(RULE, tables["detections"], tables["wanted"], arrays["block"])
+        beside = {
+            table: replace(rows, distance=arrays[f"{table}.border"])  # type: ignore[type-var]  # each is a dataclass
+            for table, rows in tables.items()
+        }
+        return Trial(evaluation, replace(evaluation, **beside))

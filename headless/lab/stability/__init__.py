@@ -1,0 +1,1 @@
+"""Where visibility, placement and arithmetic fail, chapter by chapter."""

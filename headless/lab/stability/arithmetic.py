@@ -1,0 +1,339 @@
+"""Where arithmetic fails: both ray casters against float64 on scenes that are hard on them.
+
+Two questions are asked of each scene. Of its hits: how many are others than float64's,
+and does any lie where no rounding explains it? Of V: does any entry differ where the
+distance to δ, and all that stands before it, is clearer than the rounding?
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from shapely import box
+
+from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import BeamPattern, LidarModel
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.site.site import Candidates, Site, Targets
+from seip_addon.core.visibility.grid import WIDEST_DELTA, VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.rounding import NOTICEABLE, STEP
+
+from .float64_rays import FirstHits, first_hits
+from .hard_scenes import HardScene, far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray
+from .rows import Row
+from .shares import Share
+
+ROUNDINGS = 64
+"""Steps of float32 at a scene's extent that explain a hit: what visibility allows for, too."""
+
+DISTANCES = tuple(10.0 ** (half / 2) for half in range(4, 15))
+"""Metres to which an ordinary street is moved, or at which a stray mesh is left."""
+
+ENDLESS = 1e9
+"""Metres that rays go."""
+
+DELTA = 0.5
+TARGETS = 300
+SENSOR = LidarModel(
+    key="probe",
+    name="probe",
+    manufacturer="none",
+    source="none",
+    elevations=np.radians(np.linspace(-70, 0, 24)),
+    min_range=0.001,
+    max_range=9000.0,
+    points_per_second=24 * 10 * 150.0,
+    rotation_rate=10.0,
+    price_range=(1.0, 1.0),
+)
+"""What looks at the scenes: few rays, so that float64 can follow all of them."""
+
+
+@dataclass(frozen=True)
+class HitCheck:
+    """A ray caster's hits against float64's.
+
+    Parameters
+    ----------
+    scene, engine : str
+    distance : float, metres
+        Of the street, or of the stray mesh, from the origin; 0 where that is not in question.
+    extent : float, metres
+        Of scene and rays.
+    flipped : Share
+        Rays that hit another surface, or hit instead of missing, or miss instead of hitting.
+    unexplained : Share
+        Rays whose hit rounding does not explain.
+    off : float, metres
+        By how far the other hits are off at most, across their surfaces.
+    off_along : float, metres
+        The same along the rays.
+    """
+
+    scene: str
+    engine: str
+    distance: float
+    extent: float
+    flipped: Share
+    unexplained: Share
+    off: float
+    off_along: float
+
+
+@dataclass(frozen=True)
+class GridCheck:
+    """A visibility grid against float64's.
+
+    Parameters
+    ----------
+    scene, engine : str
+    flipped : Share
+        Entries that differ.
+    in_band : Share
+        Entries that rounding may decide either way.
+    outside : Share
+        Entries that differ though rounding does not explain it.
+    """
+
+    scene: str
+    engine: str
+    flipped: Share
+    in_band: Share
+    outside: Share
+
+
+@dataclass(frozen=True)
+class ArithmeticStudy:
+    """Ray casters against float64.
+
+    Parameters
+    ----------
+    hits : tuple of HitCheck
+        One for each scene and engine.
+    moved, stored, stray : tuple of HitCheck
+        An ordinary street moved away from the origin in float64; kept there in float32, as Blender does; and with a
+        stray mesh far from it. By distance.
+    grids : tuple of GridCheck
+    """
+
+    hits: tuple[HitCheck, ...]
+    moved: tuple[HitCheck, ...]
+    stored: tuple[HitCheck, ...]
+    stray: tuple[HitCheck, ...]
+    grids: tuple[GridCheck, ...]
+
+
+def engines_here() -> tuple[Engine, ...]:
+    """Return the ray casters that can be had here."""
+    known: tuple[Engine, ...] = ("bvh", "embree")
+    found = []
+    for engine in known:
+        try:
+            make_ray_caster(np.zeros((0, 3, 3)), engine)
+        except SeipError:  # it says that it is not there
+            continue
+        found.append(engine)
+    return tuple(found)
+
+
+def arithmetic_study(
+    rays: int = 20_000, seed: int = 0, engines: Sequence[Engine] | None = None
+) -> Generator[Progress, None, ArithmeticStudy]:
+    """Hold ray casters to float64 on scenes that are hard on them.
+
+    Parameters
+    ----------
+    rays : int
+        For each scene.
+    seed : int
+    engines : sequence of str, optional
+        All that are there if not given.
+    """
+    random = np.random.default_rng(seed)
+    engines = engines_here() if engines is None else engines
+    scenes = hard_scenes(rays, random)
+    street = ordinary_scene(rays, random)
+    total = len(scenes) + 1 + len(DISTANCES)
+    hits, grids = [], []
+    for number, scene in enumerate(scenes):
+        yield Progress(number, total, f"float64 rays: {scene.name}")
+        truth = _truth(scene)
+        hits += [check_hits(scene, engine, truth) for engine in engines]
+        grids += [check_grid(scene, engine) for engine in engines]
+    yield Progress(len(scenes), total, "float64 rays: far away")
+    here = _truth(street)
+    moved, stored, stray = [], [], []
+    for number, distance in enumerate(DISTANCES):
+        yield Progress(len(scenes) + 1 + number, total, f"float64 rays: {distance:,.0f} m away")
+        with_one = with_stray(street, distance)
+        truth = _truth(with_one)
+        for engine in engines:
+            moved.append(check_hits(far_away(street, distance), engine, here, distance))
+            stored.append(check_hits(stored_far_away(street, distance), engine, here, distance, kept_at=distance))
+            stray.append(check_hits(with_one, engine, truth, distance))
+    return ArithmeticStudy(tuple(hits), tuple(moved), tuple(stored), tuple(stray), tuple(grids))
+
+
+def check_hits(
+    scene: HardScene, engine: Engine, truth: FirstHits, distance: float = 0.0, *, kept_at: float = 0.0
+) -> HitCheck:
+    """Compare a ray caster's hits with those of float64, of a scene that was kept in float32 so far from its origin."""
+    found, _ = make_ray_caster(scene.triangles, engine).cast(scene.origin, scene.directions, ENDLESS)
+    missed = np.isfinite(found) != np.isfinite(truth.distance)
+    both = np.isfinite(found) & np.isfinite(truth.distance)
+    along = np.zeros(len(found))
+    along[both] = np.abs(found[both] - truth.distance[both])
+    across = along * truth.slope
+    flipped = missed | (across > max(tolerance_of(scene), ROUNDINGS * STEP * kept_at))
+    return HitCheck(
+        scene=scene.name,
+        engine=engine,
+        distance=distance,
+        extent=extent_of(scene),
+        flipped=Share(int(flipped.sum()), len(found)),
+        unexplained=Share(int((~truth.allow(found)).sum()), len(found)),
+        off=float(across[~flipped].max(initial=0.0)),
+        off_along=float(along[~flipped].max(initial=0.0)),
+    )
+
+
+def check_grid(scene: HardScene, engine: Engine) -> GridCheck:
+    """Compare the visibility of targets on a scene with what float64 says of it, and of what it may be."""
+    site = _site(scene)
+    delta = min(DELTA * extent_of(scene) / 20.0, WIDEST_DELTA)
+    settings = VisibilitySettings(delta)
+    seen = finish(compute_visibility(site, {SENSOR.key: SENSOR}, settings, engine)).visible[0]
+    exact, surely, maybe = _seen_in_float64(scene, site.targets.xyz, delta)
+    outside = (surely & ~seen) | (seen & ~maybe)
+    return GridCheck(
+        scene=scene.name,
+        engine=engine,
+        flipped=Share(int((seen != exact).sum()), len(seen)),
+        in_band=Share(int((maybe & ~surely).sum()), len(seen)),
+        outside=Share(int(outside.sum()), len(seen)),
+    )
+
+
+def extent_of(scene: HardScene) -> float:
+    """Return the longest side of the box about a scene and the start of its rays, in metres."""
+    points = np.concatenate([scene.triangles.reshape(-1, 3), scene.origin[None]])
+    return float(np.ptp(points, axis=0).max())
+
+
+def tolerance_of(scene: HardScene) -> float:
+    """Return by how much rounding may explain that a hit is off, in metres."""
+    return ROUNDINGS * STEP * extent_of(scene)
+
+
+def _truth(scene: HardScene) -> FirstHits:
+    return first_hits(scene.origin, scene.directions, scene.triangles, tolerance_of(scene))
+
+
+def _seen_in_float64(scene: HardScene, targets: Float, delta: float) -> tuple[Boolean, Boolean, Boolean]:
+    """Return which targets are seen, surely seen, and maybe seen, (t,) bool each."""
+    directions = BeamPattern(SENSOR).directions(np.arange(SENSOR.channels * SENSOR.azimuth_count))
+    tolerance = tolerance_of(scene)
+    hits = first_hits(scene.origin, directions, scene.triangles, tolerance)
+    way = targets - scene.origin
+    exact, surely, maybe = (np.zeros(len(targets), dtype=bool) for _ in range(3))
+    for number, target in enumerate(way):
+        along = directions @ target
+        aside = np.sqrt(np.maximum(target @ target - along**2, 0.0))
+
+        def gap(distance: Float, along: Float = along, aside: Float = aside) -> Float:
+            return np.hypot(aside, np.where(np.isfinite(distance), distance, ENDLESS) - along)
+
+        exact[number] = _within(hits.distance, gap(hits.distance) < delta)
+        ends = np.maximum(gap(hits.nearest), gap(hits.farthest))
+        surely[number] = _within(hits.farthest, ends < delta - tolerance)
+        closest = np.clip(along, hits.nearest, hits.farthest)
+        maybe[number] = bool((np.isfinite(hits.nearest) & (gap(closest) < delta + tolerance)).any())
+    return exact, surely, maybe
+
+
+def _within(distance: Float, near: Boolean) -> bool:
+    """Tell whether some ray that is near ends within the sensor's range."""
+    return bool((near & (distance >= SENSOR.min_range) & (distance <= SENSOR.max_range)).any())
+
+
+def _site(scene: HardScene) -> Site:
+    """Return a scene as a site: targets on its surfaces, one pose where its rays start."""
+    random = np.random.default_rng(len(scene.triangles))
+    which = random.integers(0, len(scene.triangles), TARGETS)
+    share = random.dirichlet((1.0, 1.0, 1.0), TARGETS)
+    targets = (scene.triangles[which] * share[:, :, None]).sum(axis=1)
+    pose = scene.origin[None]
+    return Site(
+        name=scene.name,
+        origin=np.zeros(3),
+        region=box(*scene.triangles[:, :, :2].min(axis=(0, 1)), *scene.triangles[:, :, :2].max(axis=(0, 1))),
+        targets=Targets(targets, np.ones(TARGETS), np.zeros(TARGETS, dtype=bool), 1.0),
+        candidates=Candidates(
+            position=pose,
+            position_name=np.array(["probe"]),
+            on_pole=np.zeros(1, dtype=bool),
+            pole_source=np.full(1, ""),
+            position_of=np.zeros(1, dtype=np.int64),
+            sensor=np.array([SENSOR.key]),
+            height=pose[:, 2],
+            xyz=pose,
+            yaw=np.zeros(1),
+            tilt=np.zeros(1),
+            mandatory=np.zeros((0, 1), dtype=bool),
+            mandatory_name=np.zeros(0, dtype=np.str_),
+            dropped={},
+        ),
+        triangles=scene.triangles,
+    )
+
+
+def border(checks: Sequence[HitCheck], off: float) -> float:
+    """Return the first distance at which hits are off by more than ``off`` metres; infinite where none is."""
+    return min((c.distance for c in checks if c.off > off), default=math.inf)
+
+
+def arithmetic_rows(study: ArithmeticStudy) -> list[Row]:
+    """Return where float32 begins to fail."""
+    how = "{:,} rays a scene against float64, both ray casters"
+    trials = max(check.flipped.trials for check in study.hits)
+    rows = []
+    for engine in dict.fromkeys(check.engine for check in study.hits):
+        own = [check for check in study.hits if check.engine == engine]
+        flips = {check.scene: check.flipped for check in own if check.flipped.count}
+        said = "; ".join(f"{scene}: {share.per_million}" for scene, share in flips.items()) or "no flipped hit"
+        grids = [check for check in study.grids if check.engine == engine]
+        outside, entries = sum(g.outside.count for g in grids), sum(g.outside.trials for g in grids)
+        rows.append(
+            Row(
+                method=f"ray caster {engine}",
+                regime="edges, vertices, grazing, slivers, duplicate, coplanar, open, inside out, mirrored, scaled",
+                begins=f"{said}; {outside} of {entries:,} entries of V outside the noise band",
+                how=how.format(trials),
+                answer="both sides stop a ray; Embree's distances on needles are computed again in float64",
+            )
+        )
+    for name, checks, answer in (
+        ("far origin, computed", study.moved, "moves every scene to its middle in float64 before it casts"),
+        ("far origin, stored by Blender", study.stored, "warns where the scene lies so far out"),
+        ("stray mesh", study.stray, "leaves out what no sensor reaches, and warns of wider meshes by name"),
+    ):
+        first, second = border(checks, NOTICEABLE), border(checks, 10 * NOTICEABLE)
+        rows.append(
+            Row(
+                method="ray casters",
+                regime=name,
+                begins=f"hits off by over 1 mm {_from(first)}, by over 1 cm {_from(second)}",
+                how=how.format(trials) + ", at powers of ten",
+                answer=answer,
+            )
+        )
+    return rows
+
+
+def _from(distance: float) -> str:
+    return f"from {distance:,.0f} m on" if math.isfinite(distance) else f"nowhere up to {DISTANCES[-1]:,.0f} m"

@@ -1,0 +1,230 @@
+"""Charts of where the criterion, arithmetic and the solvers begin to fail."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.placement.near_optimal import FlatTop
+from seip_addon.core.placement.problem import TIE
+from seip_addon.core.storage.files import whole_file
+from seip_addon.core.visibility.rounding import NOTICEABLE, STEP
+
+from .arithmetic import ArithmeticStudy
+from .criterion import CriterionStudy
+from .solver_limits import SolverStudy
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Told apart by colour-blind people (Okabe and Ito 2008)."""
+
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
+LIMIT: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
+
+
+def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
+    """Draw, for each sensor type, from where rings are more than 2δ apart, against δ; what lies above is beams."""
+    sensors = list(dict.fromkeys(border.sensor for border in study.borders))
+    figure, panels = _figure(len(sensors), title)
+    for panel, sensor in zip(panels, sensors, strict=True):
+        own = [border for border in study.borders if border.sensor == sensor]
+        top = max(border.radius for border in study.borders)
+        for number, height in enumerate(sorted({border.height for border in own})):
+            at = [border for border in own if border.height == height]
+            deltas, radii = [border.delta for border in at], [border.radius for border in at]
+            style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
+            panel.plot(deltas, radii, label=f"{height:g} m high", **style)
+            panel.fill_between(deltas, radii, top, color=COLOURS[number], alpha=0.07)
+        panel.axvline(delta, **LIMIT)
+        _delta_axis(panel, study)
+        panel.set_ylim(0, top)
+        panel.set_title(f"{sensor}: above the line, coverage counts beams", fontsize=10, color=INK)
+        _name(panel, "δ (m); dashed: asked for", "distance on a level road (m)")
+        panel.legend(frameon=False, fontsize=8.5, loc="upper left")
+    _save(figure, path)
+
+
+def save_border_check_chart(path: str | os.PathLike[str], study: CriterionStudy, title: str) -> None:
+    """Draw the share of targets in view that count as seen against their distance in multiples of the border."""
+    figure, (panel,) = _figure(1, title)
+    for number, own in enumerate(study.by_ratio):
+        points = [
+            (float(np.mean(own.ratios[row : row + 2])), share.value, *share.interval)
+            for row, share in enumerate(own.seen)
+            if share is not None
+        ]
+        at, value, low, high = np.array(points).T
+        reach = [np.maximum(value - low, 0), np.maximum(high - value, 0)]
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "capsize": 3}
+        panel.errorbar(at, value, reach, label=own.sensor, **style)
+    panel.axvline(1.0, **LIMIT)
+    panel.set_ylim(0, 1.03)
+    _share_axis(panel)
+    _name(panel, "distance in multiples of the border", "of the targets in view, share that counts as seen")
+    panel.legend(frameon=False, fontsize=9)
+    _save(figure, path)
+
+
+def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
+    """Draw coverage and what is in view against δ, and what the placement for each δ covers under the one asked for."""
+    figure, panels = _figure(2, title)
+    for number, sensor in enumerate(dict.fromkeys(answer.sensor for answer in study.by_delta)):
+        own = [answer for answer in study.by_delta if answer.sensor == sensor]
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
+        deltas = [answer.delta for answer in own]
+        coverage, view = [answer.coverage for answer in own], [answer.view for answer in own]
+        panels[0].plot(deltas, coverage, label=f"{sensor}, {own[0].height:g} m high", **style)
+        panels[0].plot(deltas, view, color=COLOURS[number], linewidth=1.0, linestyle=":")
+        panels[0].fill_between(deltas, coverage, view, color=COLOURS[number], alpha=0.06)
+        panels[1].plot(deltas, [answer.judged for answer in own], label=sensor, **style)
+    for panel, what in zip(
+        panels,
+        ("coverage (dotted: what is in view; between them, beams)", f"coverage under δ = {delta:g} m"),
+        strict=True,
+    ):
+        panel.axvline(delta, **LIMIT)
+        _delta_axis(panel, study)
+        panel.set_ylim(0, 1.03)
+        _share_axis(panel)
+        _name(panel, "δ (m) that the placement was made for", what)
+        panel.legend(frameon=False, fontsize=8.5)
+    _save(figure, path)
+
+
+def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, title: str) -> None:
+    """Draw coverage against the spacing of targets and of candidates, with what the tolerance picks."""
+    figure, panels = _figure(2, title)
+    picked = study.convergence.settings
+    for panel, answers, what, at in (
+        (panels[0], study.by_grid, "spacing of the targets (m)", picked.grid_spacing),
+        (panels[1], study.by_candidates, "spacing of the candidates (m)", picked.candidates.spacing),
+    ):
+        spacing = [a.grid_spacing if panel is panels[0] else a.candidate_spacing for a in answers]
+        panel.plot(spacing, [a.own for a in answers], color=COLOURS[1], marker="s", label="on its own grid")
+        panel.plot(spacing, [a.judged for a in answers], color=COLOURS[0], marker="o", label="on the fine grid")
+        best = max(a.judged for a in answers)
+        panel.axhspan(best - study.convergence.tolerance, best, color=COLOURS[2], alpha=0.12, label="tolerance")
+        panel.axvline(at, **LIMIT)
+        panel.set_xscale("log", base=2)
+        panel.invert_xaxis()
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _share_axis(panel)
+        _name(panel, f"{what}; dashed: picked", "coverage of the best placement")
+        panel.legend(frameon=False, fontsize=8.5)
+    _save(figure, path)
+
+
+def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, title: str) -> None:
+    """Draw by how far hits are off against how far away a street, or a stray mesh, lies."""
+    figure, (panel,) = _figure(1, title)
+    for number, (name, checks) in enumerate(
+        (
+            ("street moved, computed in float64", study.moved),
+            ("street kept there in float32", study.stored),
+            ("stray mesh there", study.stray),
+        )
+    ):
+        for engine, dash in zip(dict.fromkeys(check.engine for check in checks), ("-", ":"), strict=False):
+            own = [check for check in checks if check.engine == engine]
+            style: dict[str, Any] = {
+                "color": COLOURS[number],
+                "marker": MARKS[number],
+                "linestyle": dash,
+                "markersize": 5,
+            }
+            panel.plot([c.distance for c in own], [c.off for c in own], label=f"{name}, {engine}", **style)
+    panel.axhline(NOTICEABLE, **LIMIT)
+    panel.axvline(NOTICEABLE / STEP, **LIMIT)
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    _name(panel, "distance (m); dashed: where the tool warns", "hits off at most, across the surface (m)")
+    panel.legend(frameon=False, fontsize=8.5)
+    _save(figure, path)
+
+
+def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: str) -> None:
+    """Draw what is lost where weights and prices lie far apart, when near-ties move the choice, and greedy's worst."""
+    figure, panels = _figure(3, title)
+    for number, (what, method) in enumerate(dict.fromkeys((c.what, c.method) for c in study.spans)):
+        own = [c for c in study.spans if (c.what, c.method) == (what, method)]
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
+        panels[0].plot([c.decades for c in own], [c.lost for c in own], label=f"{what}, {method}", **style)
+    panels[0].axhline(TIE, **LIMIT)
+    panels[0].set_yscale("symlog", linthresh=1e-13)
+    panels[0].set_ylim(0, 10 * TIE)
+    panels[0].set_xticks(sorted({check.decades for check in study.spans}))
+    _name(panels[0], "powers of ten that they span", "largest loss; dashed: counts as equal")
+    by = [check.by for check in study.ties]
+    shares = np.array([(c.changed.value, *c.changed.interval) for c in study.ties]).T
+    panels[1].errorbar(
+        by, shares[0], np.maximum([shares[0] - shares[1], shares[2] - shares[0]], 0), color=COLOURS[0], marker="o"
+    )
+    panels[1].axvline(TIE, **LIMIT)
+    panels[1].set_xscale("log")
+    _share_axis(panels[1])
+    _name(panels[1], "share by which equal weights are disturbed", "choices that change")
+    counts = [check.count for check in study.greedy]
+    for number, (name, values) in enumerate(
+        (
+            ("exact", [c.best for c in study.greedy]),
+            ("greedy", [c.greedy for c in study.greedy]),
+            ("greedy's bound", [c.least for c in study.greedy]),
+        )
+    ):
+        dash = "--" if number == 2 else "-"
+        panels[2].plot(counts, values, color=COLOURS[number], marker=MARKS[number], linestyle=dash, label=name)
+    panels[2].set_ylim(0.5, 1.03)
+    _share_axis(panels[2])
+    _name(panels[2], "sensors", "coverage on the worst instance")
+    for panel in (panels[0], panels[2]):
+        panel.legend(frameon=False, fontsize=8)
+    _save(figure, path)
+
+
+def save_flat_top_chart(path: str | os.PathLike[str], tops: Sequence[tuple[str, FlatTop]], title: str) -> None:
+    """Draw how many placements near the best share how many positions with it."""
+    figure, panels = _figure(len(tops), title)
+    for panel, (name, top) in zip(panels, tops, strict=True):
+        panel.bar_label(panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0]), fontsize=9)
+        panel.set_xticks(range(len(top.in_common)))
+        panel.set_title(f"{name}: {len(top):,}{'' if top.complete else ' and more'}", fontsize=10, color=INK)
+        _name(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")
+    _save(figure, path)
+
+
+def _figure(panels: int, title: str) -> tuple[Figure, Sequence[Axes]]:
+    figure = Figure((max(6.5, 4.8 * panels), 4.6), dpi=150, facecolor=PAPER, layout="constrained")
+    figure.suptitle(title, color=INK, fontsize=11)
+    return figure, list(figure.subplots(1, panels, squeeze=False)[0])
+
+
+def _delta_axis(panel: Axes, study: CriterionStudy) -> None:
+    panel.set_xscale("log")
+    panel.minorticks_off()
+    panel.set_xticks(sorted({border.delta for border in study.borders})[::2])
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def _share_axis(panel: Axes) -> None:
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
+
+
+def _name(panel: Axes, x: str, y: str) -> None:
+    panel.set_xlabel(x, color=INK)
+    panel.set_ylabel(y, color=INK)
+    panel.grid(color="#e3e6e8", linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.tick_params(which="both", colors=SOFT_INK)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})

@@ -1,0 +1,477 @@
+"""Where the criterion of visibility fails: coverage and placement against δ, the grids, and the beams' azimuth.
+
+Each setting is varied alone. An answer is judged twice: as its own settings see it, and on
+one fine grid of targets with the δ asked for, the same for all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.geometry.plan import surface_height
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.placement.deployment import Deployment
+from seip_addon.core.placement.goal import Goal, Plan
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.scans.sensor import level_orientation
+from seip_addon.core.site.scene_geometry import SceneGeometry, joined
+from seip_addon.core.site.site import Site, Targets, make_site
+from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.visibility.ray_casting import RayCaster, make_ray_caster
+from seip_addon.core.visibility.ring_resolution import unresolved_from
+from seip_addon.core.visibility.rotated_sensors import onlooker
+from seip_addon.core.workflows.convergence import (
+    CANDIDATE_SPACINGS,
+    GRID_SPACINGS,
+    JUDGED_ON,
+    Answer,
+    Convergence,
+    Judge,
+    coarsest_settings,
+)
+from seip_addon.core.workflows.survey import SurveySettings
+
+from .rows import Row
+from .shares import NORMAL, Share
+
+DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+"""Metres."""
+
+RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
+"""Distances in multiples of the border, between which targets are counted."""
+
+PLACES = 6
+"""Positions from which targets are counted for each sensor type and height."""
+
+CLEAR = 0.3
+"""Metres before a target within which a line of sight may end on the road that the target lies on."""
+
+
+@dataclass(frozen=True)
+class RingBorder:
+    """From where the rings on a level road are more than 2δ apart.
+
+    Parameters
+    ----------
+    sensor : str
+    height, delta, radius : float, metres
+    """
+
+    sensor: str
+    height: float
+    delta: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class SeenByRatio:
+    """Which share of the targets in view counts as seen, by their distance in multiples of the border.
+
+    Parameters
+    ----------
+    sensor : str
+    ratios : tuple of float
+        Edges of the classes.
+    seen : tuple of Share or None
+        One for each class; None where no target lies in it.
+    """
+
+    sensor: str
+    ratios: tuple[float, ...]
+    seen: tuple[Share | None, ...]
+
+
+@dataclass(frozen=True)
+class DeltaAnswer:
+    """The best placement of one sensor type under one δ.
+
+    Parameters
+    ----------
+    sensor : str
+    height, delta : float, metres
+    coverage : float
+        Under this δ.
+    view : float
+        Share of the targets that its sensors have in view: what coverage would be if beams lay close.
+    judged : float
+        Its coverage on the fine grid, under the δ asked for.
+    moved : float, metres
+        Mean distance of its sensors to the nearest of the placement for the δ asked for.
+    """
+
+    sensor: str
+    height: float
+    delta: float
+    coverage: float
+    view: float
+    judged: float
+    moved: float
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Coverage of one placement under random changes that should not matter.
+
+    Parameters
+    ----------
+    what : str
+    coverage : (n,) float64
+    """
+
+    what: str
+    coverage: Float
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation."""
+        return float(self.coverage.std(ddof=1))
+
+    @property
+    def spread_interval(self) -> tuple[float, float]:
+        """Its 95 % interval, by the normal approximation of its logarithm."""
+        reach = math.exp(NORMAL / math.sqrt(2 * (len(self.coverage) - 1)))
+        return self.spread / reach, self.spread * reach
+
+    @property
+    def settled(self) -> bool:
+        """Whether half of the draws lead to a spread within the interval."""
+        half = self.coverage[: len(self.coverage) // 2]
+        low, high = self.spread_interval
+        return len(half) > 1 and low <= float(half.std(ddof=1)) <= high
+
+
+@dataclass(frozen=True, eq=False)
+class CriterionStudy:
+    """How coverage and placement hang on the criterion.
+
+    Parameters
+    ----------
+    borders : tuple of RingBorder
+    by_ratio : tuple of SeenByRatio
+    by_delta : tuple of DeltaAnswer
+    by_grid, by_candidates : tuple of Answer
+        Best placements under all spacings, the other spacing as asked for.
+    convergence : Convergence
+        What a tolerance picks.
+    phase, azimuth : Draws
+        The best placement's coverage on grids that lie and turn otherwise, and with beams that begin elsewhere.
+    rechosen : Draws
+        Coverage, on the fine grid, of the placements that such grids lead to.
+    """
+
+    borders: tuple[RingBorder, ...]
+    by_ratio: tuple[SeenByRatio, ...]
+    by_delta: tuple[DeltaAnswer, ...]
+    by_grid: tuple[Answer, ...]
+    by_candidates: tuple[Answer, ...]
+    convergence: Convergence
+    phase: Draws
+    azimuth: Draws
+    rechosen: Draws
+
+
+def criterion_study(
+    geometry: SceneGeometry,
+    settings: SurveySettings,
+    count: int = 4,
+    *,
+    tolerance: float = 0.01,
+    draws: int = 40,
+    seed: int = 0,
+) -> Generator[Progress, None, CriterionStudy]:
+    """Vary what defines visibility, one thing at a time.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : SurveySettings
+        What is asked for; δ is varied for each of its sensor types, at the middle one of its heights.
+    count : int
+        Sensors.
+    tolerance : float
+    draws : int
+        Grids, and azimuths, that are drawn at random.
+    seed : int
+    """
+    goal, random = Goal(count=count), np.random.default_rng(seed)
+    models = settings.models()
+    site = make_site(geometry, settings.candidates, settings.grid_spacing)
+    reach = float(np.hypot(*np.ptp(site.targets.xyz[:, :2], axis=0)))
+    heights = sorted(set(settings.candidates.heights))
+    borders = ring_borders(models, heights, DELTAS, reach)
+
+    yield Progress(0, 0, "targets in view that no beam comes near")
+    by_ratio = tuple(_seen_by_ratio(site, model, settings.visibility) for model in models.values())
+    by_delta: list[DeltaAnswer] = []
+    for key in models:
+        candidates = replace(settings.candidates, sensors=(key,), heights=(heights[len(heights) // 2],))
+        by_delta += yield from _by_delta(geometry, replace(settings, candidates=candidates), goal)
+
+    judge = Judge(geometry, settings, goal)
+    by_grid = []
+    for spacing in GRID_SPACINGS:
+        tried = replace(settings, grid_spacing=spacing)
+        by_grid.append((yield from within(Progress(0, 0, f"targets {spacing:g} m apart"), judge.answer(tried))))
+    by_candidates = []
+    for spacing in CANDIDATE_SPACINGS:
+        tried = replace(settings, candidates=replace(settings.candidates, spacing=spacing))
+        by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), judge.answer(tried))))
+    convergence = yield from coarsest_settings(geometry, settings, goal, tolerance)
+
+    best = yield from judge.plan(site, settings)
+    phase, rechosen = yield from _by_grid_laid(judge, site, settings, best, draws, random)
+    azimuth = yield from _by_azimuth(site, settings, best.deployment, draws, random)
+    return CriterionStudy(
+        borders=borders,
+        by_ratio=by_ratio,
+        by_delta=tuple(by_delta),
+        by_grid=tuple(by_grid),
+        by_candidates=tuple(by_candidates),
+        convergence=convergence,
+        phase=phase,
+        azimuth=azimuth,
+        rechosen=rechosen,
+    )
+
+
+def ring_borders(
+    models: dict[str, LidarModel], heights: Sequence[float], deltas: Sequence[float], reach: float
+) -> tuple[RingBorder, ...]:
+    """Return from where rings on a level road are more than 2δ apart, for each type, height and δ.
+
+    Parameters
+    ----------
+    models : dict of str to LidarModel
+    heights, deltas : sequence of float, metres
+    reach : float, metres
+        Nothing farther away is looked at.
+    """
+    return tuple(
+        RingBorder(key, height, delta, unresolved_from(model, height, delta, min(reach, model.max_range)))
+        for key, model in models.items()
+        for height in heights
+        for delta in deltas
+    )
+
+
+def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float, targets: Float) -> Boolean:
+    """Return to which targets a sensor has a free line of sight, within its range and its channels' elevations.
+
+    Parameters
+    ----------
+    caster : RayCaster
+    model : LidarModel
+    xyz : (3,) float64, metres
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
+    targets : (t, 3) float64, metres
+
+    Returns
+    -------
+    (t,) bool
+    """
+    way = targets - xyz
+    distance = np.linalg.norm(way, axis=1)
+    elevation = np.arcsin(np.clip(way @ orientation[:, 2] / distance, -1.0, 1.0))
+    end, _ = caster.cast(xyz, way / distance[:, None], float(distance.max()) + 1.0)
+    free: Boolean = end >= distance - CLEAR
+    free &= (distance >= model.min_range) & (distance <= model.max_range)
+    free &= (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
+    return free
+
+
+def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle: float) -> Targets:
+    """Lay a grid of targets that is shifted and turned.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    spacing : float, metres
+    shift : (2,) float64
+        In multiples of the spacing.
+    angle : float, radians
+    """
+    middle = np.array(geometry.region.centroid.coords[0])
+    half = math.ceil(math.hypot(*np.ptp(np.reshape(geometry.region.bounds, (2, 2)), axis=0)) / spacing) + 1
+    line = np.arange(-half, half + 1) * spacing
+    x, y = (values.ravel() for values in np.meshgrid(line + shift[0] * spacing, line + shift[1] * spacing))
+    cos, sin = math.cos(angle), math.sin(angle)
+    plan = middle + np.column_stack([x * cos - y * sin, x * sin + y * cos])
+    plan = plan[shapely.contains_xy(geometry.region, plan[:, 0], plan[:, 1])]
+    height = surface_height(plan, joined(geometry.roads))
+    xyz = np.column_stack([plan, height])[np.isfinite(height)]
+    return Targets(xyz, np.ones(len(xyz)), np.zeros(len(xyz), dtype=bool), spacing)
+
+
+def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) -> SeenByRatio:
+    """Count targets in view, and those seen, from upright sensors, by distance in multiples of the border."""
+    caster, look, targets = make_ray_caster(site.triangles), onlooker(site, settings), site.targets.xyz
+    poses = site.candidates
+    total, seen = np.zeros(len(RATIOS) - 1, dtype=int), np.zeros(len(RATIOS) - 1, dtype=int)
+    upright = (poses.sensor == model.key) & (poses.tilt == 0)
+    for height in np.unique(poses.height[upright]):
+        own = np.flatnonzero(upright & (poses.height == height))
+        for pose in own[np.linspace(0, len(own) - 1, PLACES).astype(int)]:
+            xyz, orientation = poses.xyz[pose], poses.orientation(pose)
+            view = in_view(caster, model, xyz, orientation, targets)
+            sees = look.see(model, xyz, orientation) & view
+            ratio = np.hypot(*(targets - xyz)[:, :2].T) / unresolved_from(model, height, settings.delta, math.inf)
+            total += np.histogram(ratio[view], RATIOS)[0]
+            seen += np.histogram(ratio[sees], RATIOS)[0]
+    shares = (Share(int(s), int(t)) if t else None for s, t in zip(seen, total, strict=True))
+    return SeenByRatio(model.key, RATIOS, tuple(shares))
+
+
+def _by_delta(
+    geometry: SceneGeometry, settings: SurveySettings, goal: Goal
+) -> Generator[Progress, None, list[DeltaAnswer]]:
+    """Vary δ for one sensor type at one height."""
+    judge = Judge(geometry, settings, goal)
+    site = make_site(geometry, settings.candidates, settings.grid_spacing)
+    caster = make_ray_caster(site.triangles, settings.engine)
+    (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights
+    asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), judge.plan(site, settings))
+    answers = []
+    for delta in DELTAS:
+        tried = replace(settings, visibility=replace(settings.visibility, delta=delta))
+        plan = yield from within(Progress(0, 0, f"{sensor}: δ = {delta:g} m"), judge.plan(site, tried))
+        sensors = plan.deployment.sensors
+        view = np.any([in_view(caster, s.model, s.xyz, s.orientation, site.targets.xyz) for s in sensors], axis=0)
+        seen = plan.deployment.seen_by > 0
+        moved = _moved(plan.deployment, asked.deployment)
+        coverage = plan.deployment.coverage
+        answers.append(
+            DeltaAnswer(sensor, height, delta, coverage, float((view | seen).mean()), judge.judge(plan), moved)
+        )
+    return answers
+
+
+def _moved(deployment: Deployment, other: Deployment) -> float:
+    """Return the mean distance in plan of sensors to the nearest one of another deployment, in metres."""
+    there = np.array([sensor.xyz[:2] for sensor in other.sensors])
+    gaps = [np.hypot(*(there - sensor.xyz[:2]).T).min() for sensor in deployment.sensors]
+    return float(np.mean(gaps))
+
+
+def _by_grid_laid(
+    judge: Judge,
+    site: Site,
+    settings: SurveySettings,
+    best: Plan,
+    draws: int,
+    random: np.random.Generator,
+) -> Generator[Progress, None, tuple[Draws, Draws]]:
+    """Judge the best placement on grids that lie otherwise; choose anew on a quarter of them."""
+    covered, rechosen = [], []
+    for draw in range(draws):
+        targets = turned_targets(
+            judge.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
+        )
+        laid = replace(site, targets=targets)
+        covered.append(_coverage(laid, settings, best.deployment))
+        step = Progress(draw, draws, "grids of targets laid otherwise")
+        yield step
+        if draw % 4 == 0:
+            plan = yield from within(step, judge.plan(laid, settings))
+            rechosen.append(judge.judge(plan))
+    return Draws("grid phase and angle", np.array(covered)), Draws("placements on such grids", np.array(rechosen))
+
+
+def _coverage(site: Site, settings: SurveySettings, deployment: Deployment, turn: Sequence[float] = ()) -> float:
+    look = onlooker(site, settings.visibility, settings.engine)
+    turns = turn or [0.0] * len(deployment.sensors)
+    seen = [
+        look.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))
+        for sensor, by in zip(deployment.sensors, turns, strict=True)
+    ]
+    return float(np.any(seen, axis=0).mean())
+
+
+def _by_azimuth(
+    site: Site, settings: SurveySettings, deployment: Deployment, draws: int, random: np.random.Generator
+) -> Generator[Progress, None, Draws]:
+    """Let the beams of each sensor begin anywhere within a step of its azimuth."""
+    covered = []
+    for draw in range(draws):
+        yield Progress(draw, draws, "beams that begin elsewhere")
+        turn = [random.uniform(0, 2 * math.pi / s.model.azimuth_count) for s in deployment.sensors]
+        covered.append(_coverage(site, settings, deployment, turn))
+    return Draws("azimuth phase", np.array(covered))
+
+
+def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
+    """Return where the criterion begins to fail; ``delta`` is the one asked for, in metres."""
+    rows = []
+    for by_ratio in study.by_ratio:
+        own = [border for border in study.borders if border.sensor == by_ratio.sensor and border.delta == delta]
+        inside, beyond = _around_border(by_ratio)
+        rows.append(
+            Row(
+                method=f"visibility, {by_ratio.sensor}",
+                regime=f"far targets, δ = {delta:g} m",
+                begins="from " + ", ".join(f"{border.radius:.0f} m at {border.height:g} m height" for border in own),
+                how=f"rings on a level road; of the targets in view {inside} count as seen within, {beyond} beyond",
+                answer="warns, naming type, height and border",
+            )
+        )
+    for by_delta in dict.fromkeys(answer.sensor for answer in study.by_delta):
+        answers = [answer for answer in study.by_delta if answer.sensor == by_delta]
+        least, most = answers[0], answers[-1]
+        rows.append(
+            Row(
+                method=f"coverage, {by_delta} at {least.height:g} m",
+                regime=f"δ from {least.delta:g} to {most.delta:g} m",
+                begins=f"coverage goes from {least.coverage:.1%} to {most.coverage:.1%} of the targets while "
+                f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at most "
+                f"{100 * (max(a.judged for a in answers) - min(a.judged for a in answers)):.1f} points of coverage",
+                how="best placements under each δ, judged under the one asked for",
+                answer="the record holds δ; warns where it cannot resolve the rings",
+            )
+        )
+    for what, tried, picked in (
+        ("grid spacing", study.by_grid, study.convergence.settings.grid_spacing),
+        ("candidate spacing", study.by_candidates, study.convergence.settings.candidates.spacing),
+    ):
+        finest = max(answer.judged for answer in tried)
+        worst = min(tried, key=lambda answer: answer.judged)
+        spacing = worst.grid_spacing if what == "grid spacing" else worst.candidate_spacing
+        rows.append(
+            Row(
+                method="placement",
+                regime=what,
+                begins=f"loses up to {100 * (finest - worst.judged):.2f} points of coverage ({spacing:g} m)",
+                how=f"best placements under each spacing, judged on targets {JUDGED_ON:g} m apart",
+                answer=f"--tolerance {study.convergence.tolerance:g} picks {picked:g} m",
+            )
+        )
+    for draws in (study.phase, study.azimuth, study.rechosen):
+        low, high = draws.spread_interval
+        rows.append(
+            Row(
+                method="coverage",
+                regime=draws.what,
+                begins=f"standard deviation {Estimate(draws.spread, low, high).in_points()}",
+                how=f"{len(draws.coverage)} draws" + ("" if draws.settled else "; half of them say otherwise"),
+                answer="differences of coverage below twice that decide nothing",
+            )
+        )
+    return rows
+
+
+def _around_border(by_ratio: SeenByRatio) -> tuple[str, str]:
+    """Return in words which share counts as seen within the border and beyond it."""
+    inside, beyond = Share(0, 0), Share(0, 0)
+    for edge, share in zip(by_ratio.ratios, by_ratio.seen, strict=False):
+        if share is not None and edge < 1:
+            inside += share
+        elif share is not None:
+            beyond += share
+    said = (f"{share.value:.1%}" if share.trials else "none" for share in (inside, beyond))
+    return next(said), next(said)

@@ -1,0 +1,161 @@
+"""Small scenes that are hard on ray casters, each with the rays that are hardest on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+
+HALF = 10.0
+"""Metres: the street of most scenes reaches so far each way."""
+
+GROUND = 128
+"""The first so many triangles of the street are its ground."""
+
+TURN = 0.37
+"""Radians by which the street is turned about z."""
+
+EYE = np.array([0.3, -0.2, 5.0])
+"""Where rays start in most scenes."""
+
+
+@dataclass(frozen=True, eq=False)
+class HardScene:
+    """A scene and rays.
+
+    Parameters
+    ----------
+    name : str
+    triangles : (n, 3, 3) float64, metres
+    origin : (3,) float64, metres
+    directions : (r, 3) float64
+        Unit vectors.
+    """
+
+    name: str
+    triangles: Float
+    origin: Float
+    directions: Float
+
+
+def hard_scenes(rays: int, random: np.random.Generator) -> list[HardScene]:
+    """Return one scene of each kind that scenes made by hand or read from a map may hold."""
+    street = _street()
+    everywhere = _everywhere(rays, random)
+    plain = HardScene("an ordinary street", street, EYE, everywhere)
+    doubled = np.concatenate([street, street])
+    pavement = _square(HALF, 5) + np.array([0.31, -0.17, 0.0])
+    needles = _needles(120, random)
+    gaps = street[random.random(len(street)) < 0.5]
+    other_way = np.where((np.arange(len(street)) % 2 == 0)[:, None, None], street[:, ::-1], street)
+    skewed = street * (-1.0, 1.0, 1e-3)
+    return [
+        plain,
+        HardScene("rays along shared edges", street, EYE, _towards(_on_inner_edges(street[:GROUND], rays, random))),
+        HardScene("rays through vertices", street, EYE, _towards(_inner_vertices(street[:GROUND], rays, random))),
+        _grazing(rays, random),
+        HardScene("duplicate faces", doubled, EYE, everywhere),
+        HardScene("coplanar faces", np.concatenate([street, pavement]), EYE, everywhere),
+        HardScene("slivers", needles, EYE, _towards(needles[random.integers(0, len(needles), rays)].mean(axis=1))),
+        HardScene("open meshes", gaps, EYE, everywhere),
+        HardScene("inside-out normals", other_way, EYE, everywhere),
+        HardScene("mirrored and badly scaled", skewed, EYE * (-1.0, 1.0, 1e-3), everywhere),
+        HardScene("tiny (20 mm wide)", street * 1e-3, EYE * 1e-3, everywhere),
+        HardScene("huge (20 km wide)", street * 1e3, EYE * 1e3, everywhere),
+    ]
+
+
+def far_away(scene: HardScene, distance: float) -> HardScene:
+    """Return a scene moved in all directions, the computation in float64."""
+    way = distance * np.array([1.0, -1.0, 0.0])
+    return replace(scene, triangles=scene.triangles + way, origin=scene.origin + way)
+
+
+def stored_far_away(scene: HardScene, distance: float) -> HardScene:
+    """Return a scene as Blender keeps it where it is modelled far from its origin: in float32, moved back."""
+    way = distance * np.array([1.0, -1.0, 0.0])
+    stored = (scene.triangles + way).astype(np.float32).astype(np.float64)
+    return replace(scene, triangles=stored - way)
+
+
+def with_stray(scene: HardScene, distance: float) -> HardScene:
+    """Return a scene with one triangle far away, as a mesh that was left behind."""
+    stray = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]) + np.array([distance, 0.0, 0.0])
+    return replace(scene, triangles=np.concatenate([scene.triangles, stray]))
+
+
+def ordinary_scene(rays: int, random: np.random.Generator) -> HardScene:
+    """Return the street that nothing is wrong with."""
+    return HardScene("an ordinary street", _street(), EYE, _everywhere(rays, random))
+
+
+def _street() -> Float:
+    """Return a square of 128 triangles with four boxes on it, turned so that no coordinate is round."""
+    boxes = [_box((x, y), size) for x, y, size in ((4, 5, 2.0), (-6, 3, 1.0), (5, -6, 3.0), (-4, -5, 0.5))]
+    cos, sin = np.cos(TURN), np.sin(TURN)
+    turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    street: Float = np.concatenate([_square(HALF, 8), *boxes]) @ turn
+    return street
+
+
+def _square(half: float, parts: int) -> Float:
+    line = np.linspace(-half, half, parts + 1)
+    x, y = (values.ravel() for values in np.meshgrid(line[:-1], line[:-1], indexing="ij"))
+    step = line[1] - line[0]
+    corner = [np.column_stack([x + a * step, y + b * step, 0 * x]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    return np.concatenate([np.stack([corner[i] for i in face], axis=1) for face in ((0, 1, 2), (0, 2, 3))])
+
+
+def _box(place: tuple[float, float], size: float) -> Float:
+    corner = np.array([[(i >> axis) & 1 for axis in range(3)] for i in range(8)]) * size - (size / 2, size / 2, 0)
+    quads = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
+    triangles: Float = corner[np.array(faces)] + (*place, 0.0)
+    return triangles
+
+
+def _needles(count: int, random: np.random.Generator) -> Float:
+    """Triangles some metres long and a millimetre to a hundredth of one wide."""
+    start = random.uniform((-HALF, -HALF, 0), (HALF, HALF, 3), (count, 3))
+    along = random.normal(0, 3, (count, 3))
+    width = 10 ** random.uniform(-5, -3, (count, 1)) * random.normal(0, 1, (count, 3))
+    return np.stack([start, start + along, start + along / 2 + width], axis=1)
+
+
+def _grazing(rays: int, random: np.random.Generator) -> HardScene:
+    """Rays that meet a level road at 0.06° to 6°."""
+    road = _square(HALF, 8) * (50.0, 1.0, 1.0)
+    eye = np.array([-490.0, 0.1, 0.5])
+    reach = np.minimum(eye[2] / np.tan(10 ** random.uniform(-3, -1, rays)), 950.0)
+    aim = np.column_stack([eye[0] + reach, random.uniform(-HALF, HALF, rays), np.zeros(rays)])
+    return HardScene("grazing rays", road, eye, _towards(aim, eye))
+
+
+def _everywhere(rays: int, random: np.random.Generator) -> Float:
+    directions = random.normal(0, 1, (rays, 3))
+    directions[:, 2] = -np.abs(directions[:, 2])
+    unit: Float = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return unit
+
+
+def _on_inner_edges(ground: Float, count: int, random: np.random.Generator) -> Float:
+    """Points on sides that two triangles share, (count, 3): the diagonals of the squares."""
+    which, share = random.integers(0, len(ground) // 2, count), random.random((count, 1))
+    points: Float = ground[which, 0] * (1 - share) + ground[which, 2] * share
+    return points
+
+
+def _inner_vertices(ground: Float, count: int, random: np.random.Generator) -> Float:
+    """Corners off the ground's border, (count, 3)."""
+    corners = np.unique(ground.reshape(-1, 3), axis=0)
+    inner = corners[np.linalg.norm(corners, axis=1) < HALF * 0.99]
+    picked: Float = inner[random.integers(0, len(inner), count)]
+    return picked
+
+
+def _towards(points: Float, eye: Float = EYE) -> Float:
+    way = points - eye
+    unit: Float = way / np.linalg.norm(way, axis=1, keepdims=True)
+    return unit

@@ -1,0 +1,91 @@
+"""The page of stability: where each method begins to fail, chapter by chapter, as Markdown; chapters as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from seip_addon.core.storage.files import save_json, whole_file
+
+from .rows import Row
+
+SCHEMA, VERSION = "seip.stability", 1
+
+HEADINGS = ("Method", "Driven by", "Begins to fail", "How found", "What the tool does")
+"""Of the columns: the fields of a row, in their order."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A picture beside the rows.
+
+    Parameters
+    ----------
+    file : str
+        Its name in the folder of charts.
+    caption : str
+    """
+
+    file: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What one study found.
+
+    Parameters
+    ----------
+    title : str
+    rows : tuple of Row
+    charts : tuple of Chart
+    """
+
+    title: str
+    rows: tuple[Row, ...]
+    charts: tuple[Chart, ...]
+
+
+def save_chapter(path: Path, chapter: Chapter, key: str) -> None:
+    """Write a chapter as JSON, with a key for all that it was made from."""
+    save_json(path, {"schema": SCHEMA, "version": VERSION, "key": key, **asdict(chapter)})
+
+
+def load_chapter(path: Path, key: str) -> Chapter | None:
+    """Read a chapter; None where there is none, or one that was made from something else."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if (kept["schema"], kept["version"], kept["key"]) != (SCHEMA, VERSION, key):
+            return None
+        rows = tuple(Row(**row) for row in kept["rows"])
+        return Chapter(kept["title"], rows, tuple(Chart(**chart) for chart in kept["charts"]))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def save_page(path: Path, lead: str, chapters: Sequence[Chapter], charts: str) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    path : path
+    lead : str
+        What stands before the first chapter.
+    chapters : sequence of Chapter
+    charts : str
+        Folder of the charts, seen from the page.
+    """
+    parts = ["# Stability", lead]
+    for chapter in chapters:
+        parts += [f"## {chapter.title}", _table(chapter.rows)]
+        parts += [f"![{chart.caption}]({charts}/{chart.file})\n\n{chart.caption}" for chart in chapter.charts]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def _table(rows: Sequence[Row]) -> str:
+    lines = [HEADINGS, ("---",) * len(HEADINGS)]
+    lines += [tuple(getattr(row, field.name) for field in fields(Row)) for row in rows]
+    return "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in lines)

@@ -1,0 +1,104 @@
+"""Studies of robustness as rows of the page of stability."""
+
+import numpy as np
+
+from seip_addon.core.robustness.estimates import mean_of
+from seip_addon.core.robustness.pose_study import PoseStudy
+from seip_addon.core.robustness.robust_study import RobustStudy
+from seip_addon.core.robustness.traffic_study import MOSTLY, NOTABLE, WHAT, TrafficStudy
+
+from .rows import Row
+
+
+def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
+    """Return what the study says as rows of the page of stability."""
+    errors, settings = study.settings.errors, study.settings
+    losses, kinds = study.loss_by_sensor(), study.loss_by_kind()
+    worst, certain = study.worst_sensor()
+    regime = (
+        f"σ {errors.position:g} m in x and y, {errors.height:g} m in height, {np.degrees(errors.yaw):.3g}° in yaw, "
+        f"{np.degrees(errors.tilt):.3g}° in pitch and roll"
+    )
+    rows = [
+        Row(
+            "coverage of a placement",
+            regime,
+            f"planned {study.planned.whole[0]:.2%}; 5 % quantile {study.quantile(0.05).in_words()}, "
+            f"mean {mean_of(study.together.whole).in_words()}",
+            f"{settings.draws} draws, all sensors erring; half of them "
+            f"{'say the same' if study.is_converged() else 'say something else: take more'}",
+            "placement over pose scenarios; `--pose-errors` says what the 5 % quantile loses",
+        ),
+        Row(
+            "a sensor's own error",
+            regime,
+            f"{worst} costs most{'' if certain else ', though not for certain'}: "
+            + ", ".join(f"{label} {loss.in_points()}" for label, loss in zip(study.labels, losses, strict=True)),
+            "mean loss of coverage when one sensor alone errs, the same draws",
+            "the warning names the sensor",
+        ),
+    ]
+    if kinds:
+        costly = max(kinds, key=lambda kind: kinds[kind].value)
+        rows.append(
+            Row(
+                "a kind of error",
+                regime,
+                f"{costly} costs most: " + ", ".join(f"{kind} {loss.in_points()}" for kind, loss in kinds.items()),
+                f"mean loss of coverage, each kind alone, {settings.draws_of_kind} draws",
+                "set what the installer must hold to by the costly kind first",
+            )
+        )
+    return tuple(rows)
+
+
+def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
+    """Return what the study says as a row of the page of stability for each placement."""
+    settings, errors = study.settings, study.settings.errors
+    regime = f"σ {errors.position:g} m, {np.degrees(errors.tilt):.3g}°; {settings.scenarios} scenarios"
+    return tuple(
+        Row(
+            f"placement for {contender.name}",
+            regime,
+            f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
+            f"{contender.judged_by.outcome_in_words()} {contender.low.in_words()} against "
+            f"{study.beside(contender).low.in_words()} of the nominal optimum: "
+            f"{study.saving(contender).in_points()} more",
+            f"{settings.unseen} draws that nothing was chosen on; half of them "
+            f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
+            f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
+        )
+        for contender in study.robust
+    )
+
+
+def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
+    """Return what the study says as rows of the page of stability."""
+    regime = f"{study.road_users:.0f} road users at a time"
+    stretch = study.empty.seen[study.layer].stretch
+    how = (
+        f"{len(stretch)} instants in {len(np.unique(stretch))} stretches of time, of runs that nothing was chosen on; "
+        f"every other one {'says the same' if study.is_converged() else 'says something else: take more'}"
+    )
+    losses = tuple(
+        Row(
+            f"view of the {WHAT[layer]}",
+            regime,
+            f"of the targets' weight the empty road promises {seen.empty:.2%} and traffic leaves "
+            f"{seen.held.in_words()} on average over time; of what the empty road promises vehicles hide "
+            f"{seen.hidden.in_words()}, and {seen.rarely:.1%} of its targets are seen less than {MOSTLY:.0%} of the "
+            "time",
+            how,
+            f"a warning where {NOTABLE:.0%} of the weight or more is lost, and a map of the share of time",
+        )
+        for layer, seen in study.empty.seen.items()
+    )
+    gain = Row(
+        f"placement for the empty road, to see the {WHAT[study.layer]}",
+        regime,
+        f"placing on traffic holds {study.traffic.seen[study.layer].held.in_words()}, "
+        f"{study.won(study.layer).in_points()} more",
+        f"chosen on {study.chosen_at} instants; {how}",
+        f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
+    )
+    return (*losses, gain)

@@ -1,0 +1,103 @@
+"""Work in a thread that is looked at from time to time and never waited for: what a window needs to stay responsive."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Generator
+from concurrent.futures import CancelledError, Future
+from contextlib import closing
+from typing import Generic, TypeVar
+
+from .core.progress import Progress
+
+Result = TypeVar("Result")
+
+
+class Background(Generic[Result]):
+    """Runs steps in a thread of its own, from now on.
+
+    Parameters
+    ----------
+    steps : generator of Progress
+        Stopped at its next report, and closed, once somebody asks for that.
+
+    Attributes
+    ----------
+    progress : Progress
+        The last report.
+    """
+
+    def __init__(self, steps: Generator[Progress, None, Result]) -> None:
+        self.progress = Progress(0, 0, "begin")
+        self._stop = threading.Event()
+        self._pace = Pace()
+        self._end: Future[Result] = Future()
+        self._thread = threading.Thread(target=self._run, args=(steps,), daemon=True)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is a result, or an error in its place."""
+        return self._end.done()
+
+    @property
+    def seconds_left(self) -> float | None:
+        """How long it will take still, or None where nothing tells."""
+        return self._pace.seconds_left
+
+    def result(self) -> Result:
+        """Return the result, or raise what went wrong; waits for the end."""
+        return self._end.result()
+
+    def stop(self) -> None:
+        """Ask the work to end at its next report, and return at once."""
+        self._stop.set()
+
+    def join(self, seconds: float) -> bool:
+        """Wait for the thread to end, no longer than some seconds; return whether it did."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def _run(self, steps: Generator[Progress, None, Result]) -> None:
+        try:
+            with closing(steps):
+                result = self._step_through(steps)
+        except BaseException as error:  # noqa: BLE001  # raised again where the result is asked for
+            self._end.set_exception(error)
+        else:
+            self._end.set_result(result)
+
+    def _step_through(self, steps: Generator[Progress, None, Result]) -> Result:
+        while not self._stop.is_set():
+            try:
+                self.progress = next(steps)
+            except StopIteration as stop:
+                result: Result = stop.value
+                return result
+            self._pace.note(self.progress, time.monotonic())
+        raise CancelledError
+
+
+class Pace:
+    """How fast work goes, from its reports: each kind of work has a pace of its own."""
+
+    def __init__(self) -> None:
+        self._first: Progress | None = None
+        self._since = 0.0
+        self.seconds_left: float | None = None
+
+    def note(self, progress: Progress, now: float) -> None:
+        """Take a report.
+
+        Parameters
+        ----------
+        progress : Progress
+        now : float, seconds
+            Reading of a monotonic clock.
+        """
+        if self._first is None or self._first.what != progress.what:
+            self._first, self._since, self.seconds_left = progress, now, None
+        gained = progress.done - self._first.done
+        if gained > 0:
+            self.seconds_left = (progress.total - progress.done) * (now - self._since) / gained

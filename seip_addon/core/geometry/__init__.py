@@ -1,0 +1,1 @@
+"""Plane and solid geometry: orientations, polygons in plan, winding numbers."""

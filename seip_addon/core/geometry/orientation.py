@@ -1,0 +1,89 @@
+r"""How a sensor is turned: from its own axes (x along azimuth zero, z up along its axis) to the site's.
+
+A sensor of yaw ψ, tilt θ and roll φ is turned as
+
+.. math::
+    R = R_z(ψ)\, R_y(θ)\, R_x(φ):
+
+first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by θ,
+about the new y axis, so that the ray of azimuth zero and elevation zero points θ
+below the horizon; then it rolls about the new x axis.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays import Float
+
+STRAIGHT = 1 - 1e-12
+"""Sine of the tilt from which a sensor looks straight down, or up."""
+
+
+def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
+    """Return rotations from sensors' axes to the site's.
+
+    Parameters
+    ----------
+    yaw, tilt, roll : (...) float64, radians
+        Of one shape. Positive tilts are nose down.
+
+    Returns
+    -------
+    (..., 3, 3) float64
+    """
+    sin_yaw, cos_yaw = np.sin(yaw), np.cos(yaw)
+    sin_tilt, cos_tilt = np.sin(tilt), np.cos(tilt)
+    sin_roll, cos_roll = np.sin(roll), np.cos(roll)
+    rows = [
+        [
+            cos_yaw * cos_tilt,
+            cos_yaw * sin_tilt * sin_roll - sin_yaw * cos_roll,
+            cos_yaw * sin_tilt * cos_roll + sin_yaw * sin_roll,
+        ],
+        [
+            sin_yaw * cos_tilt,
+            sin_yaw * sin_tilt * sin_roll + cos_yaw * cos_roll,
+            sin_yaw * sin_tilt * cos_roll - cos_yaw * sin_roll,
+        ],
+        [-sin_tilt, cos_tilt * sin_roll, cos_tilt * cos_roll],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def orientation(yaw: float, tilt: float, roll: float = 0.0) -> Float:
+    """Return the rotation of one sensor, (3, 3) float64; see `orientations`."""
+    return orientations(np.array(yaw), np.array(tilt), np.array(roll))
+
+
+def angles_of(matrix: Float) -> tuple[float, float, float]:
+    """Return yaw, tilt and roll (radians) of a rotation (3, 3) from a sensor's axes to the site's."""
+    tilt = math.atan2(-matrix[2, 0], math.hypot(matrix[0, 0], matrix[1, 0]))
+    if abs(matrix[2, 0]) > STRAIGHT:  # straight down or up: yaw and roll turn about one axis
+        return math.atan2(-matrix[0, 1], matrix[1, 1]), tilt, 0.0
+    return math.atan2(matrix[1, 0], matrix[0, 0]), tilt, math.atan2(matrix[2, 1], matrix[2, 2])
+
+
+def turned(vectors: Float, matrix: Float) -> Float:
+    """Return the products of a matrix and each vector.
+
+    They are the same bits in every batch, which those of a matrix product need not be.
+
+    Parameters
+    ----------
+    vectors : (n, 3) float64
+    matrix : (3, 3) float64
+
+    Returns
+    -------
+    (n, 3) float64
+    """
+    x, y, z = vectors.T
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=1)
+
+
+def tilt_in_words(tilt: float) -> str:
+    """Return a tilt as words to be put after a height: empty for a sensor that hangs upright."""
+    return f", tilted {np.degrees(tilt):.3g}°" if tilt else ""

@@ -1,0 +1,103 @@
+"""Triangles seen in plan: their areas, their outline, and heights on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Boolean, Float, Integer
+
+LEAST_AREA = 1e-9
+"""Square metres in plan below which a triangle stands on edge and covers nothing."""
+
+_OVERLAY_GRID = 1e-4
+
+_SEAM = 1e-6
+"""Slack in barycentric coordinates, so that no point falls between two triangles."""
+
+
+def signed_area(triangles: Float) -> Float:
+    """Return the areas (n,) of triangles (n, 3, 2 or 3) in plan, above zero where they turn counter-clockwise."""
+    along, across = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    area: Float = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / 2
+    return area
+
+
+def outline(triangles: Float, grid: float = 1e-3) -> BaseGeometry:
+    """Return the union in plan of triangles (n, 3, 2 or 3), corners rounded to a grid in metres."""
+    lying = triangles[np.abs(signed_area(triangles)) > LEAST_AREA, :, :2]
+    return shapely.union_all(shapely.polygons(lying), grid_size=grid)
+
+
+def without(area: BaseGeometry, away: BaseGeometry) -> BaseGeometry:
+    """Return an area (or lines) in plan without another; where rounding makes that fail, on a grid of 0.1 mm."""
+    try:
+        return area.difference(away)
+    except shapely.errors.GEOSException:
+        sound = area.buffer(0) if shapely.get_dimensions(area) == 2 else area
+        return shapely.difference(sound, away.buffer(0), grid_size=_OVERLAY_GRID)
+
+
+def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
+    """Return an area in plan with cracks and gaps up to twice ``gap`` metres filled."""
+    return area.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
+
+
+def plane_height(triangles: Float, plan: Float) -> Float:
+    """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    offset = plan - triangles[:, 0, :2]
+    height: Float = triangles[:, 0, 2] - (normal[:, :2] * offset).sum(axis=1) / normal[:, 2]
+    return height
+
+
+def surface_height(plan: Float, triangles: Float) -> Float:
+    """Height of the highest surface over each plan point.
+
+    Parameters
+    ----------
+    plan : (n, 2) float64, metres
+    triangles : (m, 3, 3) float64, metres
+
+    Returns
+    -------
+    (n,) float64, metres
+        NaN where no triangle lies over or under the point.
+    """
+    point, heights = heights_over(plan, triangles)
+    height = np.full(len(plan), -np.inf)
+    np.maximum.at(height, point, heights)
+    height[np.isneginf(height)] = np.nan
+    return height
+
+
+def heights_over(plan: Float, triangles: Float) -> tuple[Integer, Float]:
+    """Heights of all surfaces over or under each plan point.
+
+    Parameters
+    ----------
+    plan : (n, 2) float64, metres
+    triangles : (m, 3, 3) float64, metres
+
+    Returns
+    -------
+    point : (k,) int64
+        Index of a plan point; one may come several times, or not at all.
+    height : (k,) float64, metres
+        Of a surface there.
+    """
+    lying = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
+    low, high = lying[:, :, :2].min(axis=1), lying[:, :, :2].max(axis=1)
+    tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
+    point, near = tree.query(shapely.points(plan), predicate="intersects")
+    above = _covers(lying[near], plan[point])
+    return point[above], plane_height(lying[near[above]], plan[point[above]])
+
+
+def _covers(triangles: Float, plan: Float) -> Boolean:
+    """Whether each triangle (n, 3, 3) lies over or under its point (n, 2), by barycentric coordinates."""
+    corners = triangles[:, :, :2]
+    opposite = [signed_area(np.stack([corners[:, i], corners[:, i - 2], plan], axis=1)) for i in range(3)]
+    inside: Boolean = (np.stack(opposite) / signed_area(triangles) >= -_SEAM).all(axis=0)
+    return inside

@@ -1,0 +1,178 @@
+"""The cheapest placement that reaches a coverage: partial set covering."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Float, Integer
+from ..errors import SeipError
+from ..progress import Progress
+from .bounds import bound_from, can_reach, lagrangian_bound, least_price
+from .clock import Clock
+from .feasibility import starting_choice
+from .greedy import greedy, greedy_and_exchange, without_idle
+from .instance import Instance, common_unit, make_instance
+from .integer_program import check_solver, reaching
+from .problem import TIE, Placement, PlacementProblem, record_choice, relative_gap
+from .scale_notes import scale_notes
+from .solver import prove, solve_within
+from .ties import fewest
+
+FINISH = 1.0
+"""Seconds, or units of work, that choosing among equally cheap placements may always take."""
+
+
+def cheapest_for_coverage(
+    problem: PlacementProblem,
+    coverage: float,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
+) -> Generator[Progress, None, Placement]:
+    """Choose the cheapest placement that covers a share of all weight.
+
+    Among the cheapest the one that covers most is returned, and among those
+    the one that `solve` prefers. Where all prices are equal, zero included,
+    the number of sensors stands for the price: the placement has the fewest
+    that suffice. The result's objective, bound and gap are prices.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        Its number of sensors and budget limit the placement where they are given.
+    coverage : float
+        Share of the weight of all targets, above 0 and at most 1.
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+    effort : float, units of work
+        As for `solve`.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Placement
+
+    Raises
+    ------
+    SeipError
+        The coverage cannot be reached, with the highest one that can; or as for `solve`.
+    """
+    if not 0 < coverage <= 1:
+        raise SeipError(f"the coverage to reach is {coverage:g}; give a share above 0 and at most 1")
+    clock = Clock(time_limit, effort)
+    check_solver(solver)
+    instance, factor = make_instance(problem)
+    whole = math.fsum(problem.weights) * factor
+    goal = instance.attainable(coverage * whole)
+    chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
+    chosen = without_idle(instance, chosen, goal)
+    if problem.prices.any():
+        cheapest, bound = yield from _cheapest(instance, chosen, goal, solver, clock)
+    else:
+        cheapest, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        bound = 0.0 if proven else -math.inf
+    finishing = clock.part(clock.elapsed, FINISH)  # no longer than it took to find the price
+    best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
+    reached = best.covered * factor >= goal - instance.margin
+    chosen = best.chosen if reached else instance.original[cheapest]
+    return _record(problem, chosen, bound, best, clock)
+
+
+def _reaching(
+    problem: PlacementProblem, instance: Instance, goal: float, whole: float, solver: str, clock: Clock
+) -> Generator[Progress, None, Integer]:
+    """Return some placement that reaches the goal."""
+    start = yield from starting_choice(problem, instance, solver)
+    chosen, _ = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
+    if instance.covered(chosen) >= goal - instance.slack:
+        return chosen
+    first = yield from greedy_and_exchange(instance, start)
+    proof = yield from prove(instance, first, solver, clock)
+    covered = instance.covered(proof.chosen)
+    if covered >= goal - instance.slack:
+        return proof.chosen
+    wanted = f"a coverage of {goal / whole:.2%}"
+    if instance.attained(proof.bound) < goal - instance.slack:
+        raise SeipError(
+            f"{wanted} cannot be reached: no placement covers more than {proof.bound / whole:.2%}; "
+            "ask for less, or allow more or better sensors"
+        )
+    raise SeipError(
+        f"no placement with {wanted} was found in {clock.seconds:.0f} s: the best one covers {covered / whole:.2%}; "
+        "ask for less or raise the time limit"
+    )
+
+
+def _cheapest(
+    instance: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Integer, float]]:
+    """Return the cheapest placement that reaches the goal and a lower bound on the price of any."""
+    price = math.fsum(instance.price[chosen])
+    if price == 0:
+        return chosen, price
+    no_dearer = replace(instance, budget=min(price, instance.budget))
+    keep, bound = yield from lagrangian_bound(no_dearer, goal, clock)
+    least = min(price, max(least_price(instance.of(keep), bound, goal), float(instance.price.min())))
+    if np.ptp(instance.price) == 0:
+        chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
+        price = math.fsum(instance.price[chosen])
+        single = float(instance.price[0])
+        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
+    cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
+    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    keep, cheaper = keep[within], cheaper.part(within)
+    if len(keep) == 0:
+        return chosen, price
+    yield Progress(0, 0, f"looking for a cheaper placement among {len(keep)} candidates")
+    program = reaching(cheaper, goal)
+    outcome = yield from program.maximise(-1 * program.price, solver, clock)
+    if outcome.chosen is not None:
+        chosen, price = keep[outcome.chosen], math.fsum(instance.price[keep[outcome.chosen]])
+    if outcome.finished:
+        return chosen, price
+    return chosen, min(price, max(least, -outcome.bound / program.price_scale))
+
+
+def _below(price: float, prices: Float) -> float:
+    """Return a budget that any lower total price meets, and that is as far below the price as it can be."""
+    unit, whole = common_unit(prices[prices > 0])
+    return price - unit / 2 if whole else price * (1 - 3 * TIE)
+
+
+def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
+    """Return the problem of covering most for the price of the cheapest placement."""
+    if np.ptp(instance.price) == 0 and (instance.price.any() or not problem.prices.any()):
+        return replace(problem, count=len(cheapest))
+    return replace(problem, budget=math.fsum(instance.price[cheapest]))
+
+
+def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
+    record = record_choice(
+        problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.seconds, notes=()
+    )
+    price = record.price
+    optimal = bound >= price * (1 - 3 * TIE)
+    notes = [*scale_notes(problem)]
+    if not optimal:
+        notes.append(
+            "the time was too short to prove this placement the cheapest: the gap says how much dearer it may be"
+        )
+    if best.status != "optimal":
+        notes.append("among equally cheap placements another one may cover more")
+    return replace(
+        record,
+        objective=price,
+        bound=price if optimal else max(bound, 0.0),
+        gap=0.0 if optimal else relative_gap(price, max(bound, 0.0)),
+        status="optimal" if optimal else "feasible",
+        notes=tuple(notes),
+    )

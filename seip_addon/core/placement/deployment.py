@@ -1,0 +1,200 @@
+"""The chosen sensors and what they see: the one thing that every table, file and picture is drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
+from ..geometry.orientation import orientation
+from ..lidar import LidarModel
+from ..site.site import Site
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """One chosen sensor.
+
+    Parameters
+    ----------
+    label : str
+        ``S1``, ``S2``, … in the order in which each adds the most to those before it.
+    pose : int or None
+        Index among the site's candidates; None where a hand has put it elsewhere.
+    model : LidarModel
+        What hangs there.
+    position_name : str
+        Name of the pole, or of the sampled place on the sidewalk.
+    on_pole : bool
+        Whether it hangs at an existing pole.
+    foot : (3,) float64, metres
+        Ground point of the position, local site axes.
+    xyz : (3,) float64, metres
+        Optical centre, local site axes.
+    height : float, metres
+        Height above the ground point.
+    yaw : float, radians
+        Direction of azimuth zero, counter-clockwise from +x.
+    tilt : float, radians
+        How far azimuth zero is turned down.
+    alone : float
+        Share of the targets that it sees.
+    added : float
+        Share of the targets that it sees and no sensor before it does; they add up to the whole coverage.
+    marginal : float
+        Share of the targets that it alone sees: what is lost without it.
+    roll : float, radians
+        How far it is rolled about its azimuth zero; only a hand does that.
+    """
+
+    label: str
+    pose: int | None
+    model: LidarModel
+    position_name: str
+    on_pole: bool
+    foot: Float
+    xyz: Float
+    height: float
+    yaw: float
+    tilt: float
+    alone: float = 0.0
+    added: float = 0.0
+    marginal: float = 0.0
+    roll: float = 0.0
+
+    @property
+    def orientation(self) -> Float:
+        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
+        return orientation(self.yaw, self.tilt, self.roll)
+
+
+@dataclass(frozen=True, eq=False)
+class Deployment:
+    """The chosen sensors and what they see together.
+
+    Parameters
+    ----------
+    sensors : tuple of Sensor
+        In the order of their labels.
+    seen_by : (t,) int64
+        How many of the sensors see each target.
+    coverage : float
+        Share of the targets that some sensor sees.
+    seen_twice : float
+        Share of the targets that two sensors or more see.
+    central : float or None
+        Coverage of the targets in weighted regions; None where there are none.
+    weighted : float
+        Share of the targets' weight that is seen.
+    price : float, dollars
+        Of all sensors together.
+    """
+
+    sensors: tuple[Sensor, ...]
+    seen_by: Integer
+    coverage: float
+    seen_twice: float
+    central: float | None
+    weighted: float
+    price: float
+
+
+def deploy(
+    site: Site, models: Mapping[str, LidarModel], visible: Boolean, chosen: Sequence[int] | Integer
+) -> Deployment:
+    """Return the chosen poses as sensors, with what they see.
+
+    Parameters
+    ----------
+    site : Site
+    models : mapping of str to LidarModel
+        The sensor types by catalogue key.
+    visible : (c, t) bool
+        Which pose sees which target.
+    chosen : (k,) int
+        Indices of the chosen poses; their order breaks ties between labels.
+
+    Returns
+    -------
+    Deployment
+    """
+    order = _by_added_coverage(visible, chosen)
+    hung = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
+    return deployed(site, hung, visible[order])
+
+
+def deployed(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
+    """Return sensors with what they see, each and together.
+
+    Parameters
+    ----------
+    site : Site
+    hung : sequence of Sensor
+        In the order in which each adds to those before it; their own shares are not looked at.
+    rows : (k, t) bool
+        What each of them sees.
+
+    Returns
+    -------
+    Deployment
+    """
+    seen_by = rows.sum(axis=0, dtype=np.int64)
+    seen = seen_by > 0
+    before: Integer = np.cumsum(rows, axis=0) - rows
+    targets = site.targets
+    sensors = tuple(
+        replace(sensor, alone=_share(row), added=_share(row & (earlier == 0)), marginal=_share(row & (seen_by == 1)))
+        for sensor, row, earlier in zip(hung, rows, before, strict=True)
+    )
+    return Deployment(
+        sensors=sensors,
+        seen_by=seen_by,
+        coverage=_share(seen),
+        seen_twice=_share(seen_by > 1),
+        central=_share(seen[targets.central]) if targets.central.any() else None,
+        weighted=weighted_share(seen, targets.weight),
+        price=float(sum(sensor.model.price for sensor in sensors)),
+    )
+
+
+def weighted_share(seen: Boolean, weight: Float) -> float:
+    """Return the share of the weight that is seen; zero where all weights are zero."""
+    total = float(weight.sum())
+    return float(weight[seen].sum()) / total if total > 0.0 else 0.0
+
+
+def _by_added_coverage(visible: Boolean, chosen: Sequence[int] | Integer) -> Integer:
+    """Order the chosen poses so that each adds the most targets to those before it."""
+    left = [int(pose) for pose in chosen]
+    unseen = np.ones(visible.shape[1], dtype=bool)
+    order: list[int] = []
+    while left:
+        best = max(left, key=lambda pose: int((visible[pose] & unseen).sum()))
+        left.remove(best)
+        order.append(best)
+        unseen &= ~visible[best]
+    return np.array(order, dtype=np.int64)
+
+
+def sensor_at(site: Site, models: Mapping[str, LidarModel], label: str, pose: int) -> Sensor:
+    """Return the sensor at a candidate pose, without what it sees."""
+    candidates = site.candidates
+    position = int(candidates.position_of[pose])
+    return Sensor(
+        label=label,
+        pose=pose,
+        model=models[str(candidates.sensor[pose])],
+        position_name=str(candidates.position_name[position]),
+        on_pole=bool(candidates.on_pole[position]),
+        foot=candidates.position[position],
+        xyz=candidates.xyz[pose],
+        height=float(candidates.height[pose]),
+        yaw=float(candidates.yaw[pose]),
+        tilt=float(candidates.tilt[pose]),
+    )
+
+
+def _share(these: Boolean) -> float:
+    return float(np.count_nonzero(these)) / len(these)

@@ -1,0 +1,246 @@
+"""What a user asks of a placement, and the problem that it makes of a site."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SeipError
+from ..lidar import LidarModel
+from ..progress import Progress
+from ..site.site import Candidates, Site
+from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
+from .deployment import Deployment, deploy
+
+DEFAULT_COUNT = 4
+"""Sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four."""
+
+
+MOVED = "moved by hand"
+"""Status of a placement whose sensors hang where a hand has put them."""
+MOVED_SENTENCE = "Moved by hand: judged where the sensors hang; nothing is proven of it."
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is asked for: the most coverage for N sensors or a budget, or a coverage for the least money.
+
+    Parameters
+    ----------
+    count : int, optional
+        N, the largest number of sensors.
+    budget : float, dollars, optional
+        The largest total price.
+    coverage : float, optional
+        Share (0 to 1] of the weight to be seen at the least price; the reverse problem.
+    central_weight : float or "scene", optional
+        The weighted problem: weight of the targets in weighted regions, or the scene's own weights. Without it
+        all targets count alike: the vanilla problem.
+    min_distance : float, metres
+        Least distance between two sensors.
+    forbidden, mandatory : tuple of str
+        Names of positions that must not, and that must, carry a sensor.
+    """
+
+    count: int | None = None
+    budget: float | None = None
+    coverage: float | None = None
+    central_weight: float | Literal["scene"] | None = None
+    min_distance: float = 0.0
+    forbidden: tuple[str, ...] = ()
+    mandatory: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("budget", "min_distance"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value >= 0):
+                raise SeipError(f"the {name.replace('_', ' ')} must be a finite number of at least 0, not {value}")
+        if self.coverage is not None and not 0 < self.coverage <= 1:
+            raise SeipError(f"the coverage to reach must be a share above 0 and at most 1, not {self.coverage:g}")
+        weight = self.central_weight
+        if isinstance(weight, float | int) and not (math.isfinite(weight) and weight > 0):
+            raise SeipError(f"the central weight must be a positive number, not {weight}")
+        both = sorted(set(self.forbidden) & set(self.mandatory))
+        if both:
+            raise SeipError(f"position {both[0]!r} is both forbidden and mandatory: take it out of one of the two")
+
+    @property
+    def weighted(self) -> bool:
+        """Whether this is the weighted problem."""
+        return self.central_weight is not None
+
+    @property
+    def cheapest(self) -> bool:
+        """Whether this is the reverse problem, whose objective is a price."""
+        return self.coverage is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """An answer to a goal.
+
+    Parameters
+    ----------
+    goal : Goal
+        With the number of sensors filled in where none was asked for.
+    placement : Placement
+        With its certificate.
+    greedy : Placement or None
+        The greedy answer to the same question; None for the reverse problem.
+    deployment : Deployment
+        The chosen sensors and what they see.
+    """
+
+    goal: Goal
+    placement: Placement
+    greedy: Placement | None
+    deployment: Deployment
+
+    @property
+    def certificate(self) -> str:
+        """How good the placement provably is, as a sentence."""
+        if self.placement.status == MOVED:
+            return MOVED_SENTENCE
+        best = "cheapest" if self.goal.cheapest else "best"
+        if self.placement.status == "optimal":
+            return f"Proven: the {best} placement that there is among these candidates."
+        return f"Within {self.placement.gap:.2%} of the {best} placement possible among these candidates."
+
+
+def target_weights(site: Site, goal: Goal) -> NDArray[np.float64]:
+    """Weight of each target under a goal, (t,) float64."""
+    if goal.central_weight is None:
+        return np.ones(len(site.targets))
+    if not site.targets.central.any():
+        raise SeipError("the weighted problem needs a weighted region: draw one in SEIP Weighted Regions")
+    if goal.central_weight == "scene":
+        return site.targets.weight
+    return np.where(site.targets.central, goal.central_weight, 1.0)
+
+
+def placement_problem(
+    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], goal: Goal
+) -> PlacementProblem:
+    """State a goal on a site as a maximal covering location problem.
+
+    Parameters
+    ----------
+    site : Site
+    visible : (c, t) bool
+        The visibility grid.
+    models : mapping of str to LidarModel
+        By catalogue key.
+    goal : Goal
+
+    Returns
+    -------
+    PlacementProblem
+
+    Raises
+    ------
+    SeipError
+        The goal contradicts itself or the site.
+    """
+    candidates = site.candidates
+    demanded = np.array([_named(candidates, name) for name in goal.mandatory], dtype=bool)
+    groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
+    forbidden = np.zeros(len(candidates.position), dtype=bool)
+    for name in goal.forbidden:
+        forbidden |= _named(candidates, name)
+    return PlacementProblem(
+        visible=visible,
+        weights=target_weights(site, goal),
+        prices=np.array([models[key].price for key in candidates.sensor]),
+        positions=candidates.position_of,
+        xyz=candidates.xyz,
+        labels=candidates.sensor,
+        mandatory=groups[:, candidates.position_of],
+        mandatory_names=np.concatenate((candidates.mandatory_name, np.array(goal.mandatory, dtype=np.str_))),
+        forbidden=forbidden[candidates.position_of],
+        count=with_count(goal, site).count,
+        budget=goal.budget,
+        min_distance=goal.min_distance,
+    )
+
+
+def check_goal(site: Site, models: Mapping[str, LidarModel], goal: Goal) -> None:
+    """Raise SeipError where a site can be seen not to allow a goal before any ray is cast."""
+    everything = np.ones((len(site.candidates), len(site.targets)), dtype=bool)
+    placement_problem(site, everything, models, goal)
+
+
+def make_plan(  # noqa: PLR0913 -- a problem, and the limits of its solution
+    site: Site,
+    visible: NDArray[np.bool_],
+    models: Mapping[str, LidarModel],
+    goal: Goal,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
+) -> Generator[Progress, None, Plan]:
+    """Answer a goal on a site: the most coverage, or the least price for a coverage.
+
+    Parameters
+    ----------
+    site : Site
+    visible : (c, t) bool
+        The visibility grid.
+    models : mapping of str to LidarModel
+        By catalogue key.
+    goal : Goal
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+    effort : float, units of work
+        As for `placement.solve`.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    SeipError
+        As for `placement_problem`, `solve` and `cheapest_for_coverage`.
+    """
+    problem = placement_problem(site, visible, models, goal)
+    if goal.coverage is not None:
+        placement = yield from cheapest_for_coverage(
+            problem, goal.coverage, solver=solver, time_limit=time_limit, effort=effort
+        )
+        greedy = None
+    else:
+        placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+        greedy = solve_greedy(problem)
+    return Plan(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
+
+
+def with_count(goal: Goal, site: Site) -> Goal:
+    """Fill in the number of sensors where nothing is asked for that limits it."""
+    free = goal.count is None and goal.budget is None and goal.coverage is None
+    return replace(goal, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else goal
+
+
+def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:
+    """Positions of that name, (p,) bool."""
+    found: NDArray[np.bool_] = candidates.position_name == name
+    if not found.any():
+        raise SeipError(f"there is no position {name!r}{_close(name, candidates.position_name.tolist())}")
+    return found
+
+
+def _close(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {known[0]!r} to {known[-1]!r}"
+    return f"; {hint} (the candidates.csv of a run lists all; quote names with blanks)"

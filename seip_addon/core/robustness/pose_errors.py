@@ -1,0 +1,177 @@
+r"""Where sensors really hang: errors of position, height, yaw and tilt, drawn from normal distributions.
+
+A sensor planned at p with the yaw ψ and the tilt θ hangs at p + e and is turned as
+
+.. math::
+    R = R_z(ψ + δ_ψ)\, R_y(θ + δ_θ)\, R_x(δ_φ), \qquad
+    e_x, e_y \sim N(0, σ_p^2),\; e_z \sim N(0, σ_h^2),\;
+    δ_ψ \sim N(0, σ_ψ^2),\; δ_θ, δ_φ \sim N(0, σ_t^2),
+
+all independent of each other and from post to post: yaw first, then pitch about
+the new y axis (nose down is positive), then roll about the new x axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ..arrays import Boolean, Float
+from ..errors import SeipError
+from ..geometry.orientation import orientations
+from ..site.obstruction import inside_any
+from ..site.scene_geometry import Mesh
+
+_MICROMETRE = 1e-6
+_KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
+
+
+WIDEST, STEEPEST = 100.0, 1.0
+"""Metres and radians: larger standard deviations are slips of the keyboard."""
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """Standard deviations of what may be wrong with a sensor's pose.
+
+    Parameters
+    ----------
+    position : float, metres
+        Of x and of y.
+    height : float, metres
+    yaw : float, radians
+    tilt : float, radians
+        Of pitch and of roll.
+    """
+
+    position: float = 0.3
+    height: float = 0.3
+    yaw: float = math.radians(2.0)
+    tilt: float = math.radians(2.0)
+
+    def __post_init__(self) -> None:
+        for name in ("position", "height"):
+            value = getattr(self, name)
+            if not 0 <= value <= WIDEST:
+                raise SeipError(f"the error of {name} must be 0 to {WIDEST:g} m, not {value:g} m")
+        for name, most in (("tilt", STEEPEST), ("yaw", math.pi)):
+            value = getattr(self, name)
+            if not 0 <= value <= most:
+                limit, shown = math.degrees(most), math.degrees(value)
+                raise SeipError(f"the error of {name} must be 0 to {limit:.0f}°, not {shown:g}°")
+
+    def alone(self, kind: str) -> PoseErrors:
+        """Return the errors of one kind, with nothing else wrong."""
+        return replace(self, **{name: 0.0 for name in KINDS if name != kind})
+
+
+KINDS = tuple(field.name for field in fields(PoseErrors))
+"""What can be wrong with a pose."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseDraws:
+    """How n draws of errors leave s sensors.
+
+    Parameters
+    ----------
+    shift : (n, s, 3) float64, metres
+        From where each was planned.
+    yaw, pitch, roll : (n, s) float64, radians
+    """
+
+    shift: Float
+    yaw: Float
+    pitch: Float
+    roll: Float
+
+    def __len__(self) -> int:
+        """Return the number of draws."""
+        return len(self.shift)
+
+    def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:
+        """Return how sensors hang, (n, s, 3, 3) float64, from their axes to the site's.
+
+        Parameters
+        ----------
+        planned_yaw, planned_tilt : (s,) float64, radians
+        """
+        return orientations(planned_yaw + self.yaw, planned_tilt + self.pitch, self.roll)
+
+
+def require_draws(draws: int) -> None:
+    """Raise SeipError where there would be no draw."""
+    if draws < 1:
+        raise SeipError(f"asked for {draws} draws of pose errors; ask for at least 1")
+
+
+def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
+    """Draw what is wrong with the poses of sensors.
+
+    What is drawn for a sensor follows from the seed, the number of the draw and
+    the sensor's position alone: whichever type hangs there at whichever height,
+    whatever hangs elsewhere, and however many draws there are. Errors of other
+    sizes are the same draws, scaled.
+
+    Parameters
+    ----------
+    errors : PoseErrors
+    foot : (s, 3) float64, metres
+        Ground point of each sensor's position; equal ones err alike.
+    draws : int
+    seed : int
+        At least 0.
+
+    Returns
+    -------
+    PoseDraws
+    """
+    require_draws(draws)
+    if seed < 0:
+        raise SeipError(f"the seed of the pose errors is {seed}; give a whole number of at least 0")
+    positions, of_position = np.unique(np.rint(foot / _MICROMETRE).astype(np.int64), axis=0, return_inverse=True)
+    standard = np.stack([_standard_normal(seed, position, draws) for position in positions.tolist()], axis=1)
+    scale = [errors.position, errors.position, errors.height, errors.yaw, errors.tilt, errors.tilt]
+    drawn = standard[:, of_position.ravel()] * np.array(scale)
+    return PoseDraws(drawn[..., :3], *np.moveaxis(drawn[..., 3:], -1, 0))
+
+
+def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
+    """Return one position's draws, (draws, 6): more draws begin with the same."""
+    signs = sum((coordinate < 0) << bit for bit, coordinate in enumerate(position))
+    words = [seed, signs, *(abs(coordinate) for coordinate in position)]
+    return np.random.default_rng(words).standard_normal((draws, _KINDS_DRAWN))
+
+
+def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
+    """Hang no sensor inside an object: where a draw would, its shift is turned about, or else there is none.
+
+    Parameters
+    ----------
+    draws : PoseDraws
+    xyz : (s, 3) float64, metres
+        Where the sensors were planned.
+    objects : sequence of Mesh
+
+    Returns
+    -------
+    PoseDraws
+    (n, s) bool
+        Which draws would have put a sensor inside an object.
+    """
+    shift = draws.shift.copy()
+    blocked = _inside(xyz + shift, objects)
+    shift[blocked] *= -1
+    still = np.zeros_like(blocked)
+    where = np.broadcast_to(xyz, shift.shape)
+    still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
+    shift[still] = 0.0
+    return replace(draws, shift=shift), blocked
+
+
+def _inside(points: Float, objects: Sequence[Mesh]) -> Boolean:
+    inside: Boolean = inside_any(points.reshape(-1, 3), objects).reshape(points.shape[:-1])
+    return inside

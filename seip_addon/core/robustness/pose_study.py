@@ -1,0 +1,201 @@
+"""What a placement covers when its sensors do not hang quite where and as they were planned.
+
+All sensors err in each draw. The same draws tell what comes of it when one
+sensor alone errs: a first-order effect, that of its own row of V beside the
+planned rows of the others. Draws with one kind of error alone, scaled from the
+same standard ones, tell which kind hurts most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Boolean, Float
+from ..placement.deployment import Deployment
+from ..progress import Progress
+from ..site.site import Site
+from .disturbed_views import Surroundings, disturbed_views, draws_for
+from .estimates import Estimate, mean_of, quantile_of
+from .pose_errors import KINDS, PoseErrors
+from .views import Views
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+NOTABLE = 0.01
+"""Share of the targets whose loss, in one of twenty draws, a user should know of."""
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """How pose errors are studied.
+
+    Parameters
+    ----------
+    errors : PoseErrors
+    draws : int
+        With all sensors erring in all ways.
+    draws_of_kind : int
+        With one kind of error alone; 0 leaves the kinds out.
+    seed : int
+    """
+
+    errors: PoseErrors = field(default_factory=PoseErrors)
+    draws: int = 500
+    draws_of_kind: int = 100
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Coverages:
+    """What a placement covers in each of n draws.
+
+    Parameters
+    ----------
+    whole : (n,) float64
+        Share of all targets that is seen.
+    central : (n,) float64 or None
+        Share of the targets in weighted regions; None where there are none.
+    """
+
+    whole: Float
+    central: Float | None
+
+
+@dataclass(frozen=True, eq=False)
+class PoseStudy:
+    """What errors of poses do to a placement.
+
+    Parameters
+    ----------
+    settings : StudySettings
+    labels : (s,) tuple of str
+        Of the sensors.
+    planned : Coverages
+        Of the poses as planned: n = 1.
+    together : Coverages
+        All sensors err.
+    alone : tuple of Coverages
+        For each sensor: it alone errs, in the same draws.
+    by_kind : dict of str to Coverages
+        For each kind of error: all sensors err in that way alone.
+    blocked : float
+        Share of the drawn poses that would have been inside an object, and were turned out of it.
+    """
+
+    settings: StudySettings
+    labels: tuple[str, ...]
+    planned: Coverages
+    together: Coverages
+    alone: tuple[Coverages, ...]
+    by_kind: dict[str, Coverages]
+    blocked: float
+
+    def quantile(self, share: float) -> Estimate:
+        """Estimate a quantile of the whole coverage."""
+        return quantile_of(self.together.whole, share)
+
+    def loss_by_sensor(self) -> tuple[Estimate, ...]:
+        """Estimate what is lost of the whole coverage on average when each sensor alone errs."""
+        return tuple(mean_of(self.planned.whole[0] - coverages.whole) for coverages in self.alone)
+
+    def loss_by_kind(self) -> dict[str, Estimate]:
+        """Estimate what is lost of the whole coverage on average by each kind of error alone."""
+        return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
+
+    def worst_sensor(self) -> tuple[str, bool]:
+        """Return the sensor whose error costs most, and whether the draws tell it from every other."""
+        losses = self.loss_by_sensor()
+        worst = max(range(len(losses)), key=lambda number: losses[number].value)
+        behind = [
+            self.alone[number].whole - self.alone[worst].whole for number in range(len(losses)) if number != worst
+        ]
+        return self.labels[worst], all(mean_of(difference).low > 0 for difference in behind)
+
+    def is_converged(self) -> bool:
+        """Whether half of the draws say the same: estimates of mean and quantiles whose intervals meet."""
+        whole = self.together.whole
+        half = whole[: len(whole) // 2]
+        pairs = [(mean_of(half), mean_of(whole)), *((quantile_of(half, q), quantile_of(whole, q)) for q in QUANTILES)]
+        return all(one.agrees_with(other) for one, other in pairs)
+
+
+def pose_study(
+    around: Surroundings,
+    deployment: Deployment,
+    settings: StudySettings,
+) -> Generator[Progress, None, PoseStudy]:
+    """Find what a placement covers when its poses err.
+
+    Parameters
+    ----------
+    around : Surroundings
+    deployment : Deployment
+        The placement, at poses of the site.
+    settings : StudySettings
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    PoseStudy
+    """
+    site = around.site
+    poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
+
+    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[Views, Boolean]]:
+        drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
+        seen = yield from disturbed_views(around, poses, drawn)
+        return seen, blocked
+
+    as_planned, _ = yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)
+    planned = as_planned.seen(0)
+    together, blocked = yield from views(settings.errors, settings.draws)
+    by_kind = {}
+    for kind in KINDS:
+        if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
+            of_kind, _ = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
+            by_kind[kind] = _coverages(site, [of_kind.seen(draw) for draw in range(len(of_kind))])
+    return PoseStudy(
+        settings=settings,
+        labels=tuple(sensor.label for sensor in deployment.sensors),
+        planned=_coverages(site, [planned]),
+        together=_coverages(site, [together.seen(draw) for draw in range(len(together))]),
+        alone=tuple(_one_errs(site, planned, together, number) for number in range(len(poses))),
+        by_kind=by_kind,
+        blocked=float(blocked.mean()),
+    )
+
+
+def _coverages(site: Site, views: Sequence[Boolean]) -> Coverages:
+    """Return what rows of V cover together, draw by draw."""
+    seen = np.array([rows.any(axis=0) for rows in views])
+    central = site.targets.central
+    return Coverages(seen.mean(axis=1), seen[:, central].mean(axis=1) if central.any() else None)
+
+
+def _one_errs(site: Site, planned: Boolean, together: Views, number: int) -> Coverages:
+    others = np.delete(planned, number, axis=0).any(axis=0)
+    return _coverages(site, [np.stack([others, row]) for row in together.seen_by_pose(number)])
+
+
+def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
+    """Say where a placement does not hold what was planned, in sentences."""
+    lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
+    return (pose_sentence(study),) if lost >= NOTABLE else ()
+
+
+def pose_sentence(study: PoseStudy) -> str:
+    """Say what a placement covers in one of twenty cases, and which sensor's error costs most."""
+    errors, low = study.settings.errors, study.quantile(QUANTILES[0])
+    lost = max(study.planned.whole[0] - low.value, 0.0)
+    worst, certain = study.worst_sensor()
+    which = f"{worst}'s error costs most" if certain else "no sensor's error stands out"
+    return (
+        f"with errors of {errors.position:g} m and {np.degrees(errors.tilt):.3g}° of tilt (standard deviations) the "
+        f"placement covers less than {low.value:.1%} in one of twenty cases, {lost:.1%} less than planned; {which}"
+    )

@@ -1,0 +1,369 @@
+r"""The placement that holds when poses are not as planned, sensors fail or one look is not enough.
+
+With K scenarios of pose errors, V of each known for every candidate,
+
+.. math::
+    \max_{x \in X} \; \min_{p \in P} \sum_k p_k \sum_j w_j\, y_{jk}
+    \quad\text{subject to}\quad
+    κ\, y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
+
+X being the placements of the problem (number, budget, one sensor per position,
+mandatory and forbidden places, least distance) and P that of `risk`. The
+expectation is the maximal covering location problem of K × t targets. Any p in P
+gives an upper bound,
+
+.. math::
+    \max_{x \in X} T(x) \le \max_{x \in X} F_p(x),
+
+of which p = 1/K says that nothing exceeds the largest expectation. A p with a
+small bound comes of fictitious play (Brown 1951): placements answer the mean of
+the scenarios that were worst for the placements before. Branch and bound on F_p
+then proves the best T (`robust_search`), where it comes to an end. Another bound
+knows each scenario beforehand (Madansky 1960), and takes K problems of t targets:
+
+.. math::
+    \max_{x \in X} T(x) \le \min_{p \in P} \sum_k p_k \max_{x \in X} f_k(x),
+
+the mean of the m smallest of the K largest coverages.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Float, Integer
+from ..errors import SeipError
+from ..placement import Placement, PlacementProblem, solve
+from ..placement.clock import Clock
+from ..placement.feasibility import starting_choice
+from ..placement.instance import Instance, common_unit, make_instance, merge_targets
+from ..placement.problem import TIE, relative_gap
+from ..placement.solver import solve_within
+from ..progress import Progress, within
+from .risk import Risk
+from .robust_search import CountedCover, RobustSearch, exchanged, exchanged_as_judged, exchanged_from_pairs
+from .views import Views
+
+ROUNDS = 16
+"""Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
+
+
+FORESEEING = 0.5
+"""Share of the time for the problems of single scenarios."""
+
+LEAST_SECONDS = 1.0
+"""Or units of work, for what comes after them, however slow they were."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobustPlacement:
+    """A placement chosen for what may go wrong.
+
+    Parameters
+    ----------
+    risk : Risk
+        What was optimised.
+    placement : Placement
+        Objective and bound are T, in units of the targets' weight; ``covered`` is what it covers as planned.
+    outcomes : (K,) float64
+        What becomes of it in each scenario, in units of the targets' weight.
+    """
+
+    risk: Risk
+    placement: Placement
+    outcomes: Float
+
+
+def solve_robust(  # noqa: PLR0913 -- a problem, and the limits of its solution
+    problem: PlacementProblem,
+    scenarios: Views,
+    risk: Risk,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
+    foreseen: Sequence[Placement] | None = None,
+) -> Generator[Progress, None, RobustPlacement]:
+    """Choose the placement that has the least to fear.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+        With the visibility of the poses as planned.
+    scenarios : Views
+        Of all candidates.
+    risk : Risk
+        What is to be large.
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+        After it the best placement found is returned with its bound and gap.
+    effort : float, units of work
+        As for `placement.solve`.
+    foreseen : sequence of Placement, optional
+        See `foresee`; found within the time limit if not given, and only of use where one look is enough.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RobustPlacement
+        The same whatever the order of candidates. Of equally good placements the one with fewest sensors, then the
+        cheapest; for the expectation as `placement.solve` chooses.
+
+    Raises
+    ------
+    SeipError
+        As `placement.solve`, or fewer sensors are allowed than the risk asks for.
+    """
+    most = allowed_sensors(problem)
+    if most < risk.least_sensors:
+        raise SeipError(f"{risk.in_words()} needs at least {risk.least_sensors} sensors, not {most}; allow more")
+    different = _without_copies(scenarios)
+    plain = risk.seen_by == 1 and risk.failure == "none"
+    if plain and len(different) == 1:
+        planned = replace(problem, visible=different.seen(0))
+        placement = yield from solve(planned, solver=solver, time_limit=time_limit, effort=effort)
+        placement = replace(placement, covered=_covered(problem, placement.chosen))
+        return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
+    clock = Clock(time_limit, effort)
+    if foreseen is None and risk.seen_by == 1:
+        foreseen = yield from _foreseen(problem, different, solver, clock.part(FORESEEING * clock.left))
+    placement = yield from _searched(problem, different, risk, solver, clock.part(math.inf, LEAST_SECONDS))
+    if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
+        placement = _with_foresight(problem, different, risk, placement, foreseen)
+    placement = replace(placement, seconds=clock.seconds)
+    return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
+
+
+def foresee(
+    problem: PlacementProblem,
+    scenarios: Views,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
+) -> Generator[Progress, None, tuple[Placement, ...]]:
+    """Solve each scenario as if it were known that it comes: no placement does better there.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+    scenarios : Views
+    solver : str
+    time_limit : float, seconds
+        For all of them.
+    effort : float, units of work
+        For all of them, as for `placement.solve`.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    tuple of Placement
+        One for each scenario; one alone where all are the same.
+    """
+    return (yield from _foreseen(problem, _without_copies(scenarios), solver, Clock(time_limit, effort)))
+
+
+def _foreseen(
+    problem: PlacementProblem, scenarios: Views, solver: str, clock: Clock
+) -> Generator[Progress, None, tuple[Placement, ...]]:
+    found = []
+    for scenario in range(len(scenarios)):
+        here = Progress(scenario, len(scenarios), "solving each scenario by itself")
+        yield here
+        alone = replace(problem, visible=scenarios.seen(scenario))
+        # what the quick ones leave goes to those that follow
+        part = clock.part(clock.left / (len(scenarios) - scenario), LEAST_SECONDS)
+        found.append((yield from within(here, solve_within(alone, solver, part))))
+    return tuple(found)
+
+
+def _with_foresight(
+    problem: PlacementProblem,
+    scenarios: Views,
+    risk: Risk,
+    placement: Placement,
+    foreseen: Sequence[Placement],
+) -> Placement:
+    """Lower the bound to what foresight could reach, and take a scenario's own placement where that is better."""
+    value, chosen = placement.objective, placement.chosen
+    for other in foreseen:
+        reached = risk.of(outcomes_of(problem, scenarios, risk, other.chosen))
+        if reached > value * (1 + TIE) and placement.status != "optimal":
+            value, chosen = reached, other.chosen
+    bound = max(min(placement.bound, risk.of(np.array([other.bound for other in foreseen]))), value)
+    optimal = placement.status == "optimal" or bound <= value * (1 + TIE)
+    return replace(
+        placement,
+        chosen=chosen,
+        objective=value,
+        bound=value if optimal else bound,
+        gap=0.0 if optimal else relative_gap(value, bound),
+        status="optimal" if optimal else "feasible",
+        covered=_covered(problem, chosen),
+        price=math.fsum(problem.prices[chosen]),
+        notes=() if optimal else placement.notes,
+    )
+
+
+def at_least(found: Placement, other: Placement, reached: float) -> Placement:
+    """Return the placement found, or another where that reaches more of the same objective.
+
+    A search that ran out of time may have missed the placement that knows of no scenarios.
+    """
+    if reached <= found.objective * (1 + TIE):
+        return found
+    bound = max(found.bound, reached)
+    return replace(
+        found,
+        chosen=other.chosen,
+        objective=reached,
+        bound=bound,
+        gap=relative_gap(reached, bound),
+        covered=other.covered,
+        price=other.price,
+    )
+
+
+def outcomes_of(problem: PlacementProblem, scenarios: Views, risk: Risk, chosen: Integer) -> Float:
+    """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
+    return risk.outcomes(_seen(scenarios, chosen), problem.weights, allowed_sensors(problem))
+
+
+def allowed_sensors(problem: PlacementProblem) -> int:
+    """Return N, the largest number of sensors that number, budget and positions allow."""
+    places, place = np.unique(problem.positions[problem.allowed], return_inverse=True)
+    cheapest = np.full(len(places), math.inf)
+    np.minimum.at(cheapest, place, problem.prices[problem.allowed])
+    affordable = len(places)
+    if problem.budget is not None:
+        affordable = int(np.count_nonzero(np.cumsum(np.sort(cheapest)) <= problem.budget * (1 + TIE)))
+    return affordable if problem.count is None else min(problem.count, affordable)
+
+
+def _without_copies(scenarios: Views) -> Views:
+    """Return one scenario where all are the same, so that without errors nothing is rounded otherwise."""
+    same = (scenarios.packed == scenarios.packed[:1]).all()
+    return Views(scenarios.packed[:1], scenarios.targets) if same else scenarios
+
+
+def _seen(scenarios: Views, chosen: Integer) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    return np.unpackbits(scenarios.packed[:, chosen], axis=2, count=scenarios.targets)
+
+
+def _stacked(problem: PlacementProblem, scenarios: Views, share: Float) -> PlacementProblem:
+    """Return the problem of all scenarios' targets, those of each weighted by its share; without those of share 0."""
+    used = np.flatnonzero(share)
+    visible = np.concatenate([scenarios.seen(scenario) for scenario in used], axis=1)
+    return replace(problem, visible=visible, weights=np.concatenate([share[k] * problem.weights for k in used]))
+
+
+def _covered(problem: PlacementProblem, chosen: Integer) -> float:
+    return math.fsum(problem.weights[problem.visible[chosen].any(axis=0)])
+
+
+def _searched(
+    problem: PlacementProblem, scenarios: Views, risk: Risk, solver: str, clock: Clock
+) -> Generator[Progress, None, Placement]:
+    """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
+    yield Progress(0, 0, "reducing the scenarios' targets")
+    whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
+    game = _Game(problem, scenarios, risk, whole)
+    start = yield from starting_choice(problem, whole, solver)
+    chosen, share = yield from game.play(start, clock)
+    search = RobustSearch(game.cover(share), game.unit(share), game.judge, chosen, TIE * math.fsum(problem.weights))
+    found = yield from search.run(clock)
+    notes = () if found.finished else ("the time was too short to prove this placement the best: the gap says how far",)
+    return _record(problem, whole.original[found.chosen], found.value, found.bound, notes, clock.seconds)
+
+
+def _record(  # what is known of a placement
+    problem: PlacementProblem, chosen: Integer, value: float, bound: float, notes: tuple[str, ...], seconds: float
+) -> Placement:
+    optimal = not notes
+    bound = value if optimal else bound
+    return Placement(
+        chosen=chosen,
+        objective=value,
+        bound=bound,
+        gap=relative_gap(value, bound),
+        status="optimal" if optimal else "feasible",
+        solver="branch and bound",
+        seconds=seconds,
+        covered=_covered(problem, chosen),
+        price=math.fsum(problem.prices[chosen]),
+        notes=notes,
+    )
+
+
+class _Game:
+    """Placements against scenarios: who places fears the worst of them.
+
+    Parameters
+    ----------
+    problem : PlacementProblem
+    scenarios : Views
+    risk : Risk
+    whole : Instance
+        Of all scenarios: candidates that can matter, with their constraints.
+    """
+
+    def __init__(self, problem: PlacementProblem, scenarios: Views, risk: Risk, whole: Instance) -> None:
+        self._scenarios, self._risk, self._whole = scenarios, risk, whole
+        self._weight = problem.weights
+        self._used = problem.weights > 0
+        self._unit, _ = common_unit(problem.weights[self._used])
+        self._sensors = allowed_sensors(problem)
+        self._worth = risk.worth(self._sensors)
+
+    def judge(self, chosen: Integer) -> float:
+        """Return T of candidates of the whole instance."""
+        seen = _seen(self._scenarios, self._whole.original[chosen])
+        return self._risk.of(self._risk.outcomes(seen, self._weight, self._sensors))
+
+    def cover(self, share: Integer) -> CountedCover:
+        """Return F for whole shares of the scenarios."""
+        weight = np.rint(self._weight[self._used] / self._unit)
+        scenarios = np.flatnonzero(share).tolist()
+        columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
+        weights = np.concatenate([share[k] * weight for k in scenarios])
+        visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
+        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._worth)
+
+    def unit(self, share: Integer) -> float:
+        """Return by what T is to be multiplied to be compared with F."""
+        return float(share.sum()) * self._worth.unit / self._unit
+
+    def play(self, start: Integer, clock: Clock) -> Generator[Progress, None, tuple[Integer, Integer]]:
+        """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
+        even = np.ones(len(self._scenarios), dtype=np.int64)
+        cover = self.cover(even)
+        chosen = yield from exchanged(cover, start)
+        if not self._worth.concave:
+            chosen = yield from exchanged_from_pairs(cover, start, chosen, clock)
+            chosen = yield from exchanged_as_judged(cover, self.judge, chosen)
+        best, value = chosen, self.judge(chosen)
+        if self._risk.counted(len(even)) == len(even):
+            return best, even
+        share = np.zeros_like(even)
+        for played in range(ROUNDS):
+            if clock.left < 0:
+                break
+            yield Progress(played, ROUNDS, "weighing the scenarios")
+            clock.spend(2 * self._scenarios.packed.size * 8)
+            seen = _seen(self._scenarios, self._whole.original[chosen])
+            share[self._risk.worst(self._risk.outcomes(seen, self._weight, self._sensors))] += 1
+            chosen = yield from exchanged(self.cover(share), chosen)
+            if self.judge(chosen) > value:
+                best, value = chosen, self.judge(chosen)
+        return best, share if share.any() else even

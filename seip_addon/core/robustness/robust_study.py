@@ -1,0 +1,222 @@
+"""What it costs to place for pose errors, and what that saves: judged by draws that no placement was chosen on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..arrays import Float
+from ..placement import Placement, PlacementProblem, solve
+from ..progress import Progress, within
+from .disturbed_views import Surroundings, disturbed_views, draws_for
+from .estimates import Estimate, mean_of, quantile_gain, quantile_of
+from .pose_errors import PoseErrors
+from .risk import Risk
+from .robust_placement import RobustPlacement, at_least, foresee, outcomes_of, solve_robust
+
+LOW = 0.05
+"""The quantile that judges."""
+
+RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
+"""That are compared where nothing else is asked for."""
+
+
+@dataclass(frozen=True)
+class RobustSettings:
+    """How placements under pose errors are chosen and judged.
+
+    Parameters
+    ----------
+    errors : PoseErrors
+    scenarios : int
+        Draws to choose on.
+    unseen : int
+        Draws to judge by.
+    seed : int
+        Of the scenarios; the unseen draws have the next one.
+    solver : str
+    time_limit : float, seconds
+        For each placement.
+    effort : float, units of work
+        As for `placement.solve`.
+    """
+
+    errors: PoseErrors = field(default_factory=PoseErrors)
+    scenarios: int = 20
+    unseen: int = 500
+    seed: int = 0
+    solver: str = "highs"
+    time_limit: float = 60.0
+    effort: float = math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A placement and what becomes of it in unseen draws.
+
+    Parameters
+    ----------
+    name : str
+        What it was chosen for.
+    placement : Placement
+    planned : float
+        Share of the targets' weight that it covers as planned, by one look and without any failure.
+    judged_by : Risk
+        Whose outcome the following are: coverage, or what is left of it after a loss, or what several sensors see.
+    undisturbed : float
+        The outcome for the poses as planned, as a share of the targets' weight.
+    unseen : (n,) float64
+        The same in each unseen draw.
+    """
+
+    name: str
+    placement: Placement
+    planned: float
+    judged_by: Risk
+    undisturbed: float
+    unseen: Float
+
+    @property
+    def low(self) -> Estimate:
+        """The 5 % quantile over unseen draws."""
+        return quantile_of(self.unseen, LOW)
+
+    @property
+    def mean(self) -> Estimate:
+        """The mean over unseen draws."""
+        return mean_of(self.unseen)
+
+
+@dataclass(frozen=True, eq=False)
+class RobustStudy:
+    """The nominal optimum beside placements chosen for what may go wrong.
+
+    Parameters
+    ----------
+    settings : RobustSettings
+    nominal : tuple of Contender
+        The placement chosen for the poses as planned, once for each way in which the others are judged.
+    robust : tuple of Contender
+        One for each risk.
+    total : float
+        Weight of all targets, the unit of placements' objectives.
+    """
+
+    settings: RobustSettings
+    nominal: tuple[Contender, ...]
+    robust: tuple[Contender, ...]
+    total: float
+
+    def beside(self, contender: Contender) -> Contender:
+        """Return the nominal optimum, judged as a contender is."""
+        return next(nominal for nominal in self.nominal if nominal.judged_by == contender.judged_by)
+
+    def price(self, contender: Contender) -> float:
+        """Return what a contender gives away of the nominal optimum's planned coverage."""
+        return self.beside(contender).planned - contender.planned
+
+    def saving(self, contender: Contender) -> Estimate:
+        """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
+        return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW)
+
+    def is_converged(self, contender: Contender) -> bool:
+        """Whether half of the unseen draws say the same of it: estimates whose intervals meet."""
+        half = len(contender.unseen) // 2
+        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW)
+        return saved.agrees_with(self.saving(contender))
+
+
+def robust_study(
+    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, risks: Sequence[Risk] = RISKS
+) -> Generator[Progress, None, RobustStudy]:
+    """Place for the poses as planned and for each risk, and judge all by unseen draws.
+
+    Parameters
+    ----------
+    around : Surroundings
+    problem : PlacementProblem
+        Of all candidates of the site.
+    settings : RobustSettings
+    risks : sequence of Risk
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RobustStudy
+    """
+    every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
+    drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
+    scenarios = yield from disturbed_views(around, every, drawn)
+    spread = scenarios.spread_to(every, len(problem.visible))
+    nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
+    foreseen = None
+    if any(risk.seen_by == 1 for risk in risks):
+        foreseen = yield from foresee(
+            problem, spread, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort
+        )
+    ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
+    entries = [_Entry("the poses as planned", nominal, way) for way in ways]
+    for number, risk in enumerate(risks):
+        here = Progress(number, len(risks), f"placing for {risk.in_words()}")
+        yield here
+        steps = solve_robust(
+            problem,
+            spread,
+            risk,
+            solver=settings.solver,
+            time_limit=settings.time_limit,
+            effort=settings.effort,
+            foreseen=foreseen,
+        )
+        found: RobustPlacement = yield from within(here, steps)
+        placed = at_least(found.placement, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
+        entries.append(_Entry(risk.in_words(), placed, risk.alone))
+    contenders = yield from _judged(around, problem, settings, entries)
+    return RobustStudy(
+        settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
+    )
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A placement that is to be judged."""
+
+    name: str
+    placement: Placement
+    judged_by: Risk
+
+
+def _judged(
+    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, entries: Sequence[_Entry]
+) -> Generator[Progress, None, list[Contender]]:
+    """Look from all chosen poses at once, in draws of another seed."""
+    used = np.unique(np.concatenate([entry.placement.chosen for entry in entries]))
+    drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
+    views = yield from disturbed_views(around, used, drawn)
+    planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
+    total = float(problem.weights.sum())
+    contenders = []
+    for entry in entries:
+        rows = np.searchsorted(used, entry.placement.chosen)
+        (undisturbed,) = outcomes_of(problem, planned, entry.judged_by, rows)
+        outcomes = [
+            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), entry.judged_by, rows)
+            for draw in range(len(views))
+        ]
+        contenders.append(
+            Contender(
+                entry.name,
+                entry.placement,
+                entry.placement.covered / total,
+                entry.judged_by,
+                float(undisturbed) / total,
+                np.concatenate(outcomes) / total,
+            )
+        )
+    return contenders

@@ -1,0 +1,287 @@
+"""What a placement for the empty road holds in traffic, and what placing on traffic wins back.
+
+Placements are chosen at some instants of traffic and judged at others, of other runs. What is judged is a share of
+time: of each target, and of the targets' weight. Instants near in time see the same queues, so that intervals come of
+stretches of time (`mean_over_time`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
+from ..placement import Placement, PlacementProblem, solve
+from ..progress import Progress
+from .disturbed_views import Surroundings
+from .estimates import Estimate, mean_over_time
+from .risk import Risk
+from .robust_placement import at_least, outcomes_of, solve_robust
+from .traffic_instants import NOBODY, Instants, Standing
+from .traffic_views import HEIGHT, Layer, traffic_views
+from .views import Views
+
+NOTABLE = 0.01
+"""Share of the targets' weight whose loss in traffic a user should know of."""
+
+IN_TRAFFIC = "in traffic"
+"""How sentences about traffic begin."""
+
+MOSTLY = 0.9
+"""Share of time from which on a target counts as mostly seen."""
+
+WHAT: Mapping[Layer, str] = {"road": "road", "height": f"points {HEIGHT:g} m above the road"}
+"""What is seen, in words."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scenarios:
+    """What all candidates see at the instants that a placement is chosen on.
+
+    Parameters
+    ----------
+    layer : {"road", "height"}
+        What is to be seen.
+    empty : (c, t) bool
+        On the empty road.
+    views : Views
+        At each instant.
+    """
+
+    layer: Layer
+    empty: Boolean
+    views: Views
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a placement sees on the empty road and at n instants of traffic.
+
+    Parameters
+    ----------
+    empty : float
+        Share of the targets' weight on the empty road.
+    at : (n,) float64
+        The same share at each instant.
+    hidden_at : (n,) float64
+        Share of the weight that is seen on the empty road and not at each instant.
+    empty_targets : (t,) bool
+        Which targets on the empty road.
+    time : (t,) float64
+        Share of the instants at which each target is seen.
+    stretch : (n,) int64
+        Of the instants.
+    """
+
+    empty: float
+    at: Float
+    hidden_at: Float
+    empty_targets: Boolean
+    time: Float
+    stretch: Integer
+
+    @property
+    def held(self) -> Estimate:
+        """The share of the targets' weight that is seen, on average over time."""
+        return mean_over_time(self.at, self.stretch)
+
+    @property
+    def lost(self) -> Estimate:
+        """How much less that is than on the empty road: what is hidden, less what returns from vehicles show."""
+        return mean_over_time(self.empty - self.at, self.stretch)
+
+    @property
+    def hidden(self) -> Estimate:
+        """Of the weight that is seen on the empty road, the share that vehicles hide, on average over time."""
+        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.stretch)
+
+    @property
+    def rarely(self) -> float:
+        """Of the targets seen on the empty road, the share that is seen less than `MOSTLY` of the time."""
+        return float((self.time[self.empty_targets] < MOSTLY).mean()) if self.empty_targets.any() else 0.0
+
+    def more_than(self, other: Seen) -> Estimate:
+        """Estimate how much more of the weight is seen than by another placement at the same instants."""
+        return mean_over_time(self.at - other.at, self.stretch)
+
+
+@dataclass(frozen=True, eq=False)
+class InTraffic:
+    """A placement and what becomes of it in traffic that it was not chosen on.
+
+    Parameters
+    ----------
+    name : str
+        What it was chosen for.
+    placement : Placement
+    seen : mapping of {"road", "height"} to Seen
+        Of the targets, and of the points `HEIGHT` metres above them.
+    """
+
+    name: str
+    placement: Placement
+    seen: Mapping[Layer, Seen]
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficStudy:
+    """The optimum of the empty road beside the placement chosen on traffic.
+
+    Parameters
+    ----------
+    layer : {"road", "height"}
+        What both were to see.
+    chosen_at : int
+        Instants of traffic that one of the two was chosen on.
+    road_users : float
+        On the road at an instant that is judged, on average.
+    empty : InTraffic
+        Chosen for the empty road.
+    traffic : InTraffic
+        Chosen on traffic.
+    """
+
+    layer: Layer
+    chosen_at: int
+    road_users: float
+    empty: InTraffic
+    traffic: InTraffic
+
+    def won(self, layer: Layer) -> Estimate:
+        """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
+        return self.traffic.seen[layer].more_than(self.empty.seen[layer])
+
+    def is_converged(self) -> bool:
+        """Whether every other instant says the same as all: means whose intervals meet."""
+        rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
+        rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
+        stretch = self.empty.seen[self.layer].stretch
+        return all(mean_over_time(row[::2], stretch[::2]).agrees_with(mean_over_time(row, stretch)) for row in rows)
+
+
+def look_at_traffic(
+    around: Surroundings, problem: PlacementProblem, instants: Instants, layer: Layer = "road"
+) -> Generator[Progress, None, Scenarios]:
+    """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
+    every = np.flatnonzero(problem.allowed)
+    views = yield from traffic_views(around, every, [NOBODY, *instants.standing()], layer)
+    spread = views.spread_to(every, len(problem.visible))
+    return Scenarios(layer, spread.seen(0), Views(spread.packed[1:], spread.targets))
+
+
+def traffic_study(  # noqa: PLR0913 -- a problem, and the limits of its solution
+    around: Surroundings,
+    problem: PlacementProblem,
+    scenarios: Scenarios,
+    judged: Instants,
+    *,
+    solver: str = "highs",
+    time_limit: float = 60.0,
+    effort: float = math.inf,
+) -> Generator[Progress, None, TrafficStudy]:
+    """Place for the empty road and on traffic, and judge both at other instants.
+
+    Parameters
+    ----------
+    around : Surroundings
+    problem : PlacementProblem
+        Of all candidates of the site; what they see is taken from the scenarios.
+    scenarios : Scenarios
+    judged : Instants
+        Of runs that are not those of the scenarios.
+    solver : str
+    time_limit : float, seconds
+        For each placement.
+    effort : float, units of work
+        As for `placement.solve`.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    TrafficStudy
+    """
+    problem = replace(problem, visible=scenarios.empty)
+    empty = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+    found = yield from solve_robust(
+        problem, scenarios.views, Risk(), solver=solver, time_limit=time_limit, effort=effort
+    )
+    reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
+    placed = at_least(found.placement, empty, reached)
+    used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
+    crowds = judged.standing()
+    layers: tuple[Layer, ...] = ("road", "height")
+    views: dict[Layer, Views] = {}
+    for layer in layers:
+        views[layer] = yield from traffic_views(around, used, [NOBODY, *crowds], layer)
+
+    def judge(name: str, placement: Placement) -> InTraffic:
+        rows = np.searchsorted(used, placement.chosen)
+        seen = {layer: _seen(views[layer], rows, problem.weights, judged.stretch) for layer in layers}
+        return InTraffic(name, placement, seen)
+
+    return TrafficStudy(
+        layer=scenarios.layer,
+        chosen_at=len(scenarios.views),
+        road_users=_users(crowds),
+        empty=judge("the empty road", empty),
+        traffic=judge("traffic", placed),
+    )
+
+
+def _seen(views: Views, rows: Integer, weight: Float, stretch: Integer) -> Seen:
+    """Return what some poses see together; the first of the views is of the empty road."""
+    seen = views.seen_by_any(rows)
+    share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
+    return Seen(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
+
+
+def tried_in_traffic(
+    around: Surroundings, poses: Integer, weight: Float, instants: Instants
+) -> Generator[Progress, None, str]:
+    """Say, in a sentence, what poses see of the road in traffic on average over time, and when it is empty.
+
+    Parameters
+    ----------
+    around : Surroundings
+    poses : (s,) int64
+        Among the site's candidates.
+    weight : (t,) float64
+        Of the targets.
+    instants : Instants
+    """
+    crowds = instants.standing()
+    views = yield from traffic_views(around, poses, [NOBODY, *crowds], "road")
+    seen = _seen(views, np.arange(len(poses)), weight, instants.stretch)
+    return (
+        f"{IN_TRAFFIC} ({_users(crowds):.0f} road users at a time) this placement sees {seen.held.in_words()} of the "
+        f"road on average over time, {seen.empty:.2%} when it is empty"
+    )
+
+
+def _users(crowds: Sequence[Standing]) -> float:
+    return float(np.mean([len(crowd.hulls) for crowd in crowds]))
+
+
+def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
+    """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
+    losses = tuple(
+        f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
+        f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
+        f"{seen.lost.value:.1%} less"
+        for layer, seen in study.empty.seen.items()
+        if seen.lost.value >= NOTABLE
+    )
+    won = study.won(study.layer)
+    if won.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
+        return losses
+    doubt = (
+        "in traffic that it was not chosen on this placement is not known to see more than the best one for the empty "
+        f"road: {won.in_words()} more; choose on more --instants, or keep that one"
+    )
+    return (*losses, doubt)

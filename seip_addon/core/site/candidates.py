@@ -1,0 +1,398 @@
+"""Candidate poses: where a sensor may hang, and what rules a place out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Boolean, Float, Integer, Text
+from ..errors import SeipError
+from ..geometry.orientation import orientation
+from ..geometry.plan import outline, surface_height
+from .obstruction import inside_any, post_blocked
+from .pavement_sampling import spread
+from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
+
+_ABOVE_POLE = 0.5
+"""Metres that a sensor may hang above the top of its pole, on a short mast."""
+
+HIGHEST = 100.0
+"""Metres: a sensor higher than this is a slip of the keyboard."""
+
+ASSUMED_POLES = "assumed poles"
+"""Why poles that stand in no map are dropped."""
+
+STEEPEST = 90.0
+"""Degrees: tilts are less than this, up or down."""
+
+
+@dataclass(frozen=True)
+class CandidateSettings:
+    """How candidates are laid out.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Catalogue keys of the sensor types to choose from.
+    heights : tuple of float, metres
+        Mounting heights above the ground point.
+    tilts : tuple of float, radians
+        How far a sensor's nose is turned down towards the region, the way that a
+        bracket points; negative is up. At 0 it hangs upright.
+    spacing : float, metres
+        Least distance between two positions on the pavement.
+    setback : float, metres
+        Distance of a new post from the kerb, the edge of the road.
+    clearance : float, metres
+        Distance of a new post and its sensor from walls and other objects.
+    bracket : float, metres
+        How far from an existing pole's axis the sensor hangs, towards the region.
+    assumed_poles : bool
+        Whether poles that are assumed, and stand in no map, may carry sensors.
+    """
+
+    sensors: tuple[str, ...] = ("type1", "type2", "type3")
+    heights: tuple[float, ...] = (3.5, 5.4, 8.0)
+    tilts: tuple[float, ...] = (0.0,)
+    spacing: float = 4.0
+    setback: float = 0.5
+    clearance: float = 0.3
+    bracket: float = 0.4
+    assumed_poles: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.sensors:
+            raise SeipError("no sensor type is chosen: name at least one of the catalogue")
+        if not self.heights:
+            raise SeipError("no mounting height is given: name at least one, in metres")
+        for height in self.heights:
+            if not 0 < height <= HIGHEST:
+                raise SeipError(
+                    f"a mounting height must be a positive number of metres up to {HIGHEST:g}, not {height}"
+                )
+        self._check_tilts()
+        if not 0.1 <= self.spacing <= 1000:
+            raise SeipError(f"the candidate spacing must be 0.1 to 1000 m, not {self.spacing}")
+        for name in ("setback", "clearance", "bracket"):
+            value = getattr(self, name)
+            if not 0 <= value <= 100:
+                raise SeipError(f"the {name} must be 0 to 100 m, not {value}")
+
+    def _check_tilts(self) -> None:
+        if not self.tilts:
+            raise SeipError("no tilt is given: name at least one, in degrees; 0 is upright")
+        for number, tilt in enumerate(self.tilts):
+            if not abs(math.degrees(tilt)) < STEEPEST:
+                raise SeipError(
+                    f"a tilt must be more than -{STEEPEST:g}° and less than {STEEPEST:g}°, not {math.degrees(tilt):g}°"
+                )
+            if tilt in self.tilts[:number]:
+                raise SeipError(f"the tilt of {math.degrees(tilt):g}° is given twice: name each tilt once")
+
+
+def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the heights in metres that texts name: each a height, or a range FROM:TO:STEP with both ends.
+
+    Raises
+    ------
+    SeipError
+        One is neither.
+    """
+    heights: list[float] = []
+    for text in texts:
+        named = _named_by(text, 0.0, HIGHEST)
+        if not named:
+            raise SeipError(
+                f"{text!r} is neither a height in metres nor a range FROM:TO:STEP "
+                f"up to {HIGHEST:g} m in steps of at least {_FINEST:g} m"
+            )
+        heights += named
+    return tuple(heights)
+
+
+def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
+    """Return the tilts in radians that texts name in degrees: each a tilt, or a range FROM:TO:STEP with both ends.
+
+    Raises
+    ------
+    SeipError
+        One is neither.
+    """
+    tilts: list[float] = []
+    for text in texts:
+        named = _named_by(text, -STEEPEST, STEEPEST)
+        if not named:
+            raise SeipError(
+                f"{text!r} is neither a tilt in degrees nor a range FROM:TO:STEP within "
+                f"±{STEEPEST:g}° in steps of at least {_FINEST:g}°"
+            )
+        tilts += [math.radians(tilt) + 0.0 for tilt in named]
+    return tuple(tilts)
+
+
+_FINEST = 0.01
+"""Metres or degrees: a finer range is a slip of the keyboard."""
+
+
+def _named_by(text: str, above: float, most: float) -> list[float]:
+    """Return the number that a text is, or the range FROM:TO:STEP; nothing where it is neither."""
+    try:
+        numbers = [float(part) for part in text.split(":")]
+    except ValueError:
+        return []
+    if len(numbers) == 1:
+        return numbers
+    if len(numbers) == 3 and above < numbers[0] <= numbers[1] <= most and numbers[2] >= _FINEST:
+        first, last, step = numbers
+        steps: list[float] = np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
+        return steps
+    return []
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Where a sensor may hang: positions (in plan), and poses (position × height × tilt × sensor type).
+
+    Parameters
+    ----------
+    position : (p, 3) float64, metres
+        Ground point of each position, local site axes.
+    position_name : (p,) str
+        Name of the pole, or ``sidewalk 12``.
+    on_pole : (p,) bool
+        Whether the position is an existing pole.
+    pole_source : (p,) str
+        Who says that the pole stands there, as in `Pole`; empty for new posts.
+    position_of : (c,) int64
+        Position of each pose.
+    sensor : (c,) str
+        Catalogue key of each pose's sensor type.
+    height : (c,) float64, metres
+        Height of the sensor above the ground point.
+    xyz : (c, 3) float64, metres
+        Optical centre. On a pole it stands off the shaft by the bracket.
+    yaw : (c,) float64, radians
+        Direction of azimuth zero of the beam pattern, counter-clockwise from +x. An upright sensor sees all around
+        alike, and its azimuth zero is +x. A tilted one looks towards the region: to the nearest point of it, or to
+        its middle from within.
+    tilt : (c,) float64, radians
+        How far azimuth zero is turned down, nose first, towards where the yaw points; see `orientation`.
+    mandatory : (g, p) bool
+        Each row is a group of positions of which at least one must carry a sensor.
+    mandatory_name : (g,) str
+        Names of those groups.
+    dropped : dict of str to int
+        How many positions or poses were dropped, by reason.
+    """
+
+    position: Float
+    position_name: Text
+    on_pole: Boolean
+    pole_source: Text
+    position_of: Integer
+    sensor: Text
+    height: Float
+    xyz: Float
+    yaw: Float
+    tilt: Float
+    mandatory: Boolean
+    mandatory_name: Text
+    dropped: dict[str, int]
+
+    def __len__(self) -> int:
+        """Return the number of poses."""
+        return len(self.xyz)
+
+    def orientation(self, pose: int) -> Float:
+        """Return how a pose's sensor is turned, (3, 3) float64, from its axes to the site's."""
+        return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
+
+
+def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
+    """Sample the candidate areas, take the poles, and drop what cannot carry a sensor.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : CandidateSettings
+
+    Returns
+    -------
+    Candidates
+        Positions in order of x, y, z with pavement positions named in that
+        order; poses by position, height, tilt, sensor type.
+
+    Raises
+    ------
+    SeipError
+        A setting cannot be meant, no candidate is left (with what dropped
+        them), or a mandatory place holds none.
+    """
+    dropped: dict[str, int] = {}
+    foot, axis_offset, top, name, source, on_pole = _positions(geometry, settings, dropped)
+    heights = np.array(sorted(set(settings.heights)), dtype=np.float64)
+    position_of = np.repeat(np.arange(len(foot)), len(heights))
+    height = np.tile(heights, len(foot))
+    xyz = foot[position_of] + axis_offset[position_of]
+    xyz[:, 2] += height
+
+    too_high = height > top[position_of] + _ABOVE_POLE
+    inside = ~too_high
+    inside[inside] = inside_any(xyz[inside], geometry.occluders)
+    blocked = np.zeros(len(xyz), dtype=bool)
+    post = ~on_pole[position_of] & ~inside
+    blocked[post] = post_blocked(foot[position_of[post]], height[post], settings.clearance, geometry.occluders)
+    dropped["higher than their pole"] = int(too_high.sum())
+    dropped["inside an object"] = int(inside.sum())
+    dropped["too close to a wall or object"] = int(blocked.sum())
+    kept = ~too_high & ~inside & ~blocked
+    if not kept.any():
+        raise SeipError(_none_left(dropped))
+
+    used, compact = np.unique(position_of[kept], return_inverse=True)
+    sensors = np.array(list(dict.fromkeys(settings.sensors)))
+    tilts = np.array(sorted(settings.tilts), dtype=np.float64)
+    repeat = len(tilts) * len(sensors)
+    position_of = np.repeat(compact.astype(np.int64), repeat)
+    tilt = np.tile(np.repeat(tilts, len(sensors)), int(kept.sum()))
+    groups = _mandatory_groups(geometry, foot[used], name[used])
+    return Candidates(
+        position=foot[used],
+        position_name=name[used],
+        on_pole=on_pole[used],
+        pole_source=source[used],
+        position_of=position_of,
+        sensor=np.tile(sensors, int(kept.sum()) * len(tilts)),
+        height=np.repeat(height[kept], repeat),
+        xyz=np.repeat(xyz[kept], repeat, axis=0),
+        yaw=_yaws(tilt, position_of, foot[used], geometry.region),
+        tilt=tilt,
+        mandatory=np.array([row for _, row in groups], dtype=bool).reshape(len(groups), len(used)),
+        mandatory_name=np.array([title for title, _ in groups], dtype=np.str_),
+        dropped={reason: count for reason, count in dropped.items() if count},
+    )
+
+
+def _positions(
+    geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]
+) -> tuple[Float, Float, Float, Text, Text, Boolean]:
+    """Foot, offset of the optical axis from it, top, name, source and kind of each position, in order of x, y, z."""
+    poles = _free_poles(geometry, settings, dropped)
+    pole_feet = np.array([pole.base for pole in poles], dtype=np.float64).reshape(-1, 3)
+    pavement = _pavement_feet(geometry, settings, pole_feet, dropped)
+    foot = np.round(np.concatenate((pavement, pole_feet)), 6)
+    offset = np.zeros_like(foot)
+    top = np.full(len(foot), np.inf)
+    for row, pole in enumerate(poles, start=len(pavement)):
+        top[row] = np.inf if pole.height is None else pole.height
+        offset[row, :2] = settings.bracket * _towards(pole.base[:2], geometry.region)
+    on_pole = np.arange(len(foot)) >= len(pavement)
+    order = np.lexsort((foot[:, 2], foot[:, 1], foot[:, 0]))
+    numbers = iter(range(1, len(pavement) + 1))
+    pole_names = [pole.name for pole in poles]
+    names = [pole_names[i - len(pavement)] if on_pole[i] else f"sidewalk {next(numbers)}" for i in order]
+    sources = np.array(["" for _ in pavement] + [pole.source for pole in poles], dtype=np.str_)[order]
+    text = np.array(names, dtype=np.str_)
+    return foot[order], np.round(offset[order], 6), top[order], text, sources, on_pole[order]
+
+
+def _free_poles(geometry: SceneGeometry, settings: CandidateSettings, dropped: dict[str, int]) -> list[Pole]:
+    for pole in geometry.poles:
+        if pole.forbidden and pole.mandatory:
+            raise SeipError(f"pole {pole.name!r} is both forbidden and mandatory: take one of the two marks off")
+    forbidden = _union(geometry.forbidden_areas)
+    free = [p for p in geometry.poles if not p.forbidden and not forbidden.intersects(shapely.Point(p.base[:2]))]
+    for pole in geometry.poles:
+        if pole.mandatory and pole not in free:
+            raise SeipError(f"mandatory pole {pole.name!r} stands in a forbidden area: take one of the two back")
+    dropped["forbidden poles"] = len(geometry.poles) - len(free)
+    usable = [pole for pole in free if settings.assumed_poles or pole.mandatory or pole.source != ASSUMED]
+    dropped[ASSUMED_POLES] = len(free) - len(usable)
+    return usable
+
+
+def _pavement_feet(
+    geometry: SceneGeometry, settings: CandidateSettings, poles: Float, dropped: dict[str, int]
+) -> Float:
+    """(n, 3) feet of new posts: a maximal sample of the candidate areas with the given least distance."""
+    area = geometry.candidate_areas
+    if area.is_empty:
+        return np.empty((0, 3))
+    road = outline(joined(geometry.roads))
+    free = area.difference(road.buffer(settings.setback)) if not road.is_empty else area
+    if len(poles):
+        # A pole that stands there already serves its surroundings.
+        free = free.difference(shapely.union_all(shapely.buffer(shapely.points(poles[:, :2]), settings.spacing / 2)))
+    plan = spread(free, settings.spacing)
+    forbidden = _union(geometry.forbidden_areas)
+    allowed = ~shapely.intersects_xy(forbidden, plan[:, 0], plan[:, 1])
+    dropped["in a forbidden area"] = int((~allowed).sum())
+    plan = plan[allowed]
+    height = surface_height(plan, joined((*geometry.ground, *geometry.roads)))
+    supported = np.isfinite(height)
+    dropped["over no ground"] = int((~supported).sum())
+    return np.column_stack((plan[supported], height[supported]))
+
+
+def _towards(point: Float, region: BaseGeometry) -> Float:
+    """Return the unit vector in plan from a point to the region, or to its middle from within."""
+    nearest = shapely.shortest_line(shapely.Point(point), region)
+    goal = np.array(nearest.coords[-1])
+    if np.hypot(*(goal - point)) < 1e-6:
+        goal = np.array(region.centroid.coords[0])
+    way = goal - point
+    length = np.hypot(*way)
+    return way / length if length > 0 else np.array((1.0, 0.0))
+
+
+def _yaws(tilt: Float, position_of: Integer, foot: Float, region: BaseGeometry) -> Float:
+    """Return the yaw of each pose, (c,) radians: zero where it is upright, else that which has the region before it."""
+    if not tilt.any():
+        return np.zeros(len(tilt))
+    way = np.array([_towards(point[:2], region) for point in foot])
+    before_it = np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
+    return np.where(tilt == 0, 0.0, before_it[position_of])
+
+
+def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[tuple[str, Boolean]]:
+    groups = []
+    for pole in geometry.poles:
+        if pole.mandatory:
+            here = np.hypot(*(foot[:, :2] - pole.base[:2]).T) < 1e-3
+            groups.append((pole.name, here & (name == pole.name)))
+    groups += [(a.name, shapely.intersects_xy(a.polygon, foot[:, 0], foot[:, 1])) for a in geometry.mandatory_areas]
+    for title, row in groups:
+        if not row.any():
+            raise SeipError(
+                f"{title!r} must carry a sensor but holds no candidate position: "
+                "enlarge it, free it of forbidden areas and obstacles, or ask for lower heights"
+            )
+    return groups
+
+
+def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tuple[str, ...]:
+    """Say how many poles of a scene are assumed, and whether they may carry sensors."""
+    assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
+    if not assumed:
+        return ()
+    poles = f"{assumed} poles are" if assumed > 1 else "1 pole is"
+    if (candidates.pole_source == ASSUMED).any():
+        return (f"{poles} assumed, not from the map, and may carry sensors: make sure that they exist",)
+    return (f"{poles} assumed, not from the map, and carry no sensors: ask for assumed poles to use them",)
+
+
+def _union(areas: Sequence[NamedArea]) -> BaseGeometry:
+    union = shapely.union_all([area.polygon for area in areas])
+    shapely.prepare(union)
+    return union
+
+
+def _none_left(dropped: dict[str, int]) -> str:
+    reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
+    cure = "enlarge SEIP Candidate Areas, add SEIP Poles, or ask for less set-back and clearance"
+    return f"no candidate is left ({reasons}): {cure}" if reasons else f"no candidate: {cure}"

@@ -1,0 +1,476 @@
+"""What a scene holds for a survey, and what in it would harm the answer: counts, and problems with their cure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..geometry.plan import heights_over, outline, signed_area, surface_height
+from ..progress import Progress
+from ..storage.files import digest
+from .scene_geometry import ASSUMED, Pole, SceneGeometry
+from .site import Site
+from .targets import lay_targets
+
+FAR = 10_000.0
+"""Metres from the origin beyond which Blender's single precision rounds coordinates to a millimetre and more."""
+SMALLEST_REGION, LARGEST_REGION = 5.0, 10_000.0
+"""Metres across between which a region of interest is one."""
+UPRIGHT = 0.5
+"""Share of a surface's area that shows in plan below which it stands more than it lies."""
+FAR_POLE = 60.0
+"""Metres from the region beyond which a pole is none of the place's."""
+OFF_GROUND = 0.5
+"""Metres between a pole's foot and the ground beyond which sensors would hang at a wrong height."""
+HOLE = 10.0
+"""Square metres in plan up to which a hole in the road is rather a missing face than an island."""
+LEAST_HOLE = 0.01
+"""Square metres in plan below which a hole is a seam."""
+STEP = 0.3
+"""Metres of height between road a metre apart that no vehicle drives over."""
+LAYERS = (0.05, 2.5)
+"""Metres between which one road above another is no bridge, but a mistake."""
+SAMPLE = 1.0
+"""Metres between the places at which the road is looked at."""
+MOST_SAMPLES = 250_000
+SAME_PLACE = 0.05
+"""Metres in plan below which two poles stand at one place."""
+MOST_NAMED = 5
+"""Culprits of one kind that are named one by one."""
+
+Severity = Literal["ERROR", "WARNING"]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that stops a survey, or harms its answer.
+
+    Parameters
+    ----------
+    severity : {"ERROR", "WARNING"}
+        Whether a survey cannot go on.
+    text : str
+        What is wrong, and the cure.
+    thing : str
+        Name of the object to look at; empty where it is the scene.
+    """
+
+    severity: Severity
+    text: str
+    thing: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """An object's surface in one of its roles.
+
+    Parameters
+    ----------
+    role : str
+        As in ``regions``, ``roads``, …: see `ROLES`.
+    name : str
+        Of the object, or of the one that instances it.
+    triangles : (n, 3, 3) float64, metres
+        In local site axes.
+    """
+
+    role: str
+    name: str
+    triangles: Float
+
+
+ROLES = {
+    "region": "Region",
+    "roads": "Roads",
+    "ground": "Ground",
+    "occluders": "Occluders",
+    "candidate_areas": "Candidate areas",
+    "weighted_regions": "Weighted regions",
+    "forbidden_areas": "Forbidden areas",
+    "mandatory_areas": "Mandatory areas",
+}
+"""What a surface may mean, and how that is called."""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneContents:
+    """What was found in a scene, whole or not.
+
+    Parameters
+    ----------
+    surfaces : tuple of Surface
+        Without faulty ones.
+    poles : tuple of Pole
+    geometry : SceneGeometry or None
+        Where all is there that a survey needs.
+    problems : tuple of Problem
+        That showed as it was read.
+    complaint : str
+        Why there is no geometry; empty where there is.
+    """
+
+    surfaces: tuple[Surface, ...]
+    poles: tuple[Pole, ...]
+    geometry: SceneGeometry | None
+    problems: tuple[Problem, ...]
+    complaint: str = ""
+
+
+@dataclass(frozen=True)
+class SiteCheck:
+    """What a scene holds, by what it is called, and its problems: errors first."""
+
+    counts: dict[str, str]
+    problems: tuple[Problem, ...]
+
+
+def check_site(
+    contents: SceneContents, lay_out: Callable[[SceneGeometry], tuple[Site, Sequence[str]]]
+) -> Generator[Progress, None, SiteCheck]:
+    """Count what a scene holds and look for what would harm an answer.
+
+    Parameters
+    ----------
+    contents : SceneContents
+    lay_out : callable
+        Lays targets and candidates into the scene as a survey would, and returns the site and its warnings.
+
+    Yields
+    ------
+    Progress
+        Looks taken, of all.
+
+    Returns
+    -------
+    SiteCheck
+    """
+    plans: dict[str, BaseGeometry] = {}
+    for number, role in enumerate(("region", "roads", "candidate_areas")):
+        yield Progress(number, STAGES, "outlines")
+        plans[role] = outline(np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, role)]))
+    yield Progress(3, STAGES, "problems")
+    problems = [*contents.problems, *_problems(contents, plans)]
+    yield Progress(4, STAGES, "road")
+    problems += _road_problems(contents, plans)
+    counts = _counts(contents, plans)
+    yield Progress(5, STAGES, "candidates")
+    if contents.geometry is not None:
+        try:
+            site, warnings = lay_out(contents.geometry)
+        except SeipError as error:
+            problems.append(Problem("ERROR", str(error), _named_in(str(error), contents)))
+        else:
+            counts |= _site_counts(site)
+            problems += [Problem("WARNING", text) for text in warnings]
+    elif not any(problem.severity == "ERROR" for problem in problems):
+        problems.append(Problem("ERROR", contents.complaint, _named_in(contents.complaint, contents)))
+    yield Progress(STAGES, STAGES, "candidates")
+    return SiteCheck(counts, _in_order(problems))
+
+
+STAGES = 6
+
+
+def _in_order(problems: Iterable[Problem]) -> tuple[Problem, ...]:
+    """Return each problem once, errors first."""
+    by_text = {problem.text: problem for problem in reversed(list(problems))}
+    once = reversed(by_text.values())
+    return tuple(sorted(once, key=lambda problem: problem.severity != "ERROR"))
+
+
+def _named_in(text: str, contents: SceneContents) -> str:
+    """Return the name of the object that a sentence is about."""
+    names = [surface.name for surface in contents.surfaces] + [pole.name for pole in contents.poles]
+    return next((name for name in names if f"{name!r}" in text), "")
+
+
+def _of(contents: SceneContents, role: str) -> list[Surface]:
+    return [surface for surface in contents.surfaces if surface.role == role]
+
+
+def _triangles(contents: SceneContents, role: str) -> list[Float]:
+    return [surface.triangles for surface in _of(contents, role)]
+
+
+def _counts(contents: SceneContents, plans: dict[str, BaseGeometry]) -> dict[str, str]:
+    counts = {}
+    for role, title in ROLES.items():
+        surfaces = _of(contents, role)
+        if surfaces or role in {"region", "roads"}:
+            faces = sum(len(surface.triangles) for surface in surfaces)
+            counts[title] = f"{_number(len(surfaces), 'object')}, {_number(faces, 'triangle')}"
+    counts["Poles"] = _number(len(contents.poles), "pole")
+    for mark in ("forbidden", "mandatory"):
+        marked = sum(getattr(pole, mark) for pole in contents.poles)
+        counts["Poles"] += f", {marked} {mark}" * (marked > 0)
+    assumed = sum(pole.source == ASSUMED for pole in contents.poles)
+    counts["Poles"] += f", {assumed} assumed" * (assumed > 0)
+    region, road = plans["region"], plans["roads"]
+    counts["Area of the region"] = f"{region.area:,.0f} m²"
+    counts["Road in the region"] = f"{region.intersection(road).area:,.0f} m²"
+    counts["Candidate area"] = f"{plans['candidate_areas'].area:,.0f} m²"
+    return counts
+
+
+def _site_counts(site: Site) -> dict[str, str]:
+    poses = site.candidates
+    on_poles = int(poses.on_pole.sum())
+    counts = {
+        "Targets": f"{len(site.targets):,}, {int(site.targets.central.sum()):,} in weighted regions",
+        "Positions": f"{len(poses.position):,}, {on_poles:,} on poles",
+        "Poses": f"{len(poses):,}",
+    }
+    return counts | {f"Dropped, {reason}": f"{count:,}" for reason, count in poses.dropped.items()}
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count:,} {what}{'s' * (count != 1)}"
+
+
+def _problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
+    yield from _missing(contents, plans)
+    yield from _wrong_size(contents, plans["region"])
+    yield from _far(contents)
+    yield from _upright(contents)
+    yield from _without_road(contents, plans)
+    yield from _pole_problems(contents, plans["region"])
+    yield from _duplicates(contents)
+
+
+def _missing(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
+    if plans["region"].is_empty:
+        yield Problem("ERROR", "There is no region of interest: draw one, or assign a mesh that covers the road to it.")
+    if not _of(contents, "roads"):
+        yield Problem("ERROR", "There is no road: assign the meshes of the carriageway to the roads.")
+    if plans["candidate_areas"].is_empty and not contents.poles:
+        yield Problem("ERROR", "Sensors can stand nowhere: assign pavements to the candidate areas, or assign poles.")
+
+
+def _wrong_size(contents: SceneContents, region: BaseGeometry) -> Iterator[Problem]:
+    if region.is_empty:
+        return
+    low_x, low_y, high_x, high_y = region.bounds
+    across = max(high_x - low_x, high_y - low_y)
+    if not SMALLEST_REGION <= across <= LARGEST_REGION:
+        yield Problem(
+            "WARNING",
+            f"The region is {across:,.3g} m across: one unit of Blender is one metre; scale the scene if it is not.",
+            _of(contents, "region")[0].name,
+        )
+
+
+def _far(contents: SceneContents) -> Iterator[Problem]:
+    reaches = [(float(np.abs(surface.triangles).max()), surface.name) for surface in contents.surfaces]
+    reaches += [(float(np.abs(pole.base).max()), pole.name) for pole in contents.poles]
+    far = [(reach, name) for reach, name in reaches if reach > FAR]
+    if far:
+        reach, name = max(far)
+        yield Problem(
+            "WARNING",
+            f"{name!r} and {_number(len(far) - 1, 'other object')} lie up to {reach / 1000:,.0f} km from the origin, "
+            f"where Blender rounds places to {1000 * np.spacing(np.float32(reach)):.0f} mm: move all to the origin and "
+            "put the map's coordinates of it into the scene's property seip_origin.",
+            name,
+        )
+
+
+def _upright(contents: SceneContents) -> Iterator[Problem]:
+    """Find what should lie and stands: z-up mistakes, and what is no road among the roads."""
+    for surface in contents.surfaces:
+        if surface.role in {"region", "roads", "candidate_areas", "weighted_regions"}:
+            side = np.linalg.norm(_normals(surface.triangles), axis=1).sum() / 2
+            if np.abs(signed_area(surface.triangles)).sum() < UPRIGHT * side:
+                yield Problem(
+                    "WARNING",
+                    f"{surface.name!r} among the {ROLES[surface.role].lower()} stands more than it lies: turn it so "
+                    "that z is up, or take it out.",
+                    surface.name,
+                )
+
+
+def _normals(triangles: Float) -> Float:
+    normals: Float = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return normals
+
+
+def _without_road(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
+    road = plans["roads"]
+    if road.is_empty or plans["region"].is_empty:
+        return
+    reached = shapely.intersection(plans["region"], road).area > 0
+    for surface in _of(contents, "region"):
+        if outline(surface.triangles).intersection(road).area == 0:
+            yield Problem(
+                "WARNING" if reached else "ERROR",
+                f"There is no road within the region {surface.name!r}: move the region over the road.",
+                surface.name,
+            )
+    shapely.prepare(plans["region"])
+    for role in ("weighted_regions", "mandatory_areas"):
+        for surface in _of(contents, role):
+            lies_in = plans["region"] if role == "weighted_regions" else plans["region"].buffer(FAR_POLE)
+            if not lies_in.intersects(outline(surface.triangles)):
+                yield Problem(
+                    "WARNING",
+                    f"{surface.name!r} among the {ROLES[role].lower()} lies outside the region of interest: "
+                    "move it or take it out.",
+                    surface.name,
+                )
+
+
+def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Problem]:
+    poles = contents.poles
+    if not poles:
+        return
+    feet = np.array([pole.base for pole in poles])
+    distance = shapely.distance(region, shapely.points(feet[:, :2])) if not region.is_empty else np.zeros(len(feet))
+    yield from _named(
+        [
+            (pole.name, f"The pole {pole.name!r} stands {away:,.0f} m from the region: take it out of the poles.")
+            for pole, away in zip(poles, distance, strict=True)
+            if away > FAR_POLE
+        ],
+        f"poles stand more than {FAR_POLE:g} m from the region: take them out of the poles",
+    )
+    under = np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, "roads"), *_triangles(contents, "ground")])
+    above = feet[:, 2] - surface_height(feet[:, :2], under) if len(under) else np.full(len(feet), np.nan)
+    yield from _named(
+        [
+            (
+                pole.name,
+                f"The foot of the pole {pole.name!r} is {_level(high)} the ground: move it, or its origin, there.",
+            )
+            for pole, high in zip(poles, above, strict=True)
+            if abs(high) > OFF_GROUND
+        ],
+        f"poles have their foot more than {OFF_GROUND:g} m above or below the ground: move them or their origins",
+    )
+    nearest = shapely.STRtree(shapely.points(feet[:, :2])).query(
+        shapely.points(feet[:, :2]), predicate="dwithin", distance=SAME_PLACE
+    )
+    yield from _named(
+        [
+            (poles[b].name, f"The poles {poles[a].name!r} and {poles[b].name!r} stand at one place: take one out.")
+            for a, b in nearest.T
+            if a < b
+        ],
+        "poles stand where another one stands: take one of each two out",
+    )
+
+
+def _level(high: float) -> str:
+    return f"{abs(high):.1f} m {'above' if high > 0 else 'below'}"
+
+
+def _named(culprits: list[tuple[str, str]], together: str) -> Iterator[Problem]:
+    """Name a few culprits one by one, and the others together."""
+    yield from (Problem("WARNING", text, name) for name, text in culprits[:MOST_NAMED])
+    rest = culprits[MOST_NAMED:]
+    if rest:
+        yield Problem("WARNING", f"{len(rest):,} more {together}.", rest[0][0])
+
+
+def _duplicates(contents: SceneContents) -> Iterator[Problem]:
+    first: dict[tuple[str, str], str] = {}
+    for surface in contents.surfaces:
+        key = (surface.role, digest(np.round(surface.triangles, 4)))
+        if key in first and surface.role == "weighted_regions":
+            yield Problem(
+                "WARNING",
+                f"The weighted regions {first[key]!r} and {surface.name!r} are the same: their weights multiply; "
+                "take one out.",
+                surface.name,
+            )
+        elif key in first:
+            yield Problem(
+                "WARNING",
+                f"{first[key]!r} and {surface.name!r} among the {ROLES[surface.role].lower()} are the same: "
+                "rays are cast at both; take one out.",
+                surface.name,
+            )
+        first.setdefault(key, surface.name)
+
+
+def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
+    """Look at the road within the region: holes, steps, and one road closely above another."""
+    region, road = plans["region"], plans["roads"]
+    within = region.intersection(road)
+    if within.area == 0:
+        return
+    yield from _holes(contents, road, region)
+    triangles = np.concatenate(_triangles(contents, "roads"))
+    spacing = max(SAMPLE, math.sqrt(region.area / MOST_SAMPLES))
+    try:
+        places = lay_targets(region, triangles, spacing).xyz
+    except SeipError:  # too narrow for the grid: nothing to be seen of steps
+        return
+    yield from _steps(contents, places, spacing)
+    yield from _layers(contents, places, triangles)
+
+
+def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) -> Iterator[Problem]:
+    rings = [ring for part in shapely.get_parts(road) if part.geom_type == "Polygon" for ring in part.interiors]
+    areas = [shapely.Polygon(ring) for ring in rings]
+    holes = [hole for hole in areas if LEAST_HOLE < hole.area <= HOLE and hole.intersects(region)]
+    if holes:
+        largest = max(holes, key=lambda hole: float(hole.area))
+        yield Problem(
+            "WARNING",
+            f"The road has {_number(len(holes), 'hole')} of up to {largest.area:.2g} m², as at {_place(largest)}: "
+            "there are no targets in them; close them where faces are missing.",
+            _nearest_road(contents, largest),
+        )
+
+
+def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[Problem]:
+    tree = shapely.STRtree(shapely.points(places[:, :2]))
+    pairs = tree.query(shapely.points(places[:, :2]), predicate="dwithin", distance=1.1 * spacing)
+    first, second = pairs[:, pairs[0] < pairs[1]]
+    rise = np.abs(places[first, 2] - places[second, 2])
+    steep = np.flatnonzero(rise > STEP * spacing)
+    if len(steep):
+        worst = steep[np.argmax(rise[steep])]
+        point = shapely.Point(places[first[worst], :2])
+        yield Problem(
+            "WARNING",
+            f"The road has steps or slopes over {STEP:.0%} at {_number(len(steep), 'place')}, up to "
+            f"{rise[worst]:.2g} m at {_place(point)}: targets there lie on no road, unless it is a bridge's edge.",
+            _nearest_road(contents, point),
+        )
+
+
+def _layers(contents: SceneContents, places: Float, triangles: Float) -> Iterator[Problem]:
+    point, heights = heights_over(places[:, :2], triangles)
+    below = places[point, 2] - heights
+    hidden = np.unique(point[(below > LAYERS[0]) & (below < LAYERS[1])])
+    if len(hidden):
+        at = shapely.Point(places[hidden[0], :2])
+        yield Problem(
+            "WARNING",
+            f"Road lies {LAYERS[0]:g} to {LAYERS[1]:g} m above other road at {_number(len(hidden), 'place')}, as at "
+            f"{_place(at)}: targets lie on the upper one; take out what is no road.",
+            _nearest_road(contents, at),
+        )
+
+
+def _nearest_road(contents: SceneContents, place: BaseGeometry) -> str:
+    """Return the name of the road object whose faces come nearest to a place in plan."""
+    centre = np.array(place.centroid.coords[0])
+
+    def distance(surface: Surface) -> float:
+        return float(np.hypot(*(surface.triangles[:, :, :2] - centre).reshape(-1, 2).T).min())
+
+    return min(_of(contents, "roads"), key=distance).name
+
+
+def _place(area: BaseGeometry) -> str:
+    middle = area.centroid
+    return f"({middle.x:.0f}, {middle.y:.0f})"

@@ -1,0 +1,120 @@
+"""What the bridge reads from a scene: plain arrays and polygons, nothing of Blender's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+
+DEFAULT_WEIGHT = 2.0
+"""Of a weighted region that does not say its own."""
+
+DEFAULT_REFLECTIVITY = 0.3
+"""Of a surface that is not known to reflect otherwise."""
+
+FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
+"""Who says that a pole stands there: the map, the site description, or nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """One object's evaluated surface.
+
+    Parameters
+    ----------
+    name : str
+        The object's name, for messages.
+    triangles : (n, 3, 3) float64, metres
+        Corners in local site axes, z up.
+    reflectivity : (n,) float64, optional
+        Share of the light (0 to 1) that each triangle scatters back; `DEFAULT_REFLECTIVITY` where not given.
+    """
+
+    name: str
+    triangles: Float
+    reflectivity: Float | None = None
+
+
+def joined(meshes: Sequence[Mesh]) -> Float:
+    """Return the triangles (n, 3, 3) of all meshes."""
+    return np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
+
+
+@dataclass(frozen=True, eq=False)
+class Pole:
+    """A post that can carry a sensor.
+
+    Parameters
+    ----------
+    name : str
+        The object's name.
+    base : (3,) float64, metres
+        Foot of the post, local site axes.
+    height : float or None, metres
+        Top of the post above its foot; None where that is not known, and any height will do.
+    forbidden, mandatory : bool
+        No sensor may hang here; at least one sensor must.
+    source : str
+        `FROM_MAP`, `DESCRIBED` or `ASSUMED`; empty where the user put it into the scene.
+    """
+
+    name: str
+    base: Float
+    height: float | None = None
+    forbidden: bool = False
+    mandatory: bool = False
+    source: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedArea:
+    """A named area in plan, local site axes in metres; ``weight`` counts for weighted regions alone."""
+
+    name: str
+    polygon: BaseGeometry
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SceneGeometry:
+    """A scene as the core sees it. All coordinates are local: metres, z up, right-handed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene, for titles.
+    origin : (3,) float64, metres
+        Map coordinates of the local origin: map = local + origin.
+    roads : tuple of Mesh
+        Surfaces on which targets stand; rays end on them too.
+    ground : tuple of Mesh
+        Other surfaces that rays end on (pavements, verges); no targets.
+    occluders : tuple of Mesh
+        Everything else that stands in the way (buildings, trees, poles).
+    region : shapely geometry
+        Region of interest in plan.
+    weighted_regions, forbidden_areas, mandatory_areas : tuple of NamedArea
+        In plan. A weighted region multiplies the weight of the targets in it.
+        At least one sensor must stand in each mandatory area.
+    candidate_areas : shapely geometry
+        Where a new post may stand, in plan.
+    poles : tuple of Pole
+        Existing posts that can carry a sensor.
+    """
+
+    name: str
+    origin: Float
+    roads: tuple[Mesh, ...]
+    ground: tuple[Mesh, ...]
+    occluders: tuple[Mesh, ...]
+    region: BaseGeometry
+    candidate_areas: BaseGeometry = field(default_factory=Polygon)
+    weighted_regions: tuple[NamedArea, ...] = ()
+    forbidden_areas: tuple[NamedArea, ...] = ()
+    mandatory_areas: tuple[NamedArea, ...] = ()
+    poles: tuple[Pole, ...] = ()

@@ -1,0 +1,90 @@
+"""The site: targets, candidate poses and the static triangles between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..errors import SeipError
+from .candidates import Candidates, CandidateSettings, lay_candidates
+from .far_objects import without_far_objects
+from .scene_geometry import SceneGeometry, joined
+from .targets import Targets, lay_targets
+
+__all__ = ["Candidates", "Site", "Targets", "make_site"]
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """All that visibility and placement need of a place.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    origin : (3,) float64, metres
+        Map coordinates of the local origin: map = local + origin.
+    region : shapely geometry
+        Region of interest in plan, local.
+    targets : Targets
+    candidates : Candidates
+    triangles : (n, 3, 3) float64, metres
+        All static surfaces that a ray which counts can end on, roads included.
+    """
+
+    name: str
+    origin: Float
+    region: BaseGeometry
+    targets: Targets
+    candidates: Candidates
+    triangles: Float
+
+
+def make_site(
+    geometry: SceneGeometry, settings: CandidateSettings, grid_spacing: float = 1.0, reach: float = math.inf
+) -> Site:
+    """Lay targets and candidates into a scene.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : CandidateSettings
+    grid_spacing : float, metres
+        Distance between neighbouring targets.
+    reach : float, metres
+        What is farther from the region ends no ray that counts, and is left out.
+
+    Returns
+    -------
+    Site
+        The same whatever the objects are called and whatever their order.
+
+    Raises
+    ------
+    SeipError
+        There is no road, no target or no candidate.
+    """
+    if not geometry.roads:
+        raise SeipError("there is no road: put the meshes of the carriageway into SEIP Roads")
+    road = joined(geometry.roads)
+    near, _ = without_far_objects(geometry, geometry.region, reach)
+    everything = joined((*near.roads, *near.ground, *near.occluders))
+    return Site(
+        name=geometry.name,
+        origin=geometry.origin,
+        region=geometry.region,
+        targets=lay_targets(geometry.region, road, grid_spacing, geometry.weighted_regions),
+        candidates=lay_candidates(geometry, settings),
+        triangles=_in_order(everything),
+    )
+
+
+def _in_order(triangles: Float) -> Float:
+    """Triangles sorted by their coordinates, so that the order of objects leaves no trace."""
+    order = np.lexsort(triangles.reshape(len(triangles), 9).T[::-1])
+    ordered: Float = triangles[order]
+    return ordered

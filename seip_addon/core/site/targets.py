@@ -1,0 +1,123 @@
+"""Target points: a uniform grid on the road surface inside the region of interest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..geometry.plan import surface_height
+from .scene_geometry import NamedArea
+
+MAX_TARGETS = 2_000_000
+"""A grid beyond this is a slip of the keyboard, not a plan."""
+
+FINEST, WIDEST = 0.01, 1000.0
+"""Metres between which a spacing makes sense."""
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """The road points to be seen.
+
+    Parameters
+    ----------
+    xyz : (t, 3) float64, metres
+        On the road surface, local site axes.
+    weight : (t,) float64
+        Importance in the weighted problem, 1 outside every weighted region.
+    central : (t,) bool
+        Whether the target lies in some weighted region.
+    spacing : float, metres
+        Side of the square that each target stands for.
+    """
+
+    xyz: Float
+    weight: Float
+    central: NDArray[np.bool_]
+    spacing: float
+
+    def __len__(self) -> int:
+        """Return the number of targets."""
+        return len(self.xyz)
+
+
+def lay_targets(
+    region: BaseGeometry, road: Float, spacing: float, weighted_regions: Sequence[NamedArea] = ()
+) -> Targets:
+    """Lay a uniform grid over the region and keep the points that lie on the road.
+
+    The grid is centred in the region's bounding box, so that moving the whole
+    scene moves the targets with it. Where road surfaces lie above each other
+    the target stands on the highest.
+
+    Parameters
+    ----------
+    region : shapely geometry
+        Region of interest in plan, metres.
+    road : (n, 3, 3) float64, metres
+        Triangles of the road surface.
+    spacing : float, metres
+        Distance between neighbouring targets.
+    weighted_regions : sequence of NamedArea
+        Where they overlap, weights multiply.
+
+    Returns
+    -------
+    Targets
+        In order of x, then y.
+
+    Raises
+    ------
+    SeipError
+        The spacing is not positive or far too small, the region is empty, or
+        no grid point lies on the road inside it.
+    """
+    if not FINEST <= spacing <= WIDEST:
+        raise SeipError(f"the grid spacing must be {FINEST:g} to {WIDEST:g} m, not {spacing}")
+    if region.is_empty:
+        raise SeipError("the region of interest is empty: put a mesh over the road into SEIP Region")
+    plan = _grid(region, spacing)
+    height = surface_height(plan, road)
+    on_road = np.isfinite(height)
+    if not on_road.any():
+        raise SeipError(
+            f"no target: no point of the {spacing:g} m grid lies on the road inside the region of interest; "
+            "let SEIP Region and SEIP Roads overlap, or choose a finer grid"
+        )
+    xyz = np.column_stack((plan[on_road], height[on_road]))
+    weight = np.ones(len(xyz))
+    central = np.zeros(len(xyz), dtype=bool)
+    for area in weighted_regions:
+        if not (np.isfinite(area.weight) and area.weight > 0):
+            raise SeipError(f"the weight of {area.name!r} must be a positive number, not {area.weight}")
+        inside = shapely.intersects_xy(area.polygon, xyz[:, 0], xyz[:, 1])
+        weight[inside] *= area.weight
+        central |= inside
+    # A micrometre of rounding takes off what the map's far origin left of noise.
+    return Targets(np.round(xyz, 6), weight, central, float(spacing))
+
+
+def _grid(region: BaseGeometry, spacing: float) -> Float:
+    low_x, low_y, high_x, high_y = region.bounds
+    sides = (high_x - low_x, high_y - low_y)
+    counts = [max(1, int(np.floor(side / spacing + 1e-6))) for side in sides]  # whole cells, targets in their middles
+    if counts[0] * counts[1] > 50 * MAX_TARGETS or region.area / spacing**2 > MAX_TARGETS:
+        raise SeipError(
+            f"a grid of {spacing:g} m would lay about {region.area / spacing**2:.3g} targets in the region; "
+            f"choose a coarser one (at most {MAX_TARGETS:,} targets)"
+        )
+    axes = [
+        centre + (np.arange(count) - (count - 1) / 2) * spacing
+        for count, centre in zip(counts, ((low_x + high_x) / 2, (low_y + high_y) / 2), strict=True)
+    ]
+    x, y = (values.ravel() for values in np.meshgrid(*axes, indexing="ij"))
+    shapely.prepare(region)
+    inside = shapely.intersects_xy(region, x, y)
+    return np.column_stack((x[inside], y[inside]))

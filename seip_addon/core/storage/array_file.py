@@ -1,0 +1,256 @@
+"""Files of named arrays and a header, of which nothing is believed before it has been checked."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SeipError
+from .files import digest, whole_file
+
+LARGEST = 1 << 32
+"""Bytes of all arrays of a file together at most: 4 GiB."""
+
+LARGEST_HEADER = 1 << 27
+"""Bytes of the header, four for each of its characters: 128 MiB."""
+
+LONGEST_TEXT = 256
+"""Characters of an entry of an array of text at most."""
+
+_UNDIGESTED = 1
+"""The version of files that hold no digest."""
+
+_DEFLATED_AT_MOST = 1032
+"""Bytes that one byte of DEFLATE can stand for (RFC 1951)."""
+
+_NPY = re.compile(
+    rb"\x93NUMPY\x01\x00.."
+    rb"\{'descr': '([<|][a-zA-Z]\d{1,9})', 'fortran_order': (?:True|False), 'shape': \(([\d, ]*)\), \} *\n",
+    re.DOTALL,
+)
+"""How NumPy begins an array in a file, with its type and shape."""
+
+
+class ContentError(ValueError):
+    """What is wrong with the content of a file, as a part of a sentence."""
+
+
+@dataclass(frozen=True)
+class ArrayRule:
+    """What an array of a file must be.
+
+    Parameters
+    ----------
+    dtype : str
+        NumPy's name of its type; ``U`` is text of any length up to `LONGEST_TEXT`.
+    shape : tuple of int and str
+        Its lengths. Those of the same name are the same number in all arrays of a file.
+    least, most : float
+        Between which all values lie. NaN never does.
+    nan : bool
+        Whether values may be NaN.
+    """
+
+    dtype: str
+    shape: tuple[int | str, ...]
+    least: float = -math.inf
+    most: float = math.inf
+    nan: bool = False
+
+    def check(self, name: str, array: NDArray[Any]) -> None:
+        """Raise `ContentError` where values lie outside the range."""
+        if array.dtype.kind not in "fiu":
+            return
+        within = (array >= self.least) & (array <= self.most)
+        if self.nan:
+            within |= np.isnan(array)
+        if not within.all():
+            worst = array[~within].flat[0]
+            raise ContentError(f"{name} has the value {worst:g}, not {self.least:g} to {self.most:g}")
+
+
+@dataclass(frozen=True)
+class ArrayFile:
+    """A kind of file that holds named arrays and a header: npz, with JSON as the text ``header``.
+
+    The header holds a digest of itself and of the arrays, but in files of version 1.
+
+    Parameters
+    ----------
+    schema : str
+        What the files are, for programs.
+    version : int
+        Of their layout.
+    what : str
+        What a file holds, for messages: "visibility grid".
+    remedy : str
+        How to get a new one, for messages: "delete it and compute it again".
+    arrays : mapping of str to ArrayRule
+        All arrays of a file, by name.
+    compressed : bool
+        Not worth its time for arrays of measurements, whose noise does not compress.
+    undigested : bool
+        Whether files of version 1 are read as well. Those of other versions are refused.
+    """
+
+    schema: str
+    version: int
+    what: str
+    remedy: str
+    arrays: Mapping[str, ArrayRule]
+    compressed: bool = True
+    undigested: bool = False
+
+    def save(self, path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a header, whose values JSON knows, and the arrays by their names."""
+        typed = {
+            name: np.asarray(arrays[name], dtype=None if rule.dtype == "U" else rule.dtype, order="C")
+            for name, rule in self.arrays.items()
+        }
+        full = {"schema": self.schema, "version": self.version, **header}
+        text = json.dumps({**full, "digest": _digest(full, typed)}, ensure_ascii=False, allow_nan=False)
+        write = np.savez_compressed if self.compressed else np.savez
+        content = io.BytesIO()  # NumPy leaves an archive unclosed that the disk had no room for
+        write(content, header=np.array(text), **typed)
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content.getvalue())
+
+    @contextmanager
+    def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:
+        """Yield the header and the arrays; what a block trips over in them is the file's fault.
+
+        Sizes are compared with the rules and with each other before any array
+        is read.
+
+        Raises
+        ------
+        SeipError
+            The file is not there, damaged, something else, or of another version.
+        """
+        try:
+            with Path(path).open("rb") as file, _archive(file) as archive:
+                header = _read_header(archive)
+                known = header["schema"] == self.schema and header["version"] in self._versions()
+                if known:
+                    yield header, self._read_arrays(archive, header)
+        except FileNotFoundError as error:
+            raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
+        except ContentError as error:
+            raise SeipError(f"{path} is no {self.what}, or is damaged: {error}; {self.remedy}") from error
+        except _DAMAGE as error:
+            raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
+        if not known:
+            raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
+
+    def _versions(self) -> tuple[int, ...]:
+        return (_UNDIGESTED, self.version) if self.undigested else (self.version,)
+
+    def _read_arrays(self, archive: zipfile.ZipFile, header: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+        members = {f"{name}.npy": name for name in self.arrays}
+        names = archive.namelist()
+        if sorted(names) != sorted([*members, "header.npy"]):
+            raise ContentError("other arrays than these belong into it")
+        self._check_claims({members[name]: _claim(archive, name) for name in members})
+        arrays = {name: _array(archive, member) for member, name in members.items()}
+        content = {name: value for name, value in header.items() if name != "digest"}
+        if (header["version"] != _UNDIGESTED or "digest" in header) and header["digest"] != _digest(content, arrays):
+            raise ContentError("its content is not what was written")
+        for name, rule in self.arrays.items():
+            rule.check(name, arrays[name])
+        return arrays
+
+    def _check_claims(self, claims: Mapping[str, tuple[np.dtype[Any], tuple[int, ...]]]) -> None:
+        """See that types and lengths are those of the rules, and that all arrays fit into memory."""
+        lengths: dict[str, int] = {}
+        for name, rule in self.arrays.items():
+            dtype, shape = claims[name]
+            text = dtype.kind == rule.dtype == "U" and dtype.itemsize <= 4 * LONGEST_TEXT
+            if not text and dtype != np.dtype(rule.dtype):
+                raise ContentError(f"{name} is of the type {dtype}")
+            if len(shape) != len(rule.shape):
+                raise ContentError(f"{name} has {len(shape)} dimensions")
+            for length, wanted in zip(shape, rule.shape, strict=True):
+                other = wanted if isinstance(wanted, int) else lengths.setdefault(wanted, length)
+                if length != other:
+                    raise ContentError(f"{name} has the length {length} in place of {other}")
+        if sum(math.prod(shape) * dtype.itemsize for dtype, shape in claims.values()) > LARGEST:
+            raise ContentError(f"it holds more than {LARGEST >> 30} GiB")
+
+
+def _archive(file: BinaryIO) -> zipfile.ZipFile:
+    """Open an archive that begins with the file, as NumPy asks for: others may have anything before it."""
+    if file.read(4) != b"PK\x03\x04":
+        raise ContentError("it does not begin with an array")
+    return zipfile.ZipFile(file)
+
+
+def _read_header(archive: zipfile.ZipFile) -> dict[str, Any]:
+    dtype, shape = _claim(archive, "header.npy")
+    if dtype.kind != "U" or shape != () or dtype.itemsize > LARGEST_HEADER:
+        raise ContentError("it has no header")
+    text = str(_array(archive, "header.npy"))
+    header = json.loads(text, parse_constant=_refuse_constant)
+    if not isinstance(header, dict):
+        raise ContentError("it has no header")
+    return header
+
+
+def _claim(archive: zipfile.ZipFile, member: str) -> tuple[np.dtype[Any], tuple[int, ...]]:
+    """Return the type and the shape that a member claims, once its size bears them out."""
+    info = archive.getinfo(member)
+    if info.flag_bits & 1 or info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+        raise ContentError(f"{member} is packed as NumPy packs none")
+    with archive.open(info) as stream:
+        begin = _NPY.match(stream.read(256))
+    if begin is None:
+        raise ContentError(f"{member} is no array")
+    dtype = np.dtype(begin[1].decode())
+    shape = tuple(int(length) for length in begin[2].decode().split(",") if length.strip())
+    size = begin.end() + math.prod(shape) * dtype.itemsize
+    if size != info.file_size or size > _DEFLATED_AT_MOST * (info.compress_size + 1):
+        raise ContentError(f"{member} claims {size:,} bytes and has none of them")
+    return dtype, shape
+
+
+def _array(archive: zipfile.ZipFile, member: str) -> NDArray[Any]:
+    with archive.open(member) as stream:
+        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)  # type: ignore[no-untyped-call]
+    return array
+
+
+def _digest(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
+    named = [part for name in sorted(arrays) for part in (name, arrays[name])]
+    return digest(json.dumps(header, sort_keys=True), *named)
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ContentError(f"its header holds the number {name}")
+
+
+_DAMAGE = (
+    OSError,
+    EOFError,
+    ArithmeticError,
+    AttributeError,
+    ValueError,
+    LookupError,
+    TypeError,
+    RuntimeError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading an npz, or taking from it what should be there, raises where the file is not what it should be."""

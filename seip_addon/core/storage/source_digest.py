@@ -1,0 +1,91 @@
+"""Digests of program code, by which stored results are told from those of another version of it."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import importlib.util
+import sys
+from collections.abc import Iterator
+from importlib.machinery import ModuleSpec, PathFinder
+
+from ..errors import SeipError
+from .files import digest
+
+CORE = __package__.rpartition(".")[0]
+"""The core's full name: Blender gives extensions another than a checkout has."""
+
+_OURS = (CORE, "headless")
+
+
+@functools.cache
+def source_digest(module: str) -> str:
+    """Return a digest of the sources of a module and of all that it imports, directly or not.
+
+    What counts are the modules of the core and of `headless`, wherever in a module they are imported, and the
+    packages that hold them. Sources are read through their loaders, so that they may lie in an archive; none is run.
+
+    Parameters
+    ----------
+    module : str
+        Its full name; of a module that asks for itself, ``__name__``.
+
+    Raises
+    ------
+    SeipError
+        A source is not there.
+    """
+    sources = _sources(module)
+    return digest(*(part for name in sorted(sources) for part in (name.removeprefix(CORE), sources[name])))
+
+
+def _sources(module: str) -> dict[str, str]:
+    """Return the sources of a module and of what it imports, by full name."""
+    sources: dict[str, str] = {}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in sources or not _is_ours(name):
+            continue
+        spec = _spec(name)
+        read = getattr(spec and spec.loader, "get_source", None)  # of files, archives and folders without a module
+        source = read and read(name)
+        if spec is None or source is None:
+            raise SeipError(f"the source of {name} is not there: install the program again")
+        sources[name] = source
+        waiting += [name.rpartition(".")[0], *_imported(spec, source)]
+    return sources
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    """Find a module without importing the packages that hold it, as `importlib.util.find_spec` does."""
+    if name in sys.modules:
+        return sys.modules[name].__spec__
+    package = name.rpartition(".")[0]
+    if not package:
+        return PathFinder.find_spec(name)
+    holder = _spec(package)
+    if holder is None or holder.submodule_search_locations is None:
+        return None
+    return PathFinder.find_spec(name, holder.submodule_search_locations)
+
+
+def _is_ours(name: str) -> bool:
+    return any(name == part or name.startswith(f"{part}.") for part in _OURS)
+
+
+def _imported(spec: ModuleSpec, source: str) -> Iterator[str]:
+    """Yield the full names of the modules of ours that a module imports, wherever in it."""
+    package = spec.name if spec.submodule_search_locations is not None else spec.name.rpartition(".")[0]
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            name = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
+            if not _is_ours(name):
+                continue
+            yield name
+            found = _spec(name)
+            if found is not None and found.submodule_search_locations is not None:  # else they are no modules
+                parts = (f"{name}.{alias.name}" for alias in node.names)
+                yield from (part for part in parts if _spec(part) is not None)

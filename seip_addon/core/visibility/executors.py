@@ -1,0 +1,155 @@
+"""Who works on the pieces: threads of this process, or the workers of a Dask scheduler on any number of machines."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
+from ..errors import SeipError
+from ..lidar import LidarModel
+from ..site.site import Site
+from .observer import Observer, Rows
+from .ray_casting import Engine, RayCaster, make_ray_caster
+
+Submit = Callable[[Integer], Future[Rows]]
+
+_RAYS_BETWEEN_LOOKS = 1 << 15  # a tenth of a second's work or less
+_SECONDS_FOR_AN_ANSWER = 20
+_LOST_WORKERS = 3  # so many die over one piece before the piece is held to be the cause
+
+
+@dataclass(frozen=True, eq=False)
+class ObserverTask:
+    """What an `Observer` is made from, to be sent to where it is needed.
+
+    Parameters
+    ----------
+    site : Site
+    models : mapping of str to LidarModel
+    delta : float, metres
+    min_intensity : float
+    engine : {"bvh", "embree"}
+    keep : (n,) bool
+        Which triangles of the site rays are cast against.
+    """
+
+    site: Site
+    models: Mapping[str, LidarModel]
+    delta: float
+    min_intensity: float
+    engine: Engine
+    keep: Boolean
+
+
+@contextmanager
+def threads_of(task: ObserverTask, threads: int | None = None) -> Iterator[Submit]:
+    """Yield what starts the work on a piece in a thread of this process; unfinished work ends with the block, soon.
+
+    Parameters
+    ----------
+    task : ObserverTask
+    threads : int, optional
+        How many work at once at most.
+    """
+    stop = threading.Event()
+    caster = StoppableCaster(make_ray_caster(task.site.triangles, task.engine, task.keep), stop)
+    observer = Observer(task.site, task.models, task.delta, task.min_intensity, caster)
+    pool = ThreadPoolExecutor(min(caster.threads, threads or caster.threads))
+    try:
+        yield lambda poses: pool.submit(observer.see, poses)
+    finally:
+        stop.set()
+        pool.shutdown(cancel_futures=True)
+
+
+class StoppableCaster:
+    """Casts rays until it is told to stop, some at a time: then nobody waits for the rest of them.
+
+    Parameters
+    ----------
+    caster : RayCaster
+        That does it.
+    stop : Event
+        Casting raises `CancelledError` once this is set.
+    """
+
+    def __init__(self, caster: RayCaster, stop: threading.Event) -> None:
+        self._caster, self._stop = caster, stop
+        self.name, self.triangles, self.threads = caster.name, caster.triangles, caster.threads
+
+    def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
+        """Cast rays; see `RayCaster.cast`."""
+        hits = []
+        for begin in range(0, max(len(directions), 1), _RAYS_BETWEEN_LOOKS):
+            if self._stop.is_set():
+                raise CancelledError
+            some = slice(begin, begin + _RAYS_BETWEEN_LOOKS)
+            hits.append(self._caster.cast(origin if origin.ndim == 1 else origin[some], directions[some], max_range))
+        distance, triangle = zip(*hits, strict=True)
+        return np.concatenate(distance), np.concatenate(triangle)
+
+
+@contextmanager
+def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
+    """Yield what starts the work on a piece at a worker of a Dask scheduler.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, like ``tcp://10.0.0.1:8786``, or ``tls://10.0.0.1:8786`` with the certificates that Dask's
+        settings name. Its workers must be able to import this package.
+    task : ObserverTask
+
+    Raises
+    ------
+    SeipError
+        Dask is not installed, no scheduler answers, it has no workers, or a piece ended one worker after the other.
+    """
+    try:
+        import dask  # noqa: PLC0415 - an extra that need not be installed
+        from distributed import Client, KilledWorker  # noqa: PLC0415 - as above
+    except ImportError as error:
+        raise SeipError(
+            "a scheduler needs Dask, which is not installed; install the group 'cluster' of pyproject.toml"
+        ) from error
+    try:
+        client = Client(address, timeout=_SECONDS_FOR_AN_ANSWER, set_as_default=False)
+    except TypeError as error:  # what distributed raises on an address with TLS, and no certificates
+        raise SeipError(
+            f"{address} needs certificates: name them in Dask's settings distributed.comm.tls.ca-file, client.cert and "
+            "client.key"
+        ) from error
+    except (OSError, ValueError) as error:
+        raise SeipError(f"no Dask scheduler answers at {address}; start one, or check the address") from error
+    with client:
+        if not client.scheduler_info()["workers"]:
+            raise SeipError(f"the Dask scheduler at {address} has no workers; start some where this package is")
+        try:
+            with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
+                # a task, not scattered data: a scheduler computes it again where the worker that held it dies
+                everywhere = client.submit(_same, task, pure=False)
+            with client.get_executor(pure=False) as executor:
+                yield lambda poses: executor.submit(_see, everywhere, poses)
+        except KilledWorker as error:
+            raise SeipError(f"workers of {address} died over one piece of the work: {error}") from error
+
+
+def _same(task: ObserverTask) -> ObserverTask:
+    return task
+
+
+def _see(task: ObserverTask, poses: Integer) -> Rows:
+    return _observer(task).see(poses)
+
+
+@functools.lru_cache(maxsize=1)  # a worker holds one object for all pieces
+def _observer(task: ObserverTask) -> Observer:
+    caster = make_ray_caster(task.site.triangles, task.engine, task.keep)
+    return Observer(task.site, task.models, task.delta, task.min_intensity, caster)

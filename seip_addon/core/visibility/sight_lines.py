@@ -1,0 +1,100 @@
+"""What one sensor sees of the targets, as lines to draw, and which targets in its range it does not see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Boolean, Float, Integer
+from ..lidar import LidarModel
+from ..site.candidates import Candidates
+from ..site.site import Site
+from ..site.target_squares import target_squares
+
+MOST_LINES = 1500
+"""More than these are a carpet, not lines: a sample of the targets is drawn."""
+SEED = 0
+"""Of the sample."""
+SAME_PLACE = 0.01
+"""Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
+SAME_TURN = 5e-5
+"""Cosines by which it may be turned otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class SightLines:
+    """What one pose sees.
+
+    Parameters
+    ----------
+    eye : (3,) float64, metres
+        Optical centre, local site axes.
+    ends : (n, 3) float64, metres
+        Targets that it sees, a sample of `MOST_LINES` where there are more.
+    seen : int
+        How many it sees.
+    in_range : int
+        How many are within its range.
+    shadows : (m, 4, 3) float64, metres
+        Squares of the targets within its range that it does not see.
+    """
+
+    eye: Float
+    ends: Float
+    seen: int
+    in_range: int
+    shadows: Float
+
+
+def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> SightLines:
+    """Return what a pose sees, and what it does not.
+
+    Parameters
+    ----------
+    site : Site
+    pose : int
+        Index among the site's candidates.
+    model : LidarModel
+        That hangs there.
+    row : (t,) bool
+        Which targets it sees: its row of the visibility grid.
+    """
+    targets = site.targets
+    eye = site.candidates.xyz[pose]
+    distance = np.linalg.norm(targets.xyz - eye, axis=1)
+    in_range = row | ((distance >= model.min_range) & (distance <= model.max_range))
+    seen = np.flatnonzero(row)
+    return SightLines(
+        eye=eye,
+        ends=targets.xyz[_sample(seen)],
+        seen=len(seen),
+        in_range=int(np.count_nonzero(in_range)),
+        shadows=target_squares(targets)[in_range & ~row],
+    )
+
+
+def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float) -> int | None:
+    """Return the candidate pose of a sensor type at a place and turned so, None where there is none.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    sensor : str
+        Its catalogue key.
+    xyz : (3,) float64, metres
+    orientation : (3, 3) float64
+        Rotation from the sensor's axes to the site's.
+    """
+    same = np.flatnonzero(candidates.sensor == sensor)
+    away = np.linalg.norm(candidates.xyz[same] - xyz, axis=1)
+    near = same[np.argsort(away, kind="stable")][: np.count_nonzero(away <= SAME_PLACE)]
+    turned_alike = (np.abs(candidates.orientation(int(pose)) - orientation).max() <= SAME_TURN for pose in near)
+    return next((int(pose) for pose, alike in zip(near, turned_alike, strict=True) if alike), None)
+
+
+def _sample(numbers: Integer) -> Integer:
+    if len(numbers) <= MOST_LINES:
+        return numbers
+    chosen: Integer = np.sort(np.random.default_rng(SEED).choice(numbers, MOST_LINES, replace=False))
+    return chosen

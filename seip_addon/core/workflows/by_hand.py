@@ -1,0 +1,152 @@
+"""A deployment whose sensors hang where a hand has put them, judged as what it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Boolean, Float
+from ..errors import SeipError
+from ..geometry.orientation import angles_of, orientation
+from ..geometry.plan import surface_height
+from ..lidar import find_models, load_catalogue
+from ..placement import Placement
+from ..placement.deployment import Sensor, deployed, sensor_at
+from ..placement.goal import MOVED, Goal, Plan, target_weights
+from ..progress import Progress
+from ..results.headings import degrees, tilt_degrees
+from ..results.placement_record import Record
+from ..scans.sensor import MountedSensor
+from ..site.scene_geometry import joined
+from ..visibility.grid import VisibilityGrid
+from ..visibility.rotated_sensors import Onlooker, onlooker
+from ..visibility.sight_lines import pose_at
+from .survey import Layout, recorded_goal
+
+BY_HAND = "by hand"
+"""Name of a place that is no position of the site."""
+
+
+def judge(
+    layout: Layout, grid: VisibilityGrid, goal: Goal, hung: Sequence[MountedSensor], places: Mapping[str, str]
+) -> Generator[Progress, None, Plan]:
+    """Find what sensors see where they hang; those at candidate poses see what the grid says.
+
+    Parameters
+    ----------
+    layout : Layout
+    grid : VisibilityGrid
+        Of the layout.
+    goal : Goal
+        That the placement answered which they were moved from: its weights, and whether a price was sought.
+    hung : sequence of MountedSensor
+        In the order of their labels.
+    places : mapping of str to str
+        Names of the places by label, for sensors at no candidate pose.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Plan
+        Without bound, gap or greedy answer.
+
+    Raises
+    ------
+    SeipError
+        A sensor hangs below the ground.
+    """
+    site, models = layout.site, layout.models
+    eyes: Onlooker | None = None
+    sensors: list[Sensor] = []
+    rows: list[Boolean] = []
+    for done, one in enumerate(hung):
+        yield Progress(done, len(hung), "looking from where the sensors hang")
+        pose = pose_at(site.candidates, one.model.key, one.xyz, one.orientation)
+        if pose is not None:
+            sensors.append(sensor_at(site, models, one.label, pose))
+            rows.append(grid.visible[pose])
+            continue
+        if eyes is None:
+            eyes = onlooker(site, layout.settings.visibility, layout.settings.engine)
+        sensor = _elsewhere(layout, one, places.get(one.label, BY_HAND))
+        sensors.append(sensor)
+        rows.append(eyes.see(sensor.model, sensor.xyz, sensor.orientation))
+    seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
+    deployment = deployed(site, sensors, seen)
+    covered = float(target_weights(site, goal)[deployment.seen_by > 0].sum())
+    placement = Placement(
+        chosen=np.array([sensor.pose for sensor in sensors if sensor.pose is not None], dtype=np.int64),
+        objective=deployment.price if goal.cheapest else covered,
+        bound=math.nan,
+        gap=math.inf,
+        status=MOVED,
+        solver="none",
+        seconds=0.0,
+        covered=covered,
+        price=deployment.price,
+    )
+    return Plan(goal, placement, None, deployment)
+
+
+def restored_by_hand(layout: Layout, grid: VisibilityGrid, record: Record) -> Generator[Progress, None, Plan]:
+    """Return the plan that the record of a `judge` tells of.
+
+    Parameters
+    ----------
+    layout : Layout
+        That it was judged on.
+    grid : VisibilityGrid
+        That it was judged with.
+    record : dict
+    """
+    lines = record["sensors"]
+    models = find_models(load_catalogue(layout.settings.catalogue), sorted({line["sensor"] for line in lines}))
+    hung = [
+        MountedSensor(line["id"], models[line["sensor"]], np.array(line["local_m"]), recorded_orientation(line))
+        for line in lines
+    ]
+    goal = recorded_goal(record)
+    return (yield from judge(layout, grid, goal, hung, {line["id"]: line["position"] for line in lines}))
+
+
+def recorded_orientation(line: Mapping[str, Any]) -> Float:
+    """Return how a sensor is turned, (3, 3), by its line in a record."""
+    yaw, tilt, roll = (math.radians(line.get(name, 0.0)) for name in ("yaw_deg", "tilt_deg", "roll_deg"))
+    return orientation(yaw, tilt, roll)
+
+
+def _elsewhere(layout: Layout, one: MountedSensor, place: str) -> Sensor:
+    """Return a sensor at no candidate pose, as exactly as records hold it."""
+    xyz = np.round(one.xyz, 6)
+    foot = np.append(xyz[:2], _ground(layout, xyz))
+    if xyz[2] < foot[2]:
+        raise SeipError(f"sensor {one.label} is {foot[2] - xyz[2]:.2f} m below the ground: lift it")
+    yaw, tilt, roll = angles_of(one.orientation)
+    return Sensor(
+        label=one.label,
+        pose=None,
+        model=one.model,
+        position_name=place,
+        on_pole=False,
+        foot=foot,
+        xyz=xyz,
+        height=float(xyz[2] - foot[2]),
+        yaw=math.radians(degrees(yaw)),
+        tilt=math.radians(tilt_degrees(tilt)),
+        roll=math.radians(tilt_degrees(roll)),
+    )
+
+
+def _ground(layout: Layout, xyz: Float) -> float:
+    """Return the height of the ground under a point, or of the nearest target where nothing lies there."""
+    geometry, targets = layout.geometry, layout.site.targets.xyz
+    under = float(surface_height(xyz[None, :2], joined((*geometry.roads, *geometry.ground)))[0])
+    if math.isfinite(under):
+        return under
+    return float(targets[np.argmin(np.hypot(*(targets - xyz)[:, :2].T)), 2])

@@ -1,0 +1,257 @@
+"""The coarsest spacings of targets and of candidates whose answer stays within a tolerance.
+
+An answer is the best placement under some settings; it is judged on a fine grid of
+targets, the same for all. First the spacing of the targets is sought, then that of the
+candidates: from coarse to fine until the answer is as good as that of the finest. To stop
+where two spacings in a row agree would be quicker, but they agree too easily: which of a
+few candidates is the best is a matter of luck.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import SeipError
+from ..placement.deployment import weighted_share
+from ..placement.goal import Goal, Plan, make_plan, target_weights
+from ..progress import Progress, within
+from ..site.scene_geometry import SceneGeometry
+from ..site.site import Site, make_site
+from ..visibility.grid import compute_visibility
+from ..visibility.rotated_sensors import Onlooker, onlooker
+from .survey import SurveySettings
+
+GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
+"""Metres between targets, from coarse to fine: each halves the square that a target stands for."""
+
+CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)
+"""Metres between posts on the pavement, from coarse to fine."""
+
+COARSE_CANDIDATES = 8.0
+"""Metres between posts while the spacing of the targets is sought."""
+
+JUDGED_ON = 0.35
+"""Metres between the targets on which answers are judged."""
+
+MOST_JUDGED = 400_000
+"""Targets to judge on; a larger place is judged on a coarser grid."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The best placement under some spacings, and how good it is.
+
+    Parameters
+    ----------
+    grid_spacing, candidate_spacing : float, metres
+    targets, poses : int
+        How many these lay.
+    own : float
+        Share of the targets' weight that it sees, on its own grid.
+    judged : float
+        The same on the fine grid.
+    """
+
+    grid_spacing: float
+    candidate_spacing: float
+    targets: int
+    poses: int
+    own: float
+    judged: float
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Which spacings were tried, and which were picked.
+
+    Parameters
+    ----------
+    settings : SurveySettings
+        With the picked spacings.
+    tolerance : float
+        Share of the weight within which answers agree.
+    by_grid, by_candidates : tuple of Answer
+        What was tried, from coarse to fine; the last is the finest, with which the others are compared.
+    judged_on : float, metres
+        Spacing of the grid that judged.
+    """
+
+    settings: SurveySettings
+    tolerance: float
+    by_grid: tuple[Answer, ...]
+    by_candidates: tuple[Answer, ...]
+    judged_on: float
+
+    @property
+    def sentence(self) -> str:
+        """What was picked and why."""
+        grid, finest = self.by_grid[-2:]
+        posts, most = self.by_candidates[-2:]
+        return (
+            f"picked for a tolerance of {self.tolerance:g}: targets {grid.grid_spacing:g} m apart, whose placement "
+            f"covers {grid.judged:.2%} against {finest.judged:.2%} with {finest.grid_spacing:g} m; "
+            f"posts {posts.candidate_spacing:g} m apart, {posts.judged:.2%} against {most.judged:.2%} "
+            f"with {most.candidate_spacing:g} m; all judged on targets {self.judged_on:g} m apart"
+        )
+
+
+def coarsest_settings(
+    geometry: SceneGeometry, settings: SurveySettings, goal: Goal, tolerance: float
+) -> Generator[Progress, None, Convergence]:
+    """Find the coarsest spacings whose answer to a goal stays within a tolerance.
+
+    Each of the two may cost half of the tolerance. A spacing of targets has to agree
+    with the fine grid about the coverage of its own placement as well.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : SurveySettings
+        Their spacings do not matter.
+    goal : Goal
+    tolerance : float
+        Share of the weight, above 0 and below 1.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Convergence
+
+    Raises
+    ------
+    SeipError
+        The tolerance or the goal does not suit this, or no spacing allows an answer.
+    """
+    if not 0 < tolerance < 1:
+        raise SeipError(f"the tolerance must be a share above 0 and below 1, not {tolerance:g}")
+    if goal.cheapest:
+        raise SeipError("a tolerance needs a number of sensors or a budget: the coverage is not what you ask for")
+    poles = {pole.name for pole in geometry.poles}
+    for name in (*goal.forbidden, *goal.mandatory):
+        if name not in poles:
+            raise SeipError(
+                f"{name!r} is no pole: a tolerance lays posts on the pavement anew, under other names; "
+                "draw a forbidden or mandatory area instead, or give --grid and --spacing"
+            )
+    judge = Judge(geometry, settings, goal)
+
+    def answer(grid_spacing: float, candidate_spacing: float) -> Generator[Progress, None, Answer]:
+        candidates = replace(settings.candidates, spacing=candidate_spacing)
+        tried = replace(settings, candidates=candidates, grid_spacing=grid_spacing)
+        return (yield from judge.answer(tried))
+
+    share = tolerance / 2
+    finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATES)
+    by_grid = yield from _until_as_good(
+        GRID_SPACINGS,
+        lambda spacing: answer(spacing, COARSE_CANDIDATES),
+        lambda found: abs(found.own - found.judged) <= share and finest.judged - found.judged <= share,
+        "spacing of the targets",
+    )
+    grid_spacing = by_grid[-1].grid_spacing
+    # with more candidates a coarse grid misleads more: the finest answer is one on a finer grid, too
+    most = yield from answer(max(grid_spacing / 2, GRID_SPACINGS[-1]), CANDIDATE_SPACINGS[-1])
+    by_candidates = yield from _until_as_good(
+        CANDIDATE_SPACINGS,
+        lambda spacing: answer(grid_spacing, spacing),
+        lambda found: most.judged - found.judged <= share,
+        "spacing of the candidates",
+    )
+    candidates = replace(settings.candidates, spacing=by_candidates[-1].candidate_spacing)
+    convergence = Convergence(
+        settings=replace(settings, grid_spacing=grid_spacing, candidates=candidates),
+        tolerance=tolerance,
+        by_grid=(*by_grid, finest),
+        by_candidates=(*by_candidates, most),
+        judged_on=judge.site.targets.spacing,
+    )
+    reasoned = replace(convergence.settings, spacings_because=convergence.sentence)
+    return replace(convergence, settings=reasoned)
+
+
+class Judge:
+    """Answers a goal under any settings of the grids, and judges the answers on one fine grid.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : SurveySettings
+        δ and the sensor types that judge.
+    goal : Goal
+    """
+
+    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Goal) -> None:
+        spacing = max(JUDGED_ON, math.sqrt(geometry.region.area / MOST_JUDGED))
+        wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
+        self.site = make_site(geometry, wide, spacing, settings.reach())
+        self.weights = target_weights(self.site, goal)
+        self.geometry, self._goal = geometry, goal
+        self._models = settings.models()
+        self._onlooker: Onlooker = onlooker(self.site, settings.visibility, settings.engine)
+
+    def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
+        """Find the best placement under some settings, and judge it."""
+        site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach())
+        plan = yield from self.plan(site, settings)
+        seen = plan.deployment.seen_by > 0
+        return Answer(
+            grid_spacing=settings.grid_spacing,
+            candidate_spacing=settings.candidates.spacing,
+            targets=len(site.targets),
+            poses=len(site.candidates),
+            own=weighted_share(seen, target_weights(site, self._goal)),
+            judged=self.judge(plan),
+        )
+
+    def plan(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Plan]:
+        """Return the best placement on a site."""
+        grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
+        return (
+            yield from make_plan(
+                site,
+                grid.visible,
+                self._models,
+                self._goal,
+                solver=settings.solver,
+                time_limit=settings.time_limit,
+                effort=settings.effort,
+            )
+        )
+
+    def judge(self, plan: Plan) -> float:
+        """Return the share of the fine grid's weight that a placement sees."""
+        seen = np.zeros(len(self.site.targets), dtype=bool)
+        for sensor in plan.deployment.sensors:
+            seen |= self._onlooker.see(sensor.model, sensor.xyz, sensor.orientation)
+        return weighted_share(seen, self.weights)
+
+
+def _until_as_good(
+    spacings: Sequence[float],
+    answer: Callable[[float], Generator[Progress, None, Answer]],
+    good: Callable[[Answer], bool],
+    what: str,
+) -> Generator[Progress, None, tuple[Answer, ...]]:
+    """Try spacings from coarse to fine until an answer is good, or there is no finer one.
+
+    Those too coarse for any answer, where fewer positions are left than sensors are asked for, are left out.
+    """
+    answers: list[Answer] = []
+    for number, spacing in enumerate(spacings):
+        try:
+            found = yield from within(Progress(number, len(spacings), f"{what}: {spacing:g} m"), answer(spacing))
+        except SeipError:
+            if answers or spacing == spacings[-1]:
+                raise
+            continue
+        answers.append(found)
+        if good(found):
+            break
+    return tuple(answers)

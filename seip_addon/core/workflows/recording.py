@@ -1,0 +1,151 @@
+"""A recording: what the sensors of a scene measure of its traffic, frame by frame, as a run and as datasets.
+
+Panel and batch both go this way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..datasets import FORMATS, SPLITS, SensorPose, TrafficRun, write_dataset
+from ..progress import Progress
+from ..scans import MountedSensor, ScanSettings, Simulation, frame_times, prepare, static_scene
+from ..scans.run_folder import Record, Run, load_frames, write_run
+from ..site.scene_geometry import SceneGeometry
+from ..traffic import Trajectories
+from ..traffic.bodies import fitted_body
+from ..visibility.ray_casting import engine_name
+
+SAME_TIME = 1e-6
+"""Seconds between two times that are one: of frames of Blender's timeline, and of a run."""
+
+
+@dataclass(frozen=True)
+class RecordingSettings:
+    """All that a user may choose about a recording.
+
+    Parameters
+    ----------
+    scan : ScanSettings
+    start, duration, rate : float, optional
+        Seconds, seconds, hertz; see `frame_times`.
+    formats : tuple of str
+        Keys of `FORMATS`: datasets to write beside the frames.
+    dataset : path, optional
+        Folder of the datasets; that of the run if not given.
+    split : str
+        One of `SPLITS`.
+    """
+
+    scan: ScanSettings = field(default_factory=ScanSettings)
+    start: float | None = None
+    duration: float | None = None
+    rate: float | None = None
+    formats: tuple[str, ...] = ()
+    dataset: Path | None = None
+    split: str = SPLITS[0]
+
+
+def make_run(
+    geometry: SceneGeometry,
+    sensors: Sequence[MountedSensor],
+    trajectories: Trajectories,
+    settings: RecordingSettings,
+    versions: Mapping[str, str],
+) -> Run:
+    """Gather all that the frames of a recording follow from.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    sensors : sequence of MountedSensor
+    trajectories : Trajectories
+        In the scene's axes.
+    settings : RecordingSettings
+    versions : mapping of str to str
+        Of this program and what it stands on.
+
+    Raises
+    ------
+    SeipError
+        As for `frame_times`.
+    """
+    return Run(
+        static=static_scene(geometry, sensors),
+        origin=geometry.origin,
+        sensors=sensors,
+        trajectories=trajectories,
+        bodies=tuple(fitted_body(user) for user in trajectories.users),
+        times=frame_times(trajectories, sensors, start=settings.start, duration=settings.duration, rate=settings.rate),
+        settings=replace(settings.scan, engine=engine_name(settings.scan.engine)),
+        versions=versions,
+    )
+
+
+def simulation_of(run: Run) -> Generator[Progress, None, Simulation]:
+    """Make a run's sensors ready to scan; see `prepare`."""
+    return prepare(run.static, run.sensors, run.trajectories, run.bodies, run.settings)
+
+
+def frame_number(run: Run, time: float) -> tuple[int, float]:
+    """Return which frame of a run a time is next to, and its time where that is the same one, else the time given.
+
+    Noise follows from the number: at a time of the run's own a scan is the run's frame.
+    """
+    number = int(np.abs(run.times - time).argmin())
+    own = float(run.times[number])
+    return number, own if abs(own - time) < SAME_TIME else time
+
+
+def record(
+    folder: Path, run: Run, simulation: Simulation, settings: RecordingSettings
+) -> Generator[Progress, None, Record]:
+    """Write a run's frames, a picture of its first, and its datasets; what is there already is kept.
+
+    Parameters
+    ----------
+    folder : path
+        Of the run; its name is the run's in datasets.
+    run : Run
+    simulation : Simulation
+        Of the run.
+    settings : RecordingSettings
+
+    Returns
+    -------
+    dict
+        The run's manifest.
+
+    Raises
+    ------
+    SeipError
+        As for `write_run` and `write_dataset`.
+    """
+    from ..pictures.scan_view import save_scan_view  # noqa: PLC0415  # matplotlib takes half a second to come
+
+    manifest = yield from write_run(folder, run, simulation)
+    save_scan_view(folder / "frame.png", next(load_frames(folder))[1], run.static.region, run.sensors)
+    for key in settings.formats:
+        target = dataset_folder(folder, settings, key)
+        yield from write_dataset(FORMATS[key], load_frames(folder), _traffic_run(folder, run, settings), target)
+    return manifest
+
+
+def _traffic_run(folder: Path, run: Run, settings: RecordingSettings) -> TrafficRun:
+    return TrafficRun(
+        name=folder.resolve().name,
+        split=settings.split,
+        key=run.key,
+        sensors=tuple(SensorPose(s.label, s.model.name, s.xyz, s.orientation) for s in run.sensors),
+        origin=run.origin,
+        record=run.record(),
+    )
+
+
+def dataset_folder(folder: Path, settings: RecordingSettings, key: str) -> Path:
+    """Return where the dataset of a format is written."""
+    return (folder if settings.dataset is None else settings.dataset) / key

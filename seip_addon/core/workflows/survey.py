@@ -1,0 +1,341 @@
+"""A survey: a place laid out for a choice of sensors, and who sees what there. Panel and batch both go this way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import SeipError
+from ..lidar import LidarModel, find_models, load_catalogue
+from ..placement import Placement
+from ..placement.clock import Clock
+from ..placement.deployment import deploy
+from ..placement.goal import Goal, Plan, make_plan, placement_problem, target_weights
+from ..placement.integer_program import check_solver
+from ..placement.near_optimal import near_best
+from ..progress import Progress
+from ..results.headings import tilt_degrees
+from ..results.placement_record import Record, Run, placement_record
+from ..robustness.disturbed_views import Surroundings
+from ..robustness.pose_study import StudySettings, pose_sentence, pose_study
+from ..site.candidates import CandidateSettings, assumed_pole_warnings
+from ..site.far_objects import without_far_objects
+from ..site.obstruction import bareness_warnings
+from ..site.scene_geometry import SceneGeometry
+from ..site.site import Site, make_site
+from ..storage.files import digest
+from ..visibility.estimate import Estimate, estimate_visibility
+from ..visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
+from ..visibility.ray_casting import Engine, engine_name
+from ..visibility.ring_resolution import resolution_warnings
+from ..visibility.rounding import rounding_warnings
+from ..visibility.store import stored_visibility
+
+POSES_TRIED = StudySettings(draws=100, draws_of_kind=0)
+"""What a placement is tried with where that is asked for."""
+
+
+@dataclass(frozen=True)
+class SurveySettings:
+    """All that a user may choose about a survey and how it is answered.
+
+    Parameters
+    ----------
+    candidates : CandidateSettings
+    visibility : VisibilitySettings
+    grid_spacing : float, metres
+        Between neighbouring targets.
+    catalogue : tuple of path
+        The user's own catalogues of LiDARs.
+    engine : {"auto", "bvh", "embree"}
+        What casts the rays.
+    solver : str
+        ``auto``, ``highs``, ``cbc`` or ``gurobi``; ``auto`` is HiGHS where it is installed, else CBC.
+    time_limit : float, seconds
+        For each answer.
+    effort : float, units of work
+        Alike, but counted, so that an answer can be had again: see `placement.solve`.
+    spacings_because : str
+        Why the spacings of targets and candidates are what they are; empty where the user chose them.
+    """
+
+    candidates: CandidateSettings = field(default_factory=CandidateSettings)
+    visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
+    grid_spacing: float = 1.0
+    catalogue: tuple[Path, ...] = ()
+    engine: Engine = "auto"
+    solver: str = "auto"
+    time_limit: float = 60.0
+    effort: float = math.inf
+    spacings_because: str = ""
+
+    def models(self) -> dict[str, LidarModel]:
+        """Return the sensor types to choose from, by catalogue key.
+
+        Raises
+        ------
+        SeipError
+            The solver or a type is unknown, a limit is no positive number, or a catalogue cannot be read.
+        """
+        check_solver(self.solver)
+        Clock(self.time_limit, self.effort)  # refuses what is no limit before any ray is cast
+        return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
+
+    def reach(self) -> float:
+        """Return how far from a target a ray that sees it can begin, or be stopped, in metres."""
+        return max(model.max_range for model in self.models().values()) + self.visibility.delta
+
+    def as_record(self) -> dict[str, Any]:
+        """Return the settings as records hold them: defaults included, values that JSON knows."""
+        limits = {"time_limit_s": self.time_limit, "effort": self.effort}
+        return {
+            "grid_spacing_m": self.grid_spacing,
+            "candidates": _candidates_record(self.candidates),
+            "visibility": asdict(self.visibility),
+            "catalogue": [path.name for path in self.catalogue],
+            "engine": self.engine,
+            "solver": self.solver,
+            "spacings_because": self.spacings_because,
+            **{name: limit for name, limit in limits.items() if math.isfinite(limit)},
+        }
+
+
+def _candidates_record(settings: CandidateSettings) -> dict[str, Any]:
+    record = asdict(settings)
+    tilts = record.pop("tilts")
+    return record | {"tilts_deg": [tilt_degrees(tilt) for tilt in tilts]}
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A scene laid out for a survey.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+        What was read from the scene.
+    site : Site
+    models : dict of str to LidarModel
+        The sensor types asked for, by catalogue key.
+    settings : SurveySettings
+    warnings : tuple of str
+        What a user should know before trusting the figures.
+    """
+
+    geometry: SceneGeometry
+    site: Site
+    models: dict[str, LidarModel]
+    settings: SurveySettings
+    warnings: tuple[str, ...]
+
+
+def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequence[str] = ()) -> Layout:
+    """Lay targets and candidates into a scene.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+    settings : SurveySettings
+    warnings : sequence of str
+        Of the scene's reading.
+
+    Raises
+    ------
+    SeipError
+        As for `SurveySettings.models` and `make_site`.
+    """
+    models = settings.models()
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach())
+    near, far = without_far_objects(geometry, geometry.region, settings.reach())
+    limits = (
+        *far,
+        *bareness_warnings(near),
+        *assumed_pole_warnings(geometry, site.candidates),
+        *rounding_warnings(near),
+        *resolution_warnings(site, models, settings.visibility),
+    )
+    return Layout(geometry, site, models, settings, (*warnings, *limits))
+
+
+def grid_key(layout: Layout) -> str:
+    """Return the key of the visibility grid of a survey: what it is kept under."""
+    settings = layout.settings
+    return visibility_key(layout.site, layout.models, settings.visibility, engine_name(settings.engine))
+
+
+def inputs_of(layout: Layout) -> dict[str, str]:
+    """Return digests of what a placement follows from: of the visibility grid, and of all else about the site.
+
+    Two layouts with the same digests have the same answers to the same goal.
+    """
+    targets, candidates = layout.site.targets, layout.site.candidates
+    prices = np.array([layout.models[key].price for key in candidates.sensor])
+    site = digest(
+        *(targets.weight, targets.central, candidates.position_name, candidates.position_of),
+        *(candidates.mandatory, candidates.mandatory_name, prices),
+    )
+    return {"visibility": grid_key(layout), "site": site}
+
+
+def see(
+    layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
+) -> Generator[Progress, None, VisibilityGrid]:
+    """Find which pose sees which target, or read it from a file where an earlier survey found the same.
+
+    Parameters
+    ----------
+    layout : Layout
+    path : path
+        The grid's file, read and written.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work.
+    threads : int, optional
+        How many cast at once at most.
+    """
+    settings = layout.settings
+    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads)
+
+
+def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
+    """Estimate what `see` will take where nothing is known yet; see `estimate_visibility`."""
+    settings = layout.settings
+    return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
+
+
+def place(
+    layout: Layout, grid: VisibilityGrid, goal: Goal, *, pose_errors: bool = False
+) -> Generator[Progress, None, Plan]:
+    """Answer a goal on a survey, and note how far the answer can be trusted.
+
+    The notes of the placement say how many others are as good (`near_best`). With ``pose_errors`` they also say what
+    it loses where its sensors do not hang quite as planned (`pose_sentence`): rays are cast for that, and for nothing
+    else.
+    """
+    site, models, settings = layout.site, layout.models, layout.settings
+    steps = make_plan(
+        site,
+        grid.visible,
+        models,
+        goal,
+        solver=settings.solver,
+        time_limit=settings.time_limit,
+        effort=settings.effort,
+    )
+    plan = yield from steps
+    notes = [*plan.placement.notes]
+    if plan.placement.status == "optimal" and not goal.cheapest:
+        top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
+        notes += [] if top is None else [top.sentence]
+    if pose_errors and plan.deployment.sensors:
+        study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
+        notes.append(pose_sentence(study))
+    return replace(plan, placement=replace(plan.placement, notes=tuple(notes)))
+
+
+def surroundings(layout: Layout) -> Surroundings:
+    """Return where the sensors of a survey may hang, and what they see there."""
+    settings = layout.settings
+    return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What is no part of an answer, and stands in its record all the same.
+
+    Parameters
+    ----------
+    created : datetime
+        When, with its time zone.
+    durations : mapping of str to float, seconds
+        How long each step took.
+    versions : mapping of str to str
+        See `results.placement_record.versions`.
+    """
+
+    created: datetime
+    durations: Mapping[str, float]
+    versions: Mapping[str, str]
+
+
+def record_of(  # what was asked for stands in the record
+    layout: Layout,
+    grid: VisibilityGrid,
+    plan: Plan,
+    circumstances: Circumstances,
+    *,
+    render: bool,
+    pose_errors: bool = False,
+) -> Record:
+    """Return what ``placement.json`` holds of a plan.
+
+    Parameters
+    ----------
+    layout : Layout
+    grid : VisibilityGrid
+    plan : Plan
+    circumstances : Circumstances
+    render : bool
+        Whether a rendered view goes with it.
+    pose_errors : bool
+        Whether the plan was tried with pose errors; see `place`.
+    """
+    asked = {"goal": asdict(plan.goal), "pose_errors": pose_errors, "render": render}
+    run = Run(
+        settings=layout.settings.as_record() | asked,
+        created=circumstances.created,
+        durations=circumstances.durations,
+        versions=circumstances.versions,
+        inputs=inputs_of(layout) | {"visibility": grid.key},
+        warnings=layout.warnings,
+    )
+    return placement_record(layout.site, plan, run)
+
+
+def recorded_goal(record: Record) -> Goal:
+    """Return the goal that a record's placement answers."""
+    asked = record["settings"]["goal"]
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
+    return Goal(**named)
+
+
+def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
+    """Return the plan that a record of `record_of` tells of, without asking a solver again.
+
+    Parameters
+    ----------
+    layout : Layout
+        That it was made on.
+    grid : VisibilityGrid
+        That it was made from.
+    record : dict
+        The greedy answer that it may hold is left out.
+
+    Raises
+    ------
+    SeipError
+        The record is of another grid, or lacks something.
+    """
+    if record.get("inputs", {}).get("visibility") != grid.key:
+        raise SeipError("the placement was made for another state of the scene or its settings: place again")
+    goal, objective = recorded_goal(record), record["objective"]
+    chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
+    value = objective["value"]
+    placement = Placement(
+        chosen=chosen,
+        objective=value,
+        bound=math.nan if objective["bound"] is None else objective["bound"],
+        gap=math.inf if objective["gap"] is None else objective["gap"],
+        status=objective["status"],
+        solver=objective["solver"],
+        seconds=record["times"]["durations_s"].get("placement", 0.0),
+        covered=float(target_weights(layout.site, goal)[grid.times_seen(chosen) > 0].sum()),
+        price=record["price_usd"],
+        notes=tuple(record["notes"]),
+    )
+    return Plan(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))
