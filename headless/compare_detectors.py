@@ -14,8 +14,8 @@ from collections.abc import Generator
 from dataclasses import replace
 
 from headless import evaluate, session, survey
+from headless.charts.detection import Setting, save_setting_chart
 from headless.detection import case_study
-from headless.detection.charts import Setting, save_setting_chart
 from headless.detection.detector import Detector
 from headless.detection.inference import detect
 from headless.detection.pillars import grid_of

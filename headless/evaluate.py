@@ -88,11 +88,8 @@ class Stage:
 
     Parameters
     ----------
-    surveyed : Survey
-    traffic : Traffic
     configurations : tuple of Configuration
         1, 2 and 4 sensors of each type.
-    studio : Studio
     """
 
     surveyed: survey.Survey

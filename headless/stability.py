@@ -66,8 +66,6 @@ class Scope:
         That are held to float64 on each scene.
     instances : int
         Random placement problems of each kind.
-    poses : StudySettings
-    robust : RobustSettings
     instants : tuple of int
         Of traffic, to choose on and to judge by.
     detector : mapping of str to int
@@ -89,7 +87,6 @@ class Stage:
 
     Parameters
     ----------
-    surveyed : Survey
     runs : list of Trajectories
         Traffic; none where there is none beside the scene.
     scene : path or None
@@ -98,7 +95,6 @@ class Stage:
         Other scenes, to try on what was learnt on this one.
     work, charts : path
         Folders of what a rerun goes on from, and of the charts.
-    scope : Scope
     """
 
     surveyed: survey.Survey

@@ -57,14 +57,7 @@ class Stopwatch:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A scene laid out and seen.
-
-    Parameters
-    ----------
-    layout : Layout
-    grid : VisibilityGrid
-    stopwatch : Stopwatch
-    """
+    """A scene laid out and seen."""
 
     layout: Layout
     grid: VisibilityGrid

@@ -20,8 +20,8 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.charts.detection import save_training_chart
 from headless.detection.average_precision import evaluate
-from headless.detection.charts import save_training_chart
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result

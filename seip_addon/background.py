@@ -92,7 +92,6 @@ class Pace:
 
         Parameters
         ----------
-        progress : Progress
         now : float, seconds
             Reading of a monotonic clock.
         """

@@ -36,7 +36,6 @@ class Live:
     ----------
     scene : int
         The scene's session number.
-    known : Held
     onlooker : Onlooker
         Of its site.
     sensors : dict of str to (MountedSensor, (t,) bool)

@@ -28,7 +28,6 @@ class HeldTraffic:
 
     Parameters
     ----------
-    files : TrafficFiles
     changed : tuple of float
         When each of the files was written, as its system says.
     trajectories : Trajectories
@@ -50,7 +49,6 @@ class HeldScan:
         What the scans follow from.
     simulation : Simulation
         Of the run.
-    frame : Frame
     seconds : float
         That the scan took.
     in_words : tuple of str

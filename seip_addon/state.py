@@ -128,7 +128,6 @@ class Running:
     ----------
     operator : str
         Its ``bl_idname``.
-    work : Background
     began : float
         Reading of `time.monotonic`.
     timer : bpy.types.Timer or None

@@ -1,1 +1,1 @@
-"""Charts of robust placement and of placement in traffic."""
+"""Charts and pictures of robust placement, of placement in traffic and of detection."""

@@ -73,10 +73,8 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
 
     Parameters
     ----------
-    path : path-like
     studies : sequence of (str, TrafficStudy)
         With what tells one from another, like ``2 × type1``.
-    title : str
     """
     figure = Figure((11.5, 4.6), dpi=160, facecolor=PAPER, layout="constrained")
     shares, changes = figure.subplots(1, 2)

@@ -92,7 +92,6 @@ class CoverageStudy:
     ----------
     sensors : tuple of str
         Catalogue keys, from the simplest type to the best.
-    heights : tuple of float, metres
     cells : tuple of Case or EmptyCell
         In the order in which they were solved.
     targets : int
@@ -155,10 +154,8 @@ def coverage_study(
     ----------
     site : Site
         With poses of every type and height to be studied.
-    models : mapping of str to LidarModel
     visible : (c, t) bool
         The visibility grid.
-    solver : str
     time_limit : float, seconds
         For each cell.
     effort : float, units of work

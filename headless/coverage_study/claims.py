@@ -23,7 +23,6 @@ class Claim:
     ----------
     number : int
         Number in the study's list of claims.
-    text : str
     verdict : str
         ``holds``, ``does not hold``, or ``undecided`` where bounds leave it open.
     evidence : str

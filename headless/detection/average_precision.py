@@ -107,9 +107,6 @@ class Evaluation:
 
     Parameters
     ----------
-    rule : Rule
-    detections : Judged
-    wanted : Wanted
     block : (f,) int64
         The block of each frame; frames of one block are drawn together.
     """
@@ -165,7 +162,6 @@ def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | 
 
     Parameters
     ----------
-    evaluation : Evaluation
     seed : int
         The same seed draws the same blocks.
     """
@@ -210,7 +206,6 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
 
     Parameters
     ----------
-    evaluation : Evaluation
     detections : (d,) bool
         Of the judged detections. Who found whom stays as it was.
     wanted : (t,) bool
@@ -272,7 +267,6 @@ def _areas(evaluation: Evaluation, times: Float | Integer, wanted: Float | Integ
 
     Parameters
     ----------
-    evaluation : Evaluation
     times : (b, d) array
         How often each detection is there.
     wanted : (b,) array

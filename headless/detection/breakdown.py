@@ -52,7 +52,6 @@ def average_precision_by(evaluation: Evaluation, quantity: str, edges: Sequence[
 
     Parameters
     ----------
-    evaluation : Evaluation
     quantity : str
         ``distance`` (to the nearest sensor, metres) or ``points`` (returns from it, or in the false box).
     edges : sequence of float
@@ -71,12 +70,10 @@ def recall_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], sco
 
     Parameters
     ----------
-    evaluation : Evaluation
     quantity : str
         ``visibility``, ``distance`` or ``points``.
     edges : sequence of float
         Ascending.
-    score : float
     """
     wanted = evaluation.wanted
     bins = []
@@ -91,12 +88,10 @@ def false_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], scor
 
     Parameters
     ----------
-    evaluation : Evaluation
     quantity : str
         ``density`` (returns per square metre around it) or ``distance`` (to the nearest sensor, metres).
     edges : sequence of float
         Ascending.
-    score : float
     """
     values, frames = getattr(evaluation.detections, quantity)[_is_false(evaluation, score)], len(evaluation.block)
     bins = pairwise(edges)
@@ -109,7 +104,6 @@ class FalsePositives:
 
     Parameters
     ----------
-    per_frame : float
     sparse : float, 0 to 1
         Share of them that lie where the cloud is sparser than around half of the hits; chance alone gives a half.
         NaN without false detections or without hits.

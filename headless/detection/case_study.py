@@ -100,7 +100,6 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
 
     Parameters
     ----------
-    paths : sequence of path
     origin : (3,) float64, metres
         Of the scene's local axes.
     every : float, seconds
@@ -143,8 +142,6 @@ class Pupil:
         Also of its file.
     configurations : tuple of Configuration
         Whose clouds it learns from, and is judged with.
-    network : NetworkSettings
-    training : TrainingSettings
     """
 
     name: str
@@ -159,9 +156,6 @@ class Judgement:
 
     Parameters
     ----------
-    pupil : Pupil
-    configuration : Configuration
-    frames : tuple of FrameResult
     evaluation : Evaluation
         By the study's rule.
     score : float
@@ -304,8 +298,6 @@ def train_all(
 
     Parameters
     ----------
-    pupils : sequence of Pupil
-    lessons : Lessons
     folder : path
         Of the detectors' files.
     device : str

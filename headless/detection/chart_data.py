@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from headless.detection.charts import Cell, Curve, Parts
-from headless.detection.error_view import ErrorView
+from headless.charts.detection import Cell, Curve, Parts
+from headless.charts.error_view import ErrorView
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,10 +78,6 @@ def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
 
     Parameters
     ----------
-    name : str
-    frame : FrameResult
-    rule : Rule
-    score : float
     cloud : (n, 3) float32, metres
     region : shapely geometry
     sensors : (s, 3) float64, metres

@@ -56,7 +56,6 @@ class Detector(nn.Module):
 
     Parameters
     ----------
-    settings : NetworkSettings
     grid : PillarGrid
         That of the whole extent.
     seed : int

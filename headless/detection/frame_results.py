@@ -92,8 +92,6 @@ class FrameResult:
         The traffic run it is from.
     time : float, seconds
         In that run.
-    truth : Truth
-    detected : Detected
     """
 
     run: str
@@ -116,10 +114,8 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
 
     Parameters
     ----------
-    frame : Frame
     cloud : CloudInPlan
         Of the frame's points: sorted once for all detectors that look at them.
-    detections : Detections
     classes : sequence of sequence of str
         Categories of road users in each of the detector's classes.
     region : shapely geometry, metres

@@ -64,12 +64,7 @@ def recording_of(folder: Path, site: str = "") -> Recording:
 
 
 class FrameFiles(Sequence[Frame]):
-    """Frames in files, read when they are asked for.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-    """
+    """Frames in files, read when they are asked for."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = tuple(paths)
@@ -130,8 +125,6 @@ class SampledRecording:
 
     Parameters
     ----------
-    recording : Recording
-    grid : PillarGrid
     most_points : int
         That a pillar keeps.
     """

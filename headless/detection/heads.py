@@ -57,7 +57,6 @@ class DetectionHead(Protocol):
             What the head returns.
         targets : list of b Targets
             In the coordinates of the grid.
-        grid : PillarGrid
         margin : float, metres
             A border in which nothing is learnt: it shows parts of what stands beyond.
         """

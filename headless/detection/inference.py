@@ -30,7 +30,6 @@ def detect(
 
     Parameters
     ----------
-    detector : Detector
     points : (n, 3) float32, metres
         Merged cloud of all sensors, local site axes. What lies outside the detector's grid is left out.
     intensity : (n,) float32, 0 to 1

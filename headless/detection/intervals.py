@@ -80,7 +80,6 @@ def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int)
 
     Parameters
     ----------
-    x, y : sequence of float
     seed : int
         The same seed draws the same pairs.
     """

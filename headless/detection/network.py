@@ -45,7 +45,6 @@ class PillarEncoder(nn.Module):
         features : (m, 8) float32 Tensor
         pillar : (m,) int64 Tensor
             Number of each point's pillar.
-        count : int
 
         Returns
         -------
@@ -95,12 +94,7 @@ class Backbone(nn.Module):
 
 
 class FeatureMap(nn.Module):
-    """Encoder and backbone together.
-
-    Parameters
-    ----------
-    settings : NetworkSettings
-    """
+    """Encoder and backbone together."""
 
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()

@@ -168,7 +168,6 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     ----------
     points : (n, 4) float32
         x, y, z (metres), intensity.
-    grid : PillarGrid
     most : int
         Points that a pillar keeps.
 

@@ -34,7 +34,6 @@ class TrafficRun:
 
     Parameters
     ----------
-    name : str
     trajectories : Trajectories
         In the scene's local axes.
     times : (n,) float64, seconds
@@ -52,12 +51,7 @@ class TrafficRun:
 
 @dataclass(frozen=True, eq=False)
 class Configuration:
-    """A number of sensors of one type, placed where they cover most.
-
-    Parameters
-    ----------
-    case : Case
-    """
+    """A number of sensors of one type, placed where they cover most."""
 
     case: Case
 
@@ -88,8 +82,6 @@ class Studio:
 
     Parameters
     ----------
-    static : StaticScene
-    settings : ScanSettings
     site : str
         The scene's name.
     """

@@ -109,14 +109,12 @@ class TrainingSettings:
         many small ones are more different from each other than few large ones.
     learning_rate : float
         Largest of the cycle: one warm-up over 30 % of the steps, then a cosine to nothing (Smith 2018).
-    weight_decay : float
     least_points : int
         A road user with fewer returns is neither asked for nor held against the network.
     validate_every : int
         Steps from one validation to the next; the state is stored with each.
     patience : int
         Validations without improvement after which training stops.
-    seed : int
     threads : int
         Of torch on the CPU. Sums depend on how they are split: the same number gives the same bytes. One is nearly
         as quick as two on windows of this size, and far quicker where other work wants the second core.

@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from headless.coverage_study import Claim
-from headless.detection.charts import (
+from headless.charts.detection import (
     Parts,
     save_count_chart,
     save_coverage_chart,
@@ -18,7 +17,8 @@ from headless.detection.charts import (
     save_price_chart,
     save_training_chart,
 )
-from headless.detection.error_view import save_error_view
+from headless.charts.error_view import save_error_view
+from headless.coverage_study import Claim
 
 import numpy as np
 
@@ -53,9 +53,6 @@ class StudyResults:
         Of the site.
     studio : Studio
         To draw frames with.
-    traffic : Traffic
-    pupils : tuple of Pupil
-    judgements : tuple of Judgement
     """
 
     name: str

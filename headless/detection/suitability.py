@@ -25,7 +25,6 @@ def suitability_warnings(
 
     Parameters
     ----------
-    detector : Detector
     sensors : sequence of str
         Catalogue keys of the types whose clouds it is to look at.
     site : str

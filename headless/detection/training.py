@@ -77,7 +77,6 @@ class Trained:
     ----------
     detector : Detector
         As it was when it did best on the frames set aside.
-    curve : Curve
     """
 
     detector: Detector
@@ -99,8 +98,6 @@ def train(
     ----------
     recordings, validation : sequence of SampledRecording
         To learn from, and to see by when it is enough; on one grid and from separate runs of traffic.
-    network : NetworkSettings
-    settings : TrainingSettings
     device : str
         Of torch: ``cpu``, ``cuda``.
     store : path, optional

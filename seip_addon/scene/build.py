@@ -48,7 +48,6 @@ def build_scene(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> Gene
     ----------
     scene : bpy.types.Scene
         Receives the site, its camera and light, and is named after it.
-    model : SiteModel
     map_name : str
         File name of the map, kept in the scene.
 

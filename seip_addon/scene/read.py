@@ -35,7 +35,6 @@ class SceneReading:
 
     Parameters
     ----------
-    geometry : SceneGeometry
     warnings : tuple of str
         One sentence each.
     """
@@ -50,7 +49,6 @@ class Shown:
 
     Parameters
     ----------
-    name : str
     own, collections : frozenset of str
         The collections of the contract that the object itself is in; these and those of its source.
     matrix : (4, 4) float64
@@ -80,10 +78,6 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
 
     What the viewport would show counts: modifiers, parents, instances and
     linked collections included, hidden objects not. The scene is not changed.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
 
     Returns
     -------

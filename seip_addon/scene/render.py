@@ -47,7 +47,6 @@ class Shot:
 
     Parameters
     ----------
-    viewpoint : Viewpoint
     reach : float, metres
         From the camera, as far as anything is shown.
     sensors : (k, 3) float64, metres
@@ -88,7 +87,6 @@ def save_rendered_view(
         The picture to write.
     scene : bpy.types.Scene
         Holds the result of `write_result`.
-    site : Site
     deployment : Deployment
         The chosen sensors and what they see.
     """
@@ -113,7 +111,6 @@ def render_elsewhere(
         Holds the scene.
     scene : str
         Its name.
-    site : Site
     deployment : Deployment
         The sensors and what they see.
 

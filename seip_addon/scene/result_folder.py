@@ -35,10 +35,6 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
     An earlier result stays whole until everything is written, and stays for good if the block raises; of a file that
     the new result does not have, none stays.
 
-    Parameters
-    ----------
-    folder : path
-
     Yields
     ------
     dict of str to path
@@ -83,18 +79,14 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
 
     Parameters
     ----------
-    folder : path
     scene : bpy.types.Scene
         Receives the sensors and the coverage.
     geometry : SceneGeometry
         What was read from the scene.
-    site : Site
-    plan : Plan
     record : dict
         What ``placement.json`` will hold.
     visible : (c, t) bool
         The visibility grid.
-    models : mapping of str to LidarModel
     render : bool
         Whether to render ``view.png``, which takes the longest.
     """

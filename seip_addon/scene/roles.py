@@ -108,7 +108,6 @@ def add_area(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     role : Role
         One of `AREAS`.
     middle : (3,) float, metres

@@ -26,7 +26,6 @@ def read_sensors(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     catalogue : mapping of str to LidarModel
         Of which the empties' ``seip_sensor`` are keys.
     hidden : bool

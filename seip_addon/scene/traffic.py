@@ -41,7 +41,6 @@ def animate(scene: bpy.types.Scene, trajectories: Trajectories) -> tuple[bpy.typ
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     trajectories : Trajectories
         In any origin; they are put into the scene's.
 

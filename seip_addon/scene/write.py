@@ -46,7 +46,6 @@ def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> 
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     site : Site
         What the result was computed on.
     deployment : Deployment
@@ -66,7 +65,6 @@ def take_over(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     site : Site
         What the result was computed on.
     deployment : Deployment
@@ -180,7 +178,6 @@ def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     colours : Colouring
         Of the targets that the coverage was written for, in their order.
 
@@ -200,7 +197,6 @@ def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     seen_by : (t,) int64
         How many sensors see each target, in the order of those that the coverage was written for.
 

@@ -33,7 +33,6 @@ class Preview:
 
     Parameters
     ----------
-    model : LidarModel
     place : (3,) float64, metres
         Optical centre.
     axes : (3, 3) float64

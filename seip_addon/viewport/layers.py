@@ -65,7 +65,6 @@ class Overlay:
 
     Parameters
     ----------
-    layers : sequence of Layer
     legend : callable
         From the scene to the block that explains the layers; called as the view is drawn, so it only reads.
     about : str

@@ -39,10 +39,8 @@ def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.typ
 
     Parameters
     ----------
-    blocks : sequence of Block
     region : bpy.types.Region
         The viewport's window.
-    area : bpy.types.Area
     scale : float
         Of the interface.
     """

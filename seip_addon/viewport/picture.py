@@ -19,7 +19,6 @@ def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     area : bpy.types.Area
         A 3D viewport.
     """

@@ -2,9 +2,9 @@
 
 import math
 
-from headless.detection import charts as detection_charts
-from headless.detection import error_view
-from headless.detection.charts import (
+from headless.charts import detection as detection_charts
+from headless.charts import error_view
+from headless.charts.detection import (
     Cell,
     Curve,
     Parts,
@@ -17,7 +17,7 @@ from headless.detection.charts import (
     save_setting_chart,
     save_training_chart,
 )
-from headless.detection.error_view import ErrorView, save_error_view
+from headless.charts.error_view import ErrorView, save_error_view
 
 import numpy as np
 import pytest

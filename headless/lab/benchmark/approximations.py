@@ -22,10 +22,8 @@ class Approximation:
 
     Parameters
     ----------
-    name, family : str
     site : Site
         With the poses of the exact site.
-    models : mapping of str to LidarModel
     stands_for : (t,) int64
         Target of ``site`` whose answer is taken for each target of the exact site.
     """

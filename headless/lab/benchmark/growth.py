@@ -37,7 +37,6 @@ class Growth:
         The work.
     size_of : str
         What grows.
-    size : tuple of float
     seconds : tuple of float
         Of processor time.
     memory : tuple of float or None, MB
@@ -68,8 +67,6 @@ class Scaled:
 
     Parameters
     ----------
-    size : float
-    site : Site
     looked_from : int
         From how many places, evenly spread, targets are looked at.
     stand_for : float

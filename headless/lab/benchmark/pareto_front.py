@@ -14,7 +14,6 @@ class Way:
 
     Parameters
     ----------
-    name : str
     family : str
         Ways of one family look alike in a chart.
     seconds : float

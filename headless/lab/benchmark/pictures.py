@@ -33,10 +33,8 @@ def save_trade_off_chart(
 
     Parameters
     ----------
-    path : path-like
     panels : mapping of str to sequence of Way
         What the error is, over each panel; the same families in all.
-    title, subtitle : str
     nought : float
         Errors up to this are drawn apart from those above, on a linear piece of the axis.
     """
@@ -77,10 +75,8 @@ def save_growth_chart(
 
     Parameters
     ----------
-    path : path-like
     panels : mapping of str to sequence of (name, sizes, costs)
         By what is measured. Sizes are drawn as multiples of the smallest.
-    title : str
     """
     figure = Figure((12.5, 6.4), dpi=150, facecolor=PAPER, layout="constrained")
     for panel, (what, lines) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):

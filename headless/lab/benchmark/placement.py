@@ -19,8 +19,6 @@ class Run:
 
     Parameters
     ----------
-    instance, way : str
-    expense : Expense
     memory : float or None, MB
     objective : float
         Covered weight; 0 where nothing was found.
@@ -28,7 +26,6 @@ class Run:
         Its own proof; infinite where it gives none.
     best_bound : float
         The least bound that any way proved.
-    note : str
     """
 
     instance: str
@@ -63,10 +60,8 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
     ----------
     name : str
         Of the instance.
-    problem : PlacementProblem
     ways : sequence of str
         Keys of `RIVALS`.
-    seconds : float
 
     Returns
     -------

@@ -37,7 +37,6 @@ class Scope:
 
     Parameters
     ----------
-    layout : CandidateSettings
     street : tuple of int
         Positions (three poses at each), targets, blocks along a side.
     counts : tuple of int

@@ -19,15 +19,7 @@ from seip_addon.core.storage.files import whole_file
 
 @dataclass(frozen=True)
 class Bar:
-    """What the project holds itself to.
-
-    Parameters
-    ----------
-    what : str
-    asked : str
-    measured : str
-    met : bool
-    """
+    """What the project holds itself to."""
 
     what: str
     asked: str
@@ -43,13 +35,8 @@ class Findings:
     ----------
     setting : dict
         What was measured, on how many cores, with which versions.
-    costs : dict of str to Cost
-    harms : dict of str to Harm
     limits : dict of str to float
         By engine, how many times the time of one cast per seen target the lazy engine takes.
-    runs : sequence of Run
-    growths : sequence of Growth
-    scans : dict of str to ScanCost
     """
 
     setting: dict[str, Any]
@@ -68,11 +55,8 @@ def bars(
 
     Parameters
     ----------
-    costs : mapping of str to Cost
-    runs : sequence of Run
     names : three str
         Instances: the one with few sensors, the one with many, the largest.
-    scans : mapping of str to ScanCost
     """
     pairs = (("lazy bvh", "full bvh", 20), ("lazy embree", "full bvh", 100), ("lazy embree", "full embree", 10))
     held = [_ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs]

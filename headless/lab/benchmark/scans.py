@@ -48,8 +48,6 @@ class ScanCost:
 
     Parameters
     ----------
-    expense : Expense
-    frames : int
     rays : int
         Of all sensors in all frames.
     differing : int
@@ -74,9 +72,6 @@ def scan_costs(site: Site, static: StaticScene, model: LidarModel, frames: int) 
     ----------
     site : Site
         At whose candidate places, evenly spread, the sensors hang.
-    static : StaticScene
-    model : LidarModel
-    frames : int
 
     Returns
     -------
@@ -117,7 +112,6 @@ class Rescan:
     ----------
     simulation : Simulation
         Whose frames are to be made otherwise.
-    static : StaticScene
     bodies : sequence of Shape
         Of each road user.
     engine : {"bvh", "embree"}

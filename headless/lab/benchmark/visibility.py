@@ -39,8 +39,6 @@ class Cost:
 
     Parameters
     ----------
-    expense : Expense
-    rays : int
     seen : int
         Pairs of pose and target.
     """
@@ -85,9 +83,6 @@ class Observers:
 
     Parameters
     ----------
-    site : Site
-    models : mapping of str to LidarModel
-    settings : VisibilitySettings
     engine : {"bvh", "embree"}
     """
 
@@ -129,9 +124,6 @@ def visibility_costs(
 
     Parameters
     ----------
-    site : Site
-    models : mapping of str to LidarModel
-    settings : VisibilitySettings
     samples : int
         How many places, evenly spread over the site.
     simpler : sequence of Approximation

@@ -46,7 +46,6 @@ def detector_limits(
 
     Parameters
     ----------
-    surveyed : Survey
     scene : path or None
         Its file; its runs of traffic stand beside it, and denser ones too, if there are any.
     others : sequence of path

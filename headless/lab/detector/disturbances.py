@@ -174,7 +174,6 @@ class OfOneSensor(Disturbance):
 
     Parameters
     ----------
-    size : float
     sensor : int
         Its number in the placement, from 0.
     """

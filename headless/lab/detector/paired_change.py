@@ -22,7 +22,6 @@ class Sampled:
 
     Parameters
     ----------
-    evaluation : Evaluation
     seed : int
         Of the resamples: what is compared pair by pair has the same, and the same frames.
     """

@@ -83,7 +83,6 @@ class Point:
 
     Parameters
     ----------
-    disturbance : Disturbance
     precision, change : Estimate
         Mean average precision over the detectors, and by how much it differs from that without the disturbance.
     change_by_half : Estimate
@@ -102,8 +101,6 @@ class Curve:
 
     Parameters
     ----------
-    configuration : str
-    undisturbed : Estimate
     points : tuple of Point
         The mildest first.
     """
@@ -139,10 +136,8 @@ class Spread:
 
     Parameters
     ----------
-    configuration : str
     values : tuple of float
         Average precision of each detector.
-    precision : Estimate
     """
 
     configuration: str
@@ -179,7 +174,6 @@ class Borders:
 
     Parameters
     ----------
-    configuration : str
     score : float
         From which on detections count.
     recall, false : mapping of str to tuple of Bin
@@ -199,7 +193,6 @@ class Pillarwise:
 
     Parameters
     ----------
-    configuration : str
     filling : dict of int to Filling
         Where so many points are kept; means over some frames.
     """
@@ -214,8 +207,6 @@ class Elsewhere:
 
     Parameters
     ----------
-    ground : Ground
-    configurations : tuple of Configuration
     entrants : tuple of Entrant
         The detectors from home, on this ground's grid.
     natives : tuple of Entrant
@@ -298,10 +289,8 @@ def course(
     ----------
     configurations : sequence of Configuration
         All that an evaluation looks at.
-    network : NetworkSettings
     training : TrainingSettings
         Of those who learn from all types.
-    seeds : int
     padding : bool
         Whether the ablation is wanted: each pupil again, with padded pillars.
     """
@@ -324,15 +313,11 @@ class LimitsStudy:
         Of the site.
     frames : int
         Test frames of each trial at home.
-    spreads : tuple of Spread
-    curves : tuple of Curve
     worst : mapping of str to int
         For each configuration the sensor, by its number from 0, whose loss costs most: it is the one to be
         misplaced, misturned and late.
     foreign : tuple of Foreign
         Other types, other traffic, other sites.
-    borders : tuple of Borders
-    pillars : tuple of Pillarwise
     padding : tuple of Foreign
         What padding with zeros does to each configuration; none where it was not trained.
     """
@@ -364,8 +349,6 @@ def limits_study(
         Where they have learnt, with traffic that they have not seen.
     configurations : sequence of Configuration
         The first is driven through everything, the others through the brief series.
-    candidates : Candidates
-    elsewhere : sequence of Elsewhere
     store : path
         Folder in which every trial is kept: a study that was stopped goes on.
     score : float

@@ -69,8 +69,6 @@ class Ground:
 
     Parameters
     ----------
-    name : str
-    studio : Studio
     runs : tuple of TrafficRun
         That no detector has seen.
     """
@@ -100,13 +98,7 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Entrant:
-    """A detector that is tried.
-
-    Parameters
-    ----------
-    name : str
-    detector : Detector
-    """
+    """A detector that is tried."""
 
     name: str
     detector: Detector
@@ -141,9 +133,6 @@ def trials(
 
     Parameters
     ----------
-    ground : Ground
-    configuration : Configuration
-    disturbance : Disturbance
     entrants : sequence of Entrant
         With pillars on the ground's own grid.
     store : path

@@ -60,7 +60,6 @@ class HitCheck:
 
     Parameters
     ----------
-    scene, engine : str
     distance : float, metres
         Of the street, or of the stray mesh, from the origin; 0 where that is not in question.
     extent : float, metres
@@ -91,7 +90,6 @@ class GridCheck:
 
     Parameters
     ----------
-    scene, engine : str
     flipped : Share
         Entries that differ.
     in_band : Share
@@ -118,7 +116,6 @@ class ArithmeticStudy:
     moved, stored, stray : tuple of HitCheck
         An ordinary street moved away from the origin in float64; kept there in float32, as Blender does; and with a
         stray mesh far from it. By distance.
-    grids : tuple of GridCheck
     """
 
     hits: tuple[HitCheck, ...]
@@ -150,7 +147,6 @@ def arithmetic_study(
     ----------
     rays : int
         For each scene.
-    seed : int
     engines : sequence of str, optional
         All that are there if not given.
     """

@@ -60,7 +60,6 @@ class RingBorder:
 
     Parameters
     ----------
-    sensor : str
     height, delta, radius : float, metres
     """
 
@@ -76,7 +75,6 @@ class SeenByRatio:
 
     Parameters
     ----------
-    sensor : str
     ratios : tuple of float
         Edges of the classes.
     seen : tuple of Share or None
@@ -94,7 +92,6 @@ class DeltaAnswer:
 
     Parameters
     ----------
-    sensor : str
     height, delta : float, metres
     coverage : float
         Under this δ.
@@ -121,7 +118,6 @@ class Draws:
 
     Parameters
     ----------
-    what : str
     coverage : (n,) float64
     """
 
@@ -153,9 +149,6 @@ class CriterionStudy:
 
     Parameters
     ----------
-    borders : tuple of RingBorder
-    by_ratio : tuple of SeenByRatio
-    by_delta : tuple of DeltaAnswer
     by_grid, by_candidates : tuple of Answer
         Best placements under all spacings, the other spacing as asked for.
     convergence : Convergence
@@ -190,15 +183,12 @@ def criterion_study(
 
     Parameters
     ----------
-    geometry : SceneGeometry
     settings : SurveySettings
         What is asked for; δ is varied for each of its sensor types, at the middle one of its heights.
     count : int
         Sensors.
-    tolerance : float
     draws : int
         Grids, and azimuths, that are drawn at random.
-    seed : int
     """
     goal, random = Goal(count=count), np.random.default_rng(seed)
     models = settings.models()
@@ -248,8 +238,6 @@ def ring_borders(
 
     Parameters
     ----------
-    models : dict of str to LidarModel
-    heights, deltas : sequence of float, metres
     reach : float, metres
         Nothing farther away is looked at.
     """
@@ -266,8 +254,6 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float
 
     Parameters
     ----------
-    caster : RayCaster
-    model : LidarModel
     xyz : (3,) float64, metres
     orientation : (3, 3) float64
         Rotation from the sensor's axes to the site's.
@@ -292,7 +278,6 @@ def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle:
 
     Parameters
     ----------
-    geometry : SceneGeometry
     spacing : float, metres
     shift : (2,) float64
         In multiples of the spacing.

@@ -27,7 +27,6 @@ class HardScene:
 
     Parameters
     ----------
-    name : str
     triangles : (n, 3, 3) float64, metres
     origin : (3,) float64, metres
     directions : (r, 3) float64

@@ -25,7 +25,6 @@ class Chart:
     ----------
     file : str
         Its name in the folder of charts.
-    caption : str
     """
 
     file: str
@@ -34,14 +33,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one study found.
-
-    Parameters
-    ----------
-    title : str
-    rows : tuple of Row
-    charts : tuple of Chart
-    """
+    """What one study found."""
 
     title: str
     rows: tuple[Row, ...]
@@ -70,10 +62,8 @@ def save_page(path: Path, lead: str, chapters: Sequence[Chapter], charts: str) -
 
     Parameters
     ----------
-    path : path
     lead : str
         What stands before the first chapter.
-    chapters : sequence of Chapter
     charts : str
         Folder of the charts, seen from the page.
     """

@@ -11,12 +11,7 @@ NORMAL = 1.959963984540054
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many independent trials.
-
-    Parameters
-    ----------
-    count, trials : int
-    """
+    """So many of so many independent trials."""
 
     count: int
     trials: int

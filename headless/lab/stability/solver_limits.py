@@ -109,12 +109,10 @@ class TimeCheck:
 
     Parameters
     ----------
-    name : str
     limit, seconds : float
         The limit, and what it took.
     gap : float
         The certificate: no placement covers more by a larger share.
-    proven : bool
     """
 
     name: str
@@ -141,7 +139,6 @@ def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Gene
     ----------
     instances : int
         Random ones for each span and each disturbance.
-    seed : int
     limit : float, seconds
         For the hard instances.
     """
@@ -172,7 +169,6 @@ def worst_for_greedy(count: int, push: float = 1e-3) -> PlacementProblem:
 
     Parameters
     ----------
-    count : int
     push : float
         How much more, as a share; it makes greedy take the rows.
     """

@@ -35,10 +35,8 @@ def write_dataset(
 
     Parameters
     ----------
-    kind : Format
     frames : iterable of (str, Frame)
         The run's frames with their ids, in order of time.
-    run : TrafficRun
     folder : path-like
         Of the dataset: new, empty, or with other runs in the same format.
     min_points : int

@@ -27,7 +27,6 @@ def label_lines(sample: Sample, xyz: Float) -> str:
 
     Parameters
     ----------
-    sample : Sample
     xyz : (k, 3) float64, metres
         The place of each box by which the format goes.
     """

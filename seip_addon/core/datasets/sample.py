@@ -101,7 +101,6 @@ class Sample:
         Of the frame in the whole dataset, from 0.
     frame_id : str
         Of the frame in its run.
-    run : TrafficRun
     frame : Frame
         With all its labels.
     fates : tuple of str
@@ -135,8 +134,6 @@ def make_sample(
     ----------
     place : (int, str)
         The frame's number in the dataset and its id in the run.
-    run : TrafficRun
-    frame : Frame
     classes : mapping of str to str
         The format's name of each category.
     min_points : int

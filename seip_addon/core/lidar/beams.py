@@ -21,7 +21,6 @@ class BeamPattern:
 
     Parameters
     ----------
-    model : LidarModel
     yaw : float, radians
         Direction of azimuth zero.
     """
@@ -67,7 +66,6 @@ def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
 
     Parameters
     ----------
-    model : LidarModel
     yaw : float, radians
         Direction of azimuth zero, counter-clockwise from +x.
 

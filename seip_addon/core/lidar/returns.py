@@ -41,7 +41,6 @@ def return_chance(model: LidarModel, distance: Float, intensity: Float) -> Float
 
     Parameters
     ----------
-    model : LidarModel
     distance : (n,) float64, metres
         Infinite on a miss.
     intensity : (n,) float64
@@ -64,7 +63,6 @@ def measured_returns(
 
     Parameters
     ----------
-    model : LidarModel
     distance : (n,) float64, metres
         True ranges.
     chance : (n,) float32 or float64

@@ -38,7 +38,6 @@ def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap:
 
     Parameters
     ----------
-    model : LidarModel
     place : (3,) float64, metres
         Optical centre.
     axes : (3, 3) float64

@@ -67,8 +67,6 @@ class Node:
 
         Parameters
         ----------
-        name : str
-        default : float, optional
         most : float
             What its amount may be at most, where that is known better.
         """

@@ -29,10 +29,8 @@ def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name
 
     Parameters
     ----------
-    road_map : RoadMap
     surfaces : iterable of LaneSurface
         The lanes of the map; a junction without any is no place to work on.
-    id_or_name : str
 
     Raises
     ------

@@ -26,7 +26,6 @@ class LaneSurface:
 
     Parameters
     ----------
-    road_id : str
     junction_id : str or None
         The junction that the road belongs to.
     section : int
@@ -84,7 +83,6 @@ def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...
 
     Parameters
     ----------
-    road : Road
     tolerance : float, metres
         Greatest distance between a true edge and the straight lines that stand for it.
 

@@ -80,7 +80,6 @@ def placed_objects(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tu
 
     Parameters
     ----------
-    road_map : RoadMap
     area : shapely geometry, optional
         In plan, map coordinates. Only objects with their origin or an outline in it count.
 

@@ -174,7 +174,6 @@ class Road:
         The junction it belongs to.
     keeps_left : bool
         Whether traffic on it keeps to the left.
-    reference_line : ReferenceLine
     elevation, lane_offset : Profile
         Metres over metres along the road.
     superelevation, left_crossfall, right_crossfall : Profile
@@ -184,8 +183,6 @@ class Road:
         Height of the surface above the plane that these make.
     sections : tuple of LaneSection
         In order along the road.
-    objects : tuple of RoadObject
-    signals : tuple of RoadSignal
     """
 
     id: str

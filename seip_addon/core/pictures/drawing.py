@@ -61,7 +61,6 @@ def draw_sensors(
     ----------
     axes : Axes
         With their final limits.
-    deployment : Deployment
     points : (k, 2) float64
         Where each sensor is, in data coordinates.
     road : (t, 2) float64

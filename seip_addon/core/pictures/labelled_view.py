@@ -56,7 +56,6 @@ def save_labelled_view(
         The picture to write.
     picture : path-like
         The rendered PNG, transparent where there is nothing.
-    site : Site
     deployment : Deployment
         The chosen sensors and what they see.
     sight : Sight

@@ -58,9 +58,6 @@ class PlanLegend:
 
         Parameters
         ----------
-        geometry : SceneGeometry
-        site : Site
-        deployment : Deployment
         heights : Normalize
             Scale of the obstacles' colours, metres above the road.
         notes : sequence of str

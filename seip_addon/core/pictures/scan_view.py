@@ -37,8 +37,6 @@ def save_scan_view(
 
     Parameters
     ----------
-    path : path-like
-    frame : Frame
     region : shapely geometry
         Region of interest in plan; the picture shows this and a little around it.
     sensors : sequence of MountedSensor

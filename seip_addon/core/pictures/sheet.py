@@ -20,7 +20,6 @@ def save_sheet(path: str | os.PathLike[str], view: Image.Image, plan: Image.Imag
     ----------
     path : path-like
         The picture to write.
-    view, plan : Image
     """
     wide = round(view.width * plan.height / view.height)
     sheet = Image.new("RGB", (wide + plan.width + 3 * GAP, plan.height + 2 * GAP), PAPER)

@@ -141,7 +141,6 @@ def lagrangian_bound(
 
     Parameters
     ----------
-    instance : Instance
     goal : float
         Covered weight to reach; the search ends when the bound falls below.
     clock : Clock

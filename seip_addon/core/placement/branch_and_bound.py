@@ -115,7 +115,6 @@ class Search:
 
     Parameters
     ----------
-    instance : Instance
     goal : float
         Weight to be covered at least.
     depth_first : bool
@@ -371,7 +370,6 @@ class BestPlacements(Search):
 
     Parameters
     ----------
-    instance : Instance
     goal : float
         Weight to be covered at least.
     most : int
@@ -432,7 +430,6 @@ class FirstInOrder(Search):
     ----------
     instance : Instance
         No placement with fewer sensors than its ``count`` reaches the goal.
-    goal : float
 
     Attributes
     ----------

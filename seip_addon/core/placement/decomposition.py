@@ -78,10 +78,8 @@ def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float
 
     Parameters
     ----------
-    instance : Instance
     goal : float
         The search ends when the bound falls below.
-    clock : Clock
     seconds : float
         Longest time to search.
 

@@ -108,7 +108,6 @@ def deploy(
 
     Parameters
     ----------
-    site : Site
     models : mapping of str to LidarModel
         The sensor types by catalogue key.
     visible : (c, t) bool
@@ -130,7 +129,6 @@ def deployed(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
 
     Parameters
     ----------
-    site : Site
     hung : sequence of Sensor
         In the order in which each adds to those before it; their own shares are not looked at.
     rows : (k, t) bool

@@ -131,12 +131,10 @@ def placement_problem(
 
     Parameters
     ----------
-    site : Site
     visible : (c, t) bool
         The visibility grid.
     models : mapping of str to LidarModel
         By catalogue key.
-    goal : Goal
 
     Returns
     -------
@@ -189,12 +187,10 @@ def make_plan(  # noqa: PLR0913 -- a problem, and the limits of its solution
 
     Parameters
     ----------
-    site : Site
     visible : (c, t) bool
         The visibility grid.
     models : mapping of str to LidarModel
         By catalogue key.
-    goal : Goal
     solver : str
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds

@@ -31,7 +31,6 @@ def greedy(
 
     Parameters
     ----------
-    instance : Instance
     start : (s,) int64
         Candidates that are chosen already, for instance for the mandatory groups.
     per_price : bool

@@ -76,10 +76,6 @@ class CoverProgram:
     of each target are continuous: at an optimum they are integral by themselves.
     ``z`` is right wherever the covered weight is required to be the largest
     possible.
-
-    Parameters
-    ----------
-    instance : Instance
     """
 
     def __init__(self, instance: Instance) -> None:

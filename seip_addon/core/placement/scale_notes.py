@@ -11,10 +11,6 @@ from .problem import TIE, PlacementProblem
 def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
     """Say which targets and prices cannot decide because others are too large.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-
     Returns
     -------
     tuple of str

@@ -56,7 +56,6 @@ class Proof:
     chosen : (k,) int64
     bound : float
         No placement covers more.
-    optimal : bool
     ties : tuple of (k,) int64, optional
         All placements that cover as much, but for those with idle sensors, where they are known.
     halfway : float, optional
@@ -89,7 +88,6 @@ def solve(
 
     Parameters
     ----------
-    problem : PlacementProblem
     solver : str
         ``highs``, ``cbc`` or ``gurobi``.
     time_limit : float, seconds
@@ -162,10 +160,6 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
     alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor 1999). The bound of
     the result is computed from the data and is usually far closer.
 
-    Parameters
-    ----------
-    problem : PlacementProblem
-
     Returns
     -------
     Placement
@@ -198,11 +192,8 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
 
     Parameters
     ----------
-    instance : Instance
     chosen : (k,) int64
         A placement to begin from.
-    solver : str
-    clock : Clock
 
     Yields
     ------

@@ -40,13 +40,10 @@ def canonical_optimum(
 
     Parameters
     ----------
-    instance : Instance
     chosen : (k,) int64
         An optimal placement.
     ties : tuple of (k,) int64, optional
         All optimal placements, but for those with idle sensors, where they are known.
-    solver : str
-    clock : Clock
 
     Yields
     ------

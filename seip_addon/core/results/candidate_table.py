@@ -52,7 +52,6 @@ def save_candidate_table(
     ----------
     path : path-like
         The file to write.
-    site : Site
     models : mapping of str to LidarModel
         The sensor types by catalogue key.
     visible : (c, t) bool

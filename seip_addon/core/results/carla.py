@@ -35,7 +35,6 @@ def carla_spawns(deployment: Deployment, origin: NDArray[np.float64]) -> list[di
 
     Parameters
     ----------
-    deployment : Deployment
     origin : (3,) float64, metres
         Map coordinates of the local origin.
 

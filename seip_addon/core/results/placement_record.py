@@ -74,7 +74,6 @@ def placement_record(site: Site, plan: Plan, run: Run) -> Record:
 
     Parameters
     ----------
-    site : Site
     plan : Plan
         Of that site.
     run : Run

@@ -27,10 +27,8 @@ class Surroundings:
 
     Parameters
     ----------
-    site : Site
     models : mapping of str to LidarModel
         At least those that the candidates name.
-    sight : VisibilitySettings
     objects : sequence of Mesh
         Nothing hangs inside these: the scene's occluders.
     engine : {"auto", "bvh", "embree"}
@@ -57,7 +55,6 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
 
     Parameters
     ----------
-    around : Surroundings
     poses : (s,) int64
         Among the site's candidates.
     draws : PoseDraws

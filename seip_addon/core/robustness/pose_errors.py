@@ -118,10 +118,8 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
 
     Parameters
     ----------
-    errors : PoseErrors
     foot : (s, 3) float64, metres
         Ground point of each sensor's position; equal ones err alike.
-    draws : int
     seed : int
         At least 0.
 
@@ -151,10 +149,8 @@ def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tup
 
     Parameters
     ----------
-    draws : PoseDraws
     xyz : (s, 3) float64, metres
         Where the sensors were planned.
-    objects : sequence of Mesh
 
     Returns
     -------

@@ -34,12 +34,10 @@ class StudySettings:
 
     Parameters
     ----------
-    errors : PoseErrors
     draws : int
         With all sensors erring in all ways.
     draws_of_kind : int
         With one kind of error alone; 0 leaves the kinds out.
-    seed : int
     """
 
     errors: PoseErrors = field(default_factory=PoseErrors)
@@ -70,7 +68,6 @@ class PoseStudy:
 
     Parameters
     ----------
-    settings : StudySettings
     labels : (s,) tuple of str
         Of the sensors.
     planned : Coverages
@@ -131,10 +128,8 @@ def pose_study(
 
     Parameters
     ----------
-    around : Surroundings
     deployment : Deployment
         The placement, at poses of the site.
-    settings : StudySettings
 
     Yields
     ------

@@ -154,9 +154,6 @@ def foresee(
 
     Parameters
     ----------
-    problem : PlacementProblem
-    scenarios : Views
-    solver : str
     time_limit : float, seconds
         For all of them.
     effort : float, units of work
@@ -311,9 +308,6 @@ class _Game:
 
     Parameters
     ----------
-    problem : PlacementProblem
-    scenarios : Views
-    risk : Risk
     whole : Instance
         Of all scenarios: candidates that can matter, with their constraints.
     """

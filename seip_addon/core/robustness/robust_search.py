@@ -229,9 +229,7 @@ class Relaxation:
 
     Parameters
     ----------
-    value : float
     targets : (t,) float64
-    selection : Selection
     """
 
     value: float
@@ -255,12 +253,10 @@ def relax(  # what is bounded, and how far to go
 
     Parameters
     ----------
-    cover : CountedCover
     times : (t,) int64
         How often each target is seen already; the count of the cover's instance is of those to come.
     goal : float
         What must be added; the search ends when the bound falls below.
-    iterations : int
     start : (t,) float64, optional
         Multipliers to begin from.
 

@@ -30,14 +30,12 @@ class RobustSettings:
 
     Parameters
     ----------
-    errors : PoseErrors
     scenarios : int
         Draws to choose on.
     unseen : int
         Draws to judge by.
     seed : int
         Of the scenarios; the unseen draws have the next one.
-    solver : str
     time_limit : float, seconds
         For each placement.
     effort : float, units of work
@@ -61,7 +59,6 @@ class Contender:
     ----------
     name : str
         What it was chosen for.
-    placement : Placement
     planned : float
         Share of the targets' weight that it covers as planned, by one look and without any failure.
     judged_by : Risk
@@ -96,7 +93,6 @@ class RobustStudy:
 
     Parameters
     ----------
-    settings : RobustSettings
     nominal : tuple of Contender
         The placement chosen for the poses as planned, once for each way in which the others are judged.
     robust : tuple of Contender
@@ -136,11 +132,8 @@ def robust_study(
 
     Parameters
     ----------
-    around : Surroundings
     problem : PlacementProblem
         Of all candidates of the site.
-    settings : RobustSettings
-    risks : sequence of Risk
 
     Yields
     ------

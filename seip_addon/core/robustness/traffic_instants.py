@@ -86,12 +86,6 @@ class Instants:
 def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Instants:
     """Draw instants that are spread evenly: one anywhere in each of so many equal parts of the runs' time.
 
-    Parameters
-    ----------
-    runs : sequence of Trajectories
-    number : int
-    seed : int
-
     Raises
     ------
     SeipError

@@ -29,7 +29,6 @@ def road_user_seconds(targets: Targets, runs: Sequence[Trajectories]) -> Generat
 
     Parameters
     ----------
-    targets : Targets
     runs : sequence of Trajectories
         In the scene's local axes; all of each but its first `WARM_UP` seconds.
 

@@ -116,7 +116,6 @@ class InTraffic:
     ----------
     name : str
         What it was chosen for.
-    placement : Placement
     seen : mapping of {"road", "height"} to Seen
         Of the targets, and of the points `HEIGHT` metres above them.
     """
@@ -186,13 +185,10 @@ def traffic_study(  # noqa: PLR0913 -- a problem, and the limits of its solution
 
     Parameters
     ----------
-    around : Surroundings
     problem : PlacementProblem
         Of all candidates of the site; what they see is taken from the scenarios.
-    scenarios : Scenarios
     judged : Instants
         Of runs that are not those of the scenarios.
-    solver : str
     time_limit : float, seconds
         For each placement.
     effort : float, units of work
@@ -248,12 +244,10 @@ def tried_in_traffic(
 
     Parameters
     ----------
-    around : Surroundings
     poses : (s,) int64
         Among the site's candidates.
     weight : (t,) float64
         Of the targets.
-    instants : Instants
     """
     crowds = instants.standing()
     views = yield from traffic_views(around, poses, [NOBODY, *crowds], "road")

@@ -53,7 +53,6 @@ def traffic_views(
 
     Parameters
     ----------
-    around : Surroundings
     poses : (s,) int64
         Among the site's candidates.
     instants : sequence of Standing

@@ -14,10 +14,6 @@ class BeamWindows:
     """Finds the rays of a model that pass through the convex hulls of points, and few that do not.
 
     A ray is ``channel * azimuth_count + step``, as in `BeamPattern`.
-
-    Parameters
-    ----------
-    model : LidarModel
     """
 
     def __init__(self, model: LidarModel) -> None:

@@ -102,7 +102,6 @@ class Frame:
     intensity : (n,) float32, 0 to 1
     instance : (n,) int32
         Road user that returned it, `STATIC` for none.
-    labels : Labels
     """
 
     time: float

@@ -35,10 +35,8 @@ class Run:
 
     Parameters
     ----------
-    static : StaticScene
     origin : (3,) float64, metres
         Map coordinates of the local origin.
-    sensors : sequence of MountedSensor
     trajectories : Trajectories
         In local axes.
     bodies : sequence of Shape
@@ -101,7 +99,6 @@ def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progr
     ----------
     folder : path
         New, empty, or with this run's frames, as an earlier start left them.
-    run : Run
     simulation : Simulation
         Of the run.
 

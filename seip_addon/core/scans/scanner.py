@@ -69,7 +69,6 @@ class SolidShape(Surface):
 
     Parameters
     ----------
-    caster : RayCaster
     reflectivity : (n,) float64, 0 to 1
     """
 
@@ -119,7 +118,6 @@ class Traffic:
 
     Parameters
     ----------
-    motions : sequence of Motion
     shapes : sequence of SolidShape
         Of each, in the same order.
     hulls : (k, m, 3) float64, metres
@@ -180,7 +178,6 @@ class Scanner:
 
     Parameters
     ----------
-    sensor : MountedSensor
     ground : Surface
         All that stands still, in site axes.
 

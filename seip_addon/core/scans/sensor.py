@@ -22,7 +22,6 @@ class MountedSensor:
     ----------
     label : str
         What people call it: ``S1``.
-    model : LidarModel
     xyz : (3,) float64, metres
         Optical centre, local site axes.
     orientation : (3, 3) float64

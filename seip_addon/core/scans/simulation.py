@@ -50,12 +50,8 @@ class Simulation:
 
     Parameters
     ----------
-    static : StaticScene
-    scanners : sequence of Scanner
-    trajectories : Trajectories
     shapes : sequence of SolidShape
         Of each road user.
-    settings : ScanSettings
     """
 
     def __init__(
@@ -153,13 +149,10 @@ def prepare(
 
     Parameters
     ----------
-    static : StaticScene
-    sensors : sequence of MountedSensor
     trajectories : Trajectories
         In the scene's local axes.
     bodies : sequence of Shape
         Of each road user. Those who share an array of triangles share its tree.
-    settings : ScanSettings
 
     Yields
     ------
@@ -199,8 +192,6 @@ def frame_times(
 
     Parameters
     ----------
-    trajectories : Trajectories
-    sensors : sequence of MountedSensor
     start : float, seconds, optional
         Of the simulation; its first sample if not given.
     duration : float, seconds, optional

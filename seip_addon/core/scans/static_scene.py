@@ -45,7 +45,6 @@ def static_scene(geometry: SceneGeometry, sensors: Sequence[MountedSensor] = ())
 
     Parameters
     ----------
-    geometry : SceneGeometry
     sensors : sequence of MountedSensor
         What lies beyond the range of all of them is left out; nothing is where none are given.
     """

@@ -216,11 +216,6 @@ class Candidates:
 def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
     """Sample the candidate areas, take the poles, and drop what cannot carry a sensor.
 
-    Parameters
-    ----------
-    geometry : SceneGeometry
-    settings : CandidateSettings
-
     Returns
     -------
     Candidates

@@ -108,7 +108,6 @@ class SceneContents:
     ----------
     surfaces : tuple of Surface
         Without faulty ones.
-    poles : tuple of Pole
     geometry : SceneGeometry or None
         Where all is there that a survey needs.
     problems : tuple of Problem
@@ -139,7 +138,6 @@ def check_site(
 
     Parameters
     ----------
-    contents : SceneContents
     lay_out : callable
         Lays targets and candidates into the scene as a survey would, and returns the site and its warnings.
 

@@ -29,7 +29,6 @@ def without_far_objects(
 
     Parameters
     ----------
-    geometry : SceneGeometry
     around : shapely geometry
         In plan, what every ray that counts begins or ends in: the region of interest, or the sensors.
     reach : float, metres

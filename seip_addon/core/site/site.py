@@ -30,8 +30,6 @@ class Site:
         Map coordinates of the local origin: map = local + origin.
     region : shapely geometry
         Region of interest in plan, local.
-    targets : Targets
-    candidates : Candidates
     triangles : (n, 3, 3) float64, metres
         All static surfaces that a ray which counts can end on, roads included.
     """
@@ -51,8 +49,6 @@ def make_site(
 
     Parameters
     ----------
-    geometry : SceneGeometry
-    settings : CandidateSettings
     grid_spacing : float, metres
         Distance between neighbouring targets.
     reach : float, metres

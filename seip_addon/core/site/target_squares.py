@@ -13,10 +13,6 @@ def target_squares(targets: Targets) -> Float:
 
     A corner that several squares share has the mean height of their targets.
 
-    Parameters
-    ----------
-    targets : Targets
-
     Returns
     -------
     (t, 4, 3) float64, metres

@@ -55,7 +55,6 @@ def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: 
     ----------
     surfaces : sequence of LaneSurface
         All lanes of a map.
-    junction_id : str
     distance : float, metres
         Along the roads, from where the junction ends.
 

@@ -92,14 +92,12 @@ class SiteModel:
 
     Parameters
     ----------
-    name : str
     origin : (3,) float64, metres
         Map coordinates of the local origin, whole metres.
     geo_reference : str or None
         Projection of the map, as the map gives it.
     header_offset : (4,) float64
         Of the map: x, y, z in metres and heading in radians.
-    parts : tuple of Part
     region : shapely geometry
         Region of interest in plan, local axes.
     notes : tuple of str
@@ -136,7 +134,6 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
 
     Parameters
     ----------
-    road_map : RoadMap
     description : SiteDescription
         Which place, and what stands there besides what the map has.
 

@@ -30,10 +30,8 @@ class Part:
 
     Parameters
     ----------
-    name : str
     solid : Solid
         Its shape; parts may share one.
-    roles : tuple of Role
     foot : (3,) float64, metres
         Where the shape's origin stands, local axes.
     yaw : float, radians

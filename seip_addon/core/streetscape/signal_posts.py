@@ -51,10 +51,8 @@ def split_posts(
 
     Parameters
     ----------
-    objects : sequence of PlacedObject
     signals : iterable of PlacedSignal
         In local axes, as the objects are.
-    roadside : Roadside
 
     Returns
     -------
@@ -87,8 +85,6 @@ def signal_parts(
     ----------
     lights : iterable of (PlacedSignal, Post or None)
         In local axes: see `split_posts`.
-    roadside : Roadside
-    terrain : Terrain
     """
     poles: list[_SignalPost] = []
     for signal, own in lights:

@@ -156,8 +156,6 @@ def tube(start: Float, stop: Float, radii: tuple[float, float], material: str, *
     start, stop : (3,) float64, metres
     radii : pair of float, metres
         At the two ends.
-    material : str
-    sides : int
     """
     axis = (stop - start) / np.linalg.norm(stop - start)
     aside = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])

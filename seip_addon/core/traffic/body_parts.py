@@ -23,7 +23,6 @@ class Part:
     ----------
     triangles : (n, 3, 3) float64, metres
         Corners counter-clockwise seen from outside. Every edge belongs to two triangles.
-    material : str
     """
 
     triangles: Float
@@ -37,7 +36,6 @@ def hull(outline: Float, material: str) -> Part:
     ----------
     outline : (k, 3) float64, metres
         Corners in turn: x, z and half the width there. In x and z it may not cross itself.
-    material : str
     """
     x, z, half = outline.T
     right, left = np.column_stack([x, -half, z]), np.column_stack([x, half, z])
@@ -50,7 +48,6 @@ def skin(first: Float, second: Float, material: str, cap: Integer | None = None)
     Parameters
     ----------
     first, second : (k, 3) float64, metres
-    material : str
     cap : (m, 3) int64
         Triangles that fill a ring, in its own sense of turn; without it the ring is convex.
     """
@@ -90,7 +87,6 @@ def pane(face: Float, across: tuple[float, float], up: tuple[float, float], mate
         Lower left, lower right, upper right and upper left corner seen from outside.
     across, up : pair of float, 0 to 1
         What part of the face it covers.
-    material : str
     """
     u = np.array([across[0], across[1], across[1], across[0]])[:, None]
     v = np.array([up[0], up[0], up[1], up[1]])[:, None]
@@ -130,7 +126,6 @@ def wheel(axle: float, outer: float, inner: float, radius: float, sides: int = 8
     outer, inner : float, metres
         y of its two sides.
     radius : float, metres
-    sides : int
     """
     return skin(_disc(axle, outer, radius, radius, sides), _disc(axle, inner, radius, radius, sides), "tyre")
 

@@ -115,7 +115,6 @@ def read_trajectories(
 
     Parameters
     ----------
-    data : FloatingCarData
     types : mapping of str to VehicleType
         As `read_vehicle_types` returns them.
     origin : (3,) float64, metres

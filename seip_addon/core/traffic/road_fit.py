@@ -51,7 +51,6 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
     ----------
     trajectories : Trajectories
         Their heights may be NaN.
-    geometry : SceneGeometry
 
     Returns
     -------

@@ -65,7 +65,6 @@ class LoadedTraffic:
 
     Parameters
     ----------
-    trajectories : Trajectories
     warnings : tuple of str
         One sentence each.
     """
@@ -116,8 +115,6 @@ def read_sumo(
 
     Parameters
     ----------
-    files : TrafficFiles
-    window : Window
     origin : (3,) float64, metres
         Map coordinates of the local origin.
     source : str

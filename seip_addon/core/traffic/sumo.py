@@ -73,8 +73,6 @@ class Scenario:
 
     Parameters
     ----------
-    demand : Demand
-    signals : SignalPlan
     seed : int
         Of everything that is random, here and in SUMO.
     duration : float, seconds
@@ -131,7 +129,6 @@ def simulate(
         The ``.xodr``.
     folder : path
         For SUMO's files.
-    scenario : Scenario
     bounds : (4,) float, metres, optional
         Only roads that reach into this rectangle of the map are kept: left, low, right, high.
 

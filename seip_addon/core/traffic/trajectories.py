@@ -98,7 +98,6 @@ class Trajectories:
 
     Parameters
     ----------
-    users : tuple of RoadUser
     origin : (3,) float64, metres
         Map coordinates of the local origin: map = local + origin.
     first : (u + 1,) int64

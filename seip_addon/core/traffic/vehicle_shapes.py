@@ -239,7 +239,6 @@ def _leaning(corners: Sequence[tuple[float, float]], widths: Float, height: floa
 
     Parameters
     ----------
-    corners : sequence of pair of float, metres
     widths : (2,) float64, metres
         On the ground and at ``height``.
     height : float, metres

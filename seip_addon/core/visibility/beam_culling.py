@@ -215,7 +215,6 @@ def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tupl
     Parameters
     ----------
     origin : (3,) float64, metres
-    surfaces : NearSurfaces
     wanted : (t,) bool
     """
     discs = surfaces.discs
@@ -234,7 +233,6 @@ def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> N
 
     Parameters
     ----------
-    beams : Beams
     patches : Patches
         As seen from the sensors.
     planes : Planes, optional

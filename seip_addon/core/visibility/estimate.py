@@ -45,7 +45,6 @@ class Estimate:
         Places are poses that differ in more than the sensor; triangles those that rays are cast against.
     rays : int
         How many will be cast.
-    seconds : float
     memory : int, bytes
         In addition to what the scene itself takes.
     """
@@ -71,9 +70,6 @@ def estimate_visibility(
 
     Parameters
     ----------
-    site : Site
-    models : mapping of str to LidarModel
-    settings : VisibilitySettings
     engine : {"auto", "bvh", "embree"}
     threads : int, optional
         How many work at once at most.

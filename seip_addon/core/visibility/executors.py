@@ -31,10 +31,7 @@ class ObserverTask:
 
     Parameters
     ----------
-    site : Site
-    models : mapping of str to LidarModel
     delta : float, metres
-    min_intensity : float
     engine : {"bvh", "embree"}
     keep : (n,) bool
         Which triangles of the site rays are cast against.
@@ -54,7 +51,6 @@ def threads_of(task: ObserverTask, threads: int | None = None) -> Iterator[Submi
 
     Parameters
     ----------
-    task : ObserverTask
     threads : int, optional
         How many work at once at most.
     """
@@ -105,7 +101,6 @@ def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
     address : str
         Of the scheduler, like ``tcp://10.0.0.1:8786``, or ``tls://10.0.0.1:8786`` with the certificates that Dask's
         settings name. Its workers must be able to import this package.
-    task : ObserverTask
 
     Raises
     ------

@@ -174,10 +174,8 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
 
     Parameters
     ----------
-    site : Site
     models : mapping of str to LidarModel
         At least those that the candidates name.
-    settings : VisibilitySettings
     engine : {"auto", "bvh", "embree"}
         What casts the rays.
     kept : KeptPieces, optional

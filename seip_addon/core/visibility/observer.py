@@ -42,11 +42,9 @@ class Observer:
 
     Parameters
     ----------
-    site : Site
     models : mapping of str to LidarModel
         At least those that the candidates name.
     delta : float, metres
-    min_intensity : float
     caster : RayCaster
         Of the site's triangles.
     """

@@ -28,7 +28,6 @@ def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, pl
     origin : (3,) float64, metres
         Where the sensor is.
     triangles : (k, 3, 3) float64, metres
-    beams : Beams
     rays : NearRays
         k bundles of them.
     planes : Planes

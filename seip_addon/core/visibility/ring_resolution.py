@@ -25,10 +25,8 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
 
     Parameters
     ----------
-    site : Site
     models : mapping of str to LidarModel
         At least those that the candidates name.
-    settings : VisibilitySettings
 
     Returns
     -------
@@ -80,7 +78,6 @@ def unresolved_from(model: LidarModel, height: float, delta: float, reach: float
 
     Parameters
     ----------
-    model : LidarModel
     height : float, metres
         Of the sensor above the road.
     delta, reach : float, metres

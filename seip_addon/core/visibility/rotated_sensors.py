@@ -18,8 +18,6 @@ class Onlooker:
 
     Parameters
     ----------
-    site : Site
-    settings : VisibilitySettings
     caster : RayCaster
         Of the site's triangles.
     """
@@ -33,7 +31,6 @@ class Onlooker:
 
         Parameters
         ----------
-        model : LidarModel
         xyz : (3,) float64, metres
             Optical centre, local site axes.
         orientation : (3, 3) float64

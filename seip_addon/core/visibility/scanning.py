@@ -53,13 +53,11 @@ class Place:
 
     Parameters
     ----------
-    caster : Caster
     origin : (3,) float64, metres
     yaw : float, radians
     models : sequence of LidarModel
         Whose scans from here are wanted.
     delta : float, metres
-    min_intensity : float
     """
 
     caster: Caster
@@ -85,7 +83,6 @@ def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, in
 
     Parameters
     ----------
-    place : Place
     surfaces : NearSurfaces
         About the targets, for the place's δ.
 
@@ -149,7 +146,6 @@ class _Returns:
 
     Parameters
     ----------
-    place : Place
     beams : Beams
         Of the place.
     """
@@ -175,7 +171,6 @@ class _Returns:
 
         Parameters
         ----------
-        bundles : NearRays
         targets : (t, 3) float64, metres
 
         Returns

@@ -35,7 +35,6 @@ class Sight:
     surfaces : NearSurfaces
         About the targets, for that δ.
     delta : float, metres
-    min_intensity : float
     """
 
     caster: Caster
@@ -48,7 +47,6 @@ class Sight:
 
         Parameters
         ----------
-        models : sequence of LidarModel
         xyz : (3,) float64, metres
             Optical centre, local site axes.
         yaw : float, radians

@@ -52,7 +52,6 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
 
     Parameters
     ----------
-    site : Site
     pose : int
         Index among the site's candidates.
     model : LidarModel
@@ -79,7 +78,6 @@ def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float)
 
     Parameters
     ----------
-    candidates : Candidates
     sensor : str
         Its catalogue key.
     xyz : (3,) float64, metres

@@ -84,9 +84,6 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who 
     ----------
     path : path
         The grid's file, read and written.
-    site : Site
-    models : mapping of str to LidarModel
-    settings : VisibilitySettings
     engine : {"auto", "bvh", "embree"}
         What casts the rays.
     scheduler : str, optional
@@ -119,12 +116,7 @@ def _load(path: Path) -> VisibilityGrid | None:
 
 
 class GridFolder:
-    """A folder of grids that are kept under their keys; other files in it are let alone.
-
-    Parameters
-    ----------
-    path : path
-    """
+    """A folder of grids that are kept under their keys; other files in it are let alone."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -37,7 +37,6 @@ def judge(
 
     Parameters
     ----------
-    layout : Layout
     grid : VisibilityGrid
         Of the layout.
     goal : Goal
@@ -103,7 +102,6 @@ def restored_by_hand(layout: Layout, grid: VisibilityGrid, record: Record) -> Ge
         That it was judged on.
     grid : VisibilityGrid
         That it was judged with.
-    record : dict
     """
     lines = record["sensors"]
     models = find_models(load_catalogue(layout.settings.catalogue), sorted({line["sensor"] for line in lines}))

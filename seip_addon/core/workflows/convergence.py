@@ -109,10 +109,8 @@ def coarsest_settings(
 
     Parameters
     ----------
-    geometry : SceneGeometry
     settings : SurveySettings
         Their spacings do not matter.
-    goal : Goal
     tolerance : float
         Share of the weight, above 0 and below 1.
 
@@ -181,10 +179,8 @@ class Judge:
 
     Parameters
     ----------
-    geometry : SceneGeometry
     settings : SurveySettings
         δ and the sensor types that judge.
-    goal : Goal
     """
 
     def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Goal) -> None:

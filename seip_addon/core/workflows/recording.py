@@ -30,7 +30,6 @@ class RecordingSettings:
 
     Parameters
     ----------
-    scan : ScanSettings
     start, duration, rate : float, optional
         Seconds, seconds, hertz; see `frame_times`.
     formats : tuple of str
@@ -61,11 +60,8 @@ def make_run(
 
     Parameters
     ----------
-    geometry : SceneGeometry
-    sensors : sequence of MountedSensor
     trajectories : Trajectories
         In the scene's axes.
-    settings : RecordingSettings
     versions : mapping of str to str
         Of this program and what it stands on.
 
@@ -110,10 +106,8 @@ def record(
     ----------
     folder : path
         Of the run; its name is the run's in datasets.
-    run : Run
     simulation : Simulation
         Of the run.
-    settings : RecordingSettings
 
     Returns
     -------

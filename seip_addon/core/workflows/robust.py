@@ -89,12 +89,10 @@ def place_robustly(
 
     Parameters
     ----------
-    layout : Layout
     grid : VisibilityGrid
         Of the poses as planned.
     goal : Goal
         Of most coverage.
-    precaution : Precaution
 
     Raises
     ------

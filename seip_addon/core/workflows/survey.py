@@ -47,8 +47,6 @@ class SurveySettings:
 
     Parameters
     ----------
-    candidates : CandidateSettings
-    visibility : VisibilitySettings
     grid_spacing : float, metres
         Between neighbouring targets.
     catalogue : tuple of path
@@ -120,10 +118,8 @@ class Layout:
     ----------
     geometry : SceneGeometry
         What was read from the scene.
-    site : Site
     models : dict of str to LidarModel
         The sensor types asked for, by catalogue key.
-    settings : SurveySettings
     warnings : tuple of str
         What a user should know before trusting the figures.
     """
@@ -140,8 +136,6 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
 
     Parameters
     ----------
-    geometry : SceneGeometry
-    settings : SurveySettings
     warnings : sequence of str
         Of the scene's reading.
 
@@ -190,7 +184,6 @@ def see(
 
     Parameters
     ----------
-    layout : Layout
     path : path
         The grid's file, read and written.
     scheduler : str, optional
@@ -276,10 +269,6 @@ def record_of(  # what was asked for stands in the record
 
     Parameters
     ----------
-    layout : Layout
-    grid : VisibilityGrid
-    plan : Plan
-    circumstances : Circumstances
     render : bool
         Whether a rendered view goes with it.
     pose_errors : bool

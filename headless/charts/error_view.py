@@ -75,10 +75,8 @@ def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], ti
 
     Parameters
     ----------
-    path : path-like
     views : sequence of ErrorView
         Side by side.
-    title : str
     """
     if not views:
         raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")

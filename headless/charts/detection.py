@@ -85,7 +85,6 @@ class Curve:
         As in `Cell`.
     recall, precision : (s,) float64, 0 to 1
         At each score, the highest first.
-    average_precision : float
     """
 
     sensor: str
@@ -133,7 +132,6 @@ class Setting:
         For one merged frame.
     average_precision : float, 0 to 1
     interval : (float, float) or None
-    default : bool
     """
 
     name: str
@@ -205,13 +203,10 @@ def save_coverage_chart(
 
     Parameters
     ----------
-    path : path-like
-    cells : sequence of Cell
     correlation : float
         Spearman's rank correlation of coverage and mean average precision.
     interval : (float, float) or None
         Its 95 % interval, where there is one.
-    title : str
     """
     _check(cells, "average precision against coverage")
     figure, (panel,) = _figure()
@@ -275,12 +270,10 @@ def save_training_chart(
 
     Parameters
     ----------
-    path : path-like
     loss : sequence of float
         Of each step.
     validation : mapping of int to float
         Average precision after so many steps; the best is marked.
-    title : str
     """
     _check(loss, "a training")
     figure, (panel,) = _figure(PANEL[0] * 1.25)
