@@ -6,8 +6,6 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[2]
 BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "addon_utils", "bpy_extras", "gpu", "gpu_extras", "blf", "bl_ext"} | {
     "bl_operators"
@@ -65,49 +63,75 @@ def test_every_module_of_the_core_loads_without_blender():
     assert int(outcome.stdout) == len(modules("seip_addon/core")) - 1  # the package itself is not listed
 
 
-@pytest.mark.parametrize("path", modules("seip_addon/core"), ids=lambda path: path.stem)
-def test_the_core_imports_nothing_above_it(path):
-    names = set(imported(path))
-    above = {name for name in names if name.startswith("seip_addon") and not name.startswith("seip_addon.core")}
-    assert not above
-    assert not {name for name in names if top(name) == "headless"}
-    blenders = {top(name) for name in names} & BLENDERS_OWN
-    # The BVH tree exists in Blender's Python alone; it is imported where such a ray caster is made.
-    assert blenders <= ({"mathutils"} if path.stem == "ray_casting" else set())
+def offenders(folders: list[str], allowed) -> dict[str, set[str]]:
+    """What files import beside what they may, by file; ``allowed(path, name)`` says what they may."""
+    found = {
+        str(path.relative_to(ROOT)): {name for name in imported(path) if not allowed(path, name)}
+        for folder in folders
+        for path in modules(folder)
+    }
+    return {path: names for path, names in found.items() if names}
 
 
-@pytest.mark.parametrize("path", modules("seip_addon/scene"), ids=lambda path: path.stem)
-def test_the_bridge_imports_neither_commands_nor_operators(path):
+def test_the_core_imports_nothing_above_it():
+    """The BVH tree exists in Blender's Python alone; it is imported where such a ray caster is made."""
+
+    def allowed(path, name):
+        if top(name) == "seip_addon":
+            return name.startswith("seip_addon.core")
+        return top(name) not in BLENDERS_OWN | {"headless"} or (path.stem, top(name)) == ("ray_casting", "mathutils")
+
+    assert not offenders(["seip_addon/core"], allowed)
+
+
+def test_the_bridge_imports_neither_commands_nor_operators():
     above = ("headless", "seip_addon.operators", "seip_addon.panels", "seip_addon.properties", "seip_addon.preferences")
-    assert not {name for name in imported(path) if name.startswith(above)}
+    assert not offenders(["seip_addon/scene"], lambda _, name: not name.startswith(above))
 
 
-@pytest.mark.parametrize("path", modules("seip_addon"), ids=lambda path: str(path.relative_to(ROOT)))
-def test_the_add_on_never_names_itself(path):
+def test_packages_of_the_core_import_each_other_in_no_circle():
+    uses: dict[str, set[str]] = {}
+    for path in modules("seip_addon/core"):
+        package = path.relative_to(ROOT / "seip_addon" / "core").parts[0]
+        parts = {name.split(".")[2] for name in imported(path) if name.startswith("seip_addon.core.")}
+        uses.setdefault(package, set()).update(parts - {package})
+    while free := {package for package, used in uses.items() if not used & set(uses)}:
+        uses = {package: used for package, used in uses.items() if package not in free}
+    assert not uses
+
+
+def test_the_add_on_never_names_itself():
     """Installed, it is called `bl_ext.user_default.seip.seip_addon`: only relative imports find it."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    absolute = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
-    absolute += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
-    assert "seip_addon" not in {top(name) for name in absolute if name}
+    for path in modules("seip_addon"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        absolute = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
+        absolute += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+        assert "seip_addon" not in {top(name) for name in absolute if name}, path
 
 
-@pytest.mark.parametrize("path", [*modules("seip_addon"), *modules("headless")], ids=lambda p: str(p.relative_to(ROOT)))
-def test_what_is_imported_is_pinned(path):
+def test_what_is_imported_is_pinned():
     """Torch may be imported by the detector alone, Dask and spopt where they are of use; SciPy is for oracles."""
-    own = {"seip_addon", "headless"}
     ours = {"contourpy", "defusedxml", "embreex", "highspy", "matplotlib", "numpy", "PIL", "pulp", "shapely", "tqdm"}
-    detector = {"torch"} if {"detection", "lab"} & set(path.parts) else set()
-    cluster = {"dask", "distributed"} if path.name == "executors.py" else set()
-    lock = {"packaging"} if path.name == "lock_wheels.py" else set()
-    rival = {"spopt"} if path.name == "rivals.py" else set()
-    foreign = {top(name) for name in imported(path)} - set(sys.stdlib_module_names) - own
-    assert foreign <= ours | BLENDERS_OWN | detector | cluster | lock | rival
+    everywhere = ours | {"seip_addon", "headless"} | set(sys.stdlib_module_names) | BLENDERS_OWN
+    by_file = {
+        "executors.py": {"dask", "distributed"},
+        "lock_wheels.py": {"packaging"},
+        "rivals.py": {"spopt"},
+    }
+
+    def allowed(path, name):
+        detector = {"torch"} if "detection" in path.parts or "lab/detector" in path.as_posix() else set()
+        return top(name) in everywhere | detector | by_file.get(path.name, set())
+
+    assert not offenders(["seip_addon", "headless"], allowed)
 
 
-@pytest.mark.parametrize("path", modules("headless"), ids=lambda path: str(path.relative_to(ROOT)))
-def test_the_laboratory_serves_its_own_commands_alone(path):
-    own = "lab" in path.parts or path.name in {"benchmark.py", "stability.py"}
-    assert own or not {name for name in imported(path) if name.startswith("headless.lab")}
+def test_the_laboratory_serves_its_own_commands_alone():
+    def allowed(path, name):
+        own = "lab" in path.parts or path.name in {"benchmark.py", "stability.py"}
+        return own or not name.startswith("headless.lab")
+
+    assert not offenders(["headless"], allowed)
 
 
 def test_an_import_that_points_up_is_found(tmp_path, monkeypatch):
