@@ -63,7 +63,10 @@ class Run:
 
 def versions(**more: str) -> dict[str, str]:
     """Return the versions of this program, of Python and of the libraries that results stand on, and ``more``."""
-    program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+    if MANIFEST.is_file():
+        program = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+    else:  # installed by pip
+        program = metadata.version("seip")
     there = {name for name in LIBRARIES if importlib.util.find_spec(name)}  # HiGHS need not be
     libraries = {name: metadata.version(name) for name in LIBRARIES if name in there}
     return {"seip": program, "python": platform.python_version(), **libraries, **more}

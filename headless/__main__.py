@@ -1,0 +1,49 @@
+"""The command ``seip``: each batch command is one of its verbs, as in ``seip place site.blend --count 4 -o out``.
+
+In a checkout ``python -m headless`` is the same command.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+
+VERBS = {
+    "build-scene": "build a Blender scene from an OpenDRIVE map",
+    "place": "choose the sensors of a scene",
+    "study": "coverage of types × heights × numbers",
+    "robust": "choose sensors for pose errors, failures or several looks",
+    "in-traffic": "choose sensors for a road full of traffic",
+    "traffic": "put traffic on the road, recorded or simulated by SUMO",
+    "simulate": "scan traffic with the sensors of a scene",
+    "evaluate": "average precision of types × numbers",
+    "train": "train and test one detector",
+    "compare-detectors": "average precision against time of other detector settings",
+    "stability": "drive every method to where it fails (laboratory)",
+    "benchmark": "measure speed and error (laboratory)",
+}
+
+
+def main() -> None:
+    """Run the command that the first argument names, with the arguments after it."""
+    asked = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    if asked in {"-h", "--help"}:
+        sys.stdout.write(_usage())
+        return
+    if asked not in VERBS:
+        sys.exit(f"error: there is no command {asked!r}: seip --help lists the commands")
+    del sys.argv[1]
+    runpy.run_module(f"headless.{asked.replace('-', '_')}", run_name="__main__", alter_sys=True)
+
+
+def _usage() -> str:
+    width = max(map(len, VERBS))
+    verbs = "\n".join(f"  {verb:{width}}  {what}" for verb, what in VERBS.items())
+    return (
+        "usage: seip COMMAND [options]\n\nChoose and evaluate roadside LiDAR sensors.\n\n"
+        f"{verbs}\n\nseip COMMAND --help lists the options of a command.\n"
+    )
+
+
+if __name__ == "__main__":
+    main()
