@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 
-from .average_precision import Evaluation, evaluate, part
-from .frame_results import FrameResult
+from .average_precision import Evaluation, part
 from .intervals import Interval
-from .matching import Rule, must_be_found
 
 ALONG_DISTANCE = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
 ALONG_POINTS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)
@@ -121,22 +119,6 @@ def false_positives(evaluation: Evaluation, score: float) -> FalsePositives:
     known = false.any() and len(hits)
     sparse = float((detections.density[false] < np.median(hits)).mean()) if known else np.nan
     return FalsePositives(float(false.sum()) / len(evaluation.block), sparse)
-
-
-def evaluate_by_class(
-    frames: Sequence[FrameResult], rule: Rule, classes: Sequence[tuple[str, ...]]
-) -> dict[tuple[str, ...], Evaluation]:
-    """Judge each of the detector's classes alone; one of which no road user has to be found is left out.
-
-    A road user of another class, taken for one of this, neither counts nor
-    punishes: its own class has missed it already.
-    """
-    rules = {members: replace(rule, categories=members) for members in classes}
-    return {
-        members: evaluate(frames, own)
-        for members, own in rules.items()
-        if any(must_be_found(frame, own).any() for frame in frames)
-    }
 
 
 def _is_false(evaluation: Evaluation, score: float) -> Boolean:

@@ -167,21 +167,6 @@ def check_device(device: str) -> None:
         raise SeipError(f"torch cannot use the device {device!r} here: name cpu, or mend its driver") from error
 
 
-def require_grid(detector: Detector, grid: PillarGrid, path: str | os.PathLike[str]) -> None:
-    """See that a detector was trained on a grid.
-
-    Raises
-    ------
-    SeipError
-        It was trained on another one.
-    """
-    if detector.grid != grid:
-        raise SeipError(
-            f"{path} was trained on {_in_words(detector.grid)}, but this site has {_in_words(grid)}: "
-            "use a detector of this site, or train one here"
-        )
-
-
 def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
     """Write plain values and tensors, with a digest of them."""
     full = {"schema": SCHEMA, "version": VERSION, **state}
@@ -334,10 +319,3 @@ def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-
-
-def _in_words(grid: PillarGrid) -> str:
-    return (
-        f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m from ({grid.west:g}, {grid.south:g}, "
-        f"{grid.bottom:g}) up to {grid.top:g} m"
-    )

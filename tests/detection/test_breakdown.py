@@ -1,11 +1,9 @@
 """Where detection fails, on frames that are told."""
 
 import math
-from dataclasses import replace
 
-import numpy as np
 import pytest
-from told_frames import SIZES, box, detected, frame, traffic, truth
+from told_frames import box, detected, frame, traffic, truth
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
@@ -13,7 +11,6 @@ from headless.detection.average_precision import evaluate
 from headless.detection.breakdown import (
     ALONG_DISTANCE,
     average_precision_by,
-    evaluate_by_class,
     false_by,
     false_positives,
     recall_by,
@@ -95,22 +92,3 @@ def test_false_positives_and_how_many_are_in_sparse_places():
 def test_density_that_says_nothing_gives_a_half():
     frames = traffic(2, frames=200)
     assert false_positives(evaluate(frames, AT_07), 0.2).sparse == pytest.approx(0.5, abs=0.06)
-
-
-def test_each_class_alone():
-    """The truck is found as a truck and, beside it, taken for a car, which neither counts nor punishes."""
-    truck = box(40, size=SIZES["truck"])
-    there = truth([box(0), box(20), truck], category=["car", "van", "truck"])
-    found = detected([box(0), truck, truck], [0.9, 0.8, 0.7], category=["car", "car", "truck"])
-    classes = (("car", "van"), ("truck", "bus"), ("pedestrian",))
-    by_class = evaluate_by_class([frame(there, found)], AT_07, classes)
-    assert {members: one.average_precision for members, one in by_class.items()} == {
-        ("car", "van"): 0.5,
-        ("truck", "bus"): 1.0,
-    }
-    assert np.array_equal(by_class["car", "van"].wanted.category, ["car", "van"])
-
-
-def test_a_class_without_enough_returns_is_left_out():
-    there = replace(truth([box(0)]), points=np.array([3]))
-    assert evaluate_by_class([frame(there, detected([], []))], replace(AT_07, fewest_points=4), (("car",),)) == {}

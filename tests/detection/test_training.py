@@ -4,7 +4,7 @@ import hashlib
 from dataclasses import replace
 
 from headless.detection.average_precision import evaluate
-from headless.detection.detector import Detector, require_grid
+from headless.detection.detector import Detector
 from headless.detection.frames import FrameFiles, Recording, SampledRecording, require_separate, sample_of, spread
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
@@ -197,9 +197,6 @@ def test_a_detector_is_read_back_as_it_was(tmp_path, learning, aside):
     one, other = (detect(d, frame.points, frame.intensity, least_score=0.0) for d in (detector, again))
     np.testing.assert_array_equal(one.boxes, other.boxes)
     assert (again.settings, again.grid) == (SMALL, GRID)
-    require_grid(again, GRID, path)
-    with pytest.raises(SeipError, match=r"was trained on 80 × 80 pillars of 0.4 m .* this site has 160 × 160 pillars"):
-        require_grid(again, grid_over((-16.0, -16.0, 16.0, 16.0), (-1.0, 4.5), 0.2), path)
 
 
 @pytest.mark.parametrize("content", [b"", b"PK nothing", b"\x80\x02."])
