@@ -1,1 +1,1 @@
-"""Batch commands: thin scripts over the same functions that the add-on calls."""
+"""Batch commands: command lines over the functions that the add-on calls."""

@@ -1,4 +1,4 @@
-"""Measure visibility, placement and their growth against what else one could do; write charts, a page and a JSON file.
+"""Benchmark of visibility, placement and scans against alternatives: charts, a page and a JSON file.
 
 python -m headless.benchmark scenes/junction.blend -o docs
 """

@@ -1,4 +1,4 @@
-"""Chart what other settings of the detector cost and gain: average precision against training and inference time.
+"""Average precision against training and inference time for alternative detector settings.
 
 python -m headless.compare_detectors scenes/junction.blend -o docs/detector
 

@@ -1,4 +1,4 @@
-"""Find out what a placement's sensors detect: coverage, price and average precision of types × numbers, on any scene.
+"""Coverage, price and average precision of sensor types × numbers, on any scene.
 
 python -m headless.evaluate scenes/junction.blend -o out/evaluation
 blender -b --python-exit-code 1 site.blend -P headless/evaluate.py -- --traffic run-*.npz -o out/evaluation

@@ -1,4 +1,4 @@
-"""Options of commands that place sensors: what is asked of the placement."""
+"""Command-line options of a placement's objective and constraints."""
 
 from __future__ import annotations
 

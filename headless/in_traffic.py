@@ -1,4 +1,4 @@
-"""Place sensors for the road in traffic, where vehicles stand in the way, and say what the empty road leaves out.
+"""Optimise for traffic: vehicles of sampled instants block the view. Also reports what the empty road overstates.
 
 python -m headless.in_traffic scenes/junction.blend --sensor type1 --count 2 -o out/in_traffic
 blender -b --python-exit-code 1 site.blend -P headless/in_traffic.py -- --traffic run-*.npz --sensor type1 -o out/

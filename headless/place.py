@@ -1,4 +1,4 @@
-"""Place sensors in a scene: visibility of every candidate, the best choice, and the evidence for it.
+"""Optimise the placement of sensors in a scene, and write it with its evidence.
 
 In Blender, on the scene that is open::
 

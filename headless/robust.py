@@ -1,4 +1,4 @@
-"""Place sensors for poses that are not quite as planned, for sensors that fail, for looks from several sides.
+"""Optimise a placement for pose errors, sensor failures or multiple looks.
 
 python -m headless.robust scenes/junction.blend --sensor type1 --count 4 -o out/robust
 blender -b --python-exit-code 1 site.blend -P headless/robust.py -- --sensor type1 --objective worst -o out/

@@ -1,4 +1,4 @@
-"""What every batch command needs around its work: arguments, the scene's file, exit status, progress.
+"""Runtime of the batch commands: arguments, scene file, exit status, progress bar.
 
 The same file runs as ``blender -b … -P headless/x.py -- arguments`` in the
 real program and as ``python -m headless.x arguments`` on the bpy module.

@@ -1,4 +1,4 @@
-"""Simulate what the sensors of a scene measure of its traffic: for each revolution a cloud per sensor, and the boxes.
+"""Simulate the scans that a scene's sensors make of its traffic, and write datasets.
 
 blender -b --python-exit-code 1 placed.blend -P headless/simulate.py -- --traffic run-1.npz -o out/run-1
 python -m headless.simulate placed.blend --traffic run-1.npz -o out/run-1

@@ -1,4 +1,4 @@
-"""Drive every method to where it fails, and write what was found as one page with charts.
+"""Find where each method begins to fail, and write the stability page with its charts.
 
 python -m headless.stability scenes/junction.blend -o docs
 blender -b --python-exit-code 1 site.blend -P headless/stability.py -- -o docs

@@ -1,4 +1,4 @@
-"""Redo the study's coverage figures on any scene: types × heights × numbers, vanilla against weighted.
+"""Coverage of sensor types × heights × numbers on any scene, vanilla against weighted.
 
 python -m headless.study scenes/junction.blend -o out/study
 blender -b --python-exit-code 1 site.blend -P headless/study.py -- -o out/study

@@ -1,4 +1,4 @@
-"""What the commands have in common: options of a scene's survey, its site, and its visibility grid."""
+"""Options and steps that commands share: scene options, site layout and visibility grid."""
 
 from __future__ import annotations
 

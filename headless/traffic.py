@@ -1,4 +1,4 @@
-"""Put traffic on the road of a scene: from SUMO's floating car data, or simulated by SUMO on the scene's map.
+"""Add traffic to a scene: SUMO's floating car data, or a SUMO simulation on the scene's map.
 
 In Blender, on the scene that is open::
 

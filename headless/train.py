@@ -1,4 +1,4 @@
-"""Train a detector on simulated scans of a site, and say how well it does on traffic that it has not seen.
+"""Train a detector on simulated scans of a site, and test it on unseen traffic.
 
 python -m headless.train site.blend --train out/run-1 out/run-2 --validation out/run-3 --test out/run-4 -o out/detector
 

@@ -1,4 +1,4 @@
-"""Work in a thread that is looked at from time to time and never waited for: what a window needs to stay responsive."""
+"""Background thread for long work, polled from Blender's event loop."""
 
 from __future__ import annotations
 

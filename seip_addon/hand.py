@@ -1,4 +1,4 @@
-"""What hands have done to the sensors of a placement: moved, turned, deleted, added."""
+"""Edits of placed sensors in the scene: moved, rotated, deleted or added."""
 
 from __future__ import annotations
 

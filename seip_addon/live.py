@@ -1,4 +1,4 @@
-"""Coverage that follows sensors which a hand moves.
+"""Live coverage of sensors while they are moved.
 
 A handler notes that something moved; a timer, a moment later, casts the rays of
 those sensors alone and colours the road anew. Neither is there while this is off.

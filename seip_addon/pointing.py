@@ -1,4 +1,4 @@
-"""From a line in a list to the thing in the scene, and back."""
+"""Selection of objects from list rows, and of rows from objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user sets once for all files."""
+"""Add-on preferences, for all files."""
 
 from __future__ import annotations
 

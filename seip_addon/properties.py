@@ -1,4 +1,4 @@
-"""What the panel asks and what it found, kept with each scene in the file."""
+"""Scene properties: settings of the panel, and results kept in the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the add-on gives to Blender, in the order in which Blender must learn of it."""
+"""Registration of the add-on's classes, in order."""
 
 from __future__ import annotations
 

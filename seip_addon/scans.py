@@ -1,4 +1,4 @@
-"""What the add-on holds in memory of scans: traffic, sensors that are ready to scan it, and the last frame.
+"""In-memory state of scans: traffic, scanners and the last frame.
 
 By the scene's session number, as `state`; none of it is needed to go on.
 """

@@ -1,4 +1,4 @@
-"""The sensor types that there are, and each scene's list of them.
+"""Sensor types known to the add-on, and each scene's list of them.
 
 The catalogue is held in memory, for panels that only look; scenes keep keys
 and whether each is to be used.

@@ -1,4 +1,4 @@
-"""What the add-on holds in memory: surveys by scene, and the work that is under way.
+"""In-memory state of the add-on: surveys by scene, and running work.
 
 None of it is needed to go on: the file keeps what was asked and found, and the
 cache keeps visibility. Scenes are named by their session number, as undo and

@@ -1,4 +1,4 @@
-"""Charts of how well vehicles are detected, and what that costs."""
+"""Charts of average precision against number, price, coverage and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where detections and road users differ, from above."""
+"""Plan view of one frame with road users, detections and errors."""
 
 from __future__ import annotations
 

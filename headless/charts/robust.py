@@ -1,4 +1,4 @@
-"""Charts of what pose errors do to placements, and of what it costs to place for them."""
+"""Charts of coverage under pose errors, and of the price of robust placements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Charts of what traffic hides from a placement, and of what placing on traffic wins back."""
+"""Charts of the coverage that traffic leaves, for nominal and for traffic-aware placements."""
 
 from __future__ import annotations
 

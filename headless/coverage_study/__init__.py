@@ -1,4 +1,4 @@
-"""The study's coverage figures on any site: types × heights × numbers, vanilla against weighted, and what holds.
+"""Coverage study of a site: types × heights × numbers, vanilla against weighted, and the claims of the paper.
 
 The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
 Evaluation of Infrastructure-based Collective Perception", section V.

@@ -1,4 +1,4 @@
-"""Charts of a coverage study, for a report."""
+"""Charts of a coverage study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a site says to the claims of the study."""
+"""Verdicts on the paper's claims about coverage, for one site."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PointPillars and how well it detects; torch is imported here and nowhere else."""
+"""PointPillars, its training and its evaluation; the only code that imports torch."""
 
 import sys
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""The head as published: boxes of given sizes at 0 and 90 degrees in each cell, and what they must become.
+"""Anchor-based detection head as published: anchors at 0 and 90 degrees in each cell, and their targets.
 
 After A. H. Lang et al.: PointPillars. CVPR 2019, and Y. Yan, Y. Mao, B. Li:
 SECOND: Sparsely Embedded Convolutional Detection. Sensors 18 (2018).

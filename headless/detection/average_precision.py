@@ -1,4 +1,4 @@
-"""Average precision over many frames, how sure it is, and what it is made of."""
+"""Average precision over many frames, with confidence intervals."""
 
 from __future__ import annotations
 

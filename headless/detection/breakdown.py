@@ -1,4 +1,4 @@
-"""Where detection fails: by distance, by returns, by visibility, by category, by how dense the cloud is."""
+"""Average precision, recall and false positives by distance, returns, visibility, category and density."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The case study: whether more or better sensors detect more, at what price, and whether coverage foretells it.
+"""The detection study: average precision of sensor types × numbers, against price and coverage.
 
 Placements come from the integer program, clouds from simulated traffic. One
 detector learns from all placements at once (or one from each), several times

@@ -1,4 +1,4 @@
-"""A head without anchors: a heat map of centres for each class, and in each cell the box whose centre is there.
+"""Anchor-free detection head: a heat map of centres for each class, and a box in each cell.
 
 After T. Yin, X. Zhou, P. Krähenbühl: Center-based 3D Object Detection and
 Tracking. CVPR 2021, with three changes for few training steps on sparse clouds:

@@ -1,4 +1,4 @@
-"""What the charts of detection draw, from what was measured."""
+"""Data of the detection charts, taken from evaluations."""
 
 from __future__ import annotations
 

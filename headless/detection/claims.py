@@ -1,4 +1,4 @@
-"""What detection on this site says to the claims of the study.
+"""Verdicts on the paper's claims about detection, for one site.
 
 Claims 5 to 9 of Qu, Huang and Suo, "SEIP: Simulation-based Design and
 Evaluation of Infrastructure-based Collective Perception", section V. Gains are

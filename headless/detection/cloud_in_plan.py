@@ -1,4 +1,4 @@
-"""The returns near a place, found without looking at all of them."""
+"""Spatial index of a cloud in plan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a detector finds in one cloud."""
+"""Detections in one cloud: boxes, scores and classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A detector: the network with its weights and the grid that they were learnt on, and the file that holds them."""
+"""A detector: network, weights and pillar grid, and the file that holds them."""
 
 from __future__ import annotations
 

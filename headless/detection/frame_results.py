@@ -1,4 +1,4 @@
-"""What was there in a frame and what was detected, with all that errors are told apart by."""
+"""Ground truth and detections of one frame, with the attributes by which errors are broken down."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames to learn from: which run they are from, and what a detector takes of them."""
+"""Frames of recorded runs as training samples, and checks that splits are independent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What heads have in common: the boxes they learn, the boxes they find, and the cells of the feature map."""
+"""Interface of detection heads: training targets, decoded boxes and the feature map's cells."""
 
 from __future__ import annotations
 

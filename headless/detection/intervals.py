@@ -1,4 +1,4 @@
-"""How sure a figure is, and what may be claimed of it."""
+"""Confidence intervals over trainings and traffic, and verdicts on claims from them."""
 
 from __future__ import annotations
 

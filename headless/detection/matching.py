@@ -1,4 +1,4 @@
-"""Which detection found which road user of its frame.
+"""Match detections to ground-truth boxes by IoU, best score first.
 
 The rule: detections take turns, the best score first (of equal scores the one
 that overlaps its road user most). Each takes, of the road users that count and

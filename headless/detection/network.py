@@ -1,4 +1,4 @@
-"""The network of PointPillars: pillars → a picture in plan → a feature map at half its resolution.
+"""The PointPillars network: pillar features → pseudo-image → feature map at half its resolution.
 
 A. H. Lang et al.: PointPillars: Fast Encoders for Object Detection from Point Clouds. CVPR 2019.
 """

@@ -1,4 +1,4 @@
-"""Points sorted into pillars.
+"""Pillars: the points of a cloud grouped by the cells of a grid in plan.
 
 There is no padding: the points of all pillars stand in one array, pillar after
 pillar, so no point can appear that was not measured. The maximum over each

@@ -1,4 +1,4 @@
-"""Frames of traffic as placements of sensors measure them, simulated when they are asked for."""
+"""Simulated recordings of traffic for each sensor configuration, made on demand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exact overlap of rotated boxes, many pairs at a time, and non-maximum suppression by it.
+"""IoU of rotated boxes, vectorised over pairs, and non-maximum suppression.
 
 The overlap in plan is found in the second box's own frame, where it is a
 rectangle about the origin. The first box's outline, moved point by point to the

@@ -1,4 +1,4 @@
-"""What may be chosen about a detector and its training, with the measured defaults."""
+"""Settings of the detector and of its training, with measured defaults."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the case study found, as charts, as a table and as a record."""
+"""Charts, tables and records of the detection study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user should know before trusting a detector with a cloud: where it is used beyond what it has learnt."""
+"""Warnings where a detector is used beyond the sensor types, sites and densities that it was trained on."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Arrays in, arrays out: everything that needs no Blender."""
+"""The core: NumPy in, NumPy out, no Blender."""

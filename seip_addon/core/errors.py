@@ -1,4 +1,4 @@
-"""The one error class for mistakes that a user can mend."""
+"""`SeipError`, the exception for mistakes that a user can correct."""
 
 _LONGEST = 1000
 

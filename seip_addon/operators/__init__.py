@@ -1,1 +1,1 @@
-"""Operators: each a thin way from a click, or a script, to the core and back into the scene."""
+"""Operators: thin wrappers of core functions."""

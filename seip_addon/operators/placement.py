@@ -1,4 +1,4 @@
-"""The choice of sensors, and what must or must not be among them."""
+"""Operators that solve a placement and edit its constraints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done with a placement: look at it, compare it, move its sensors, write it to files."""
+"""Operators on results: inspect, compare, move sensors, export."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sensor types: the catalogue and the user's own files, presets, and their beams in the viewport."""
+"""Operators on sensor types: catalogues, presets, beam previews."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The site: built from a map or modelled by hand, what its objects mean, and whether it is sound."""
+"""Operators on the site: build from a map, assign roles, check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Traffic in the scene, what the sensors measure of it, and datasets of that."""
+"""Operators on traffic, scans and datasets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the viewport shows of a placement: coverage, sight lines, a legend, and pictures of it."""
+"""Operators on overlays: coverage, sight lines, legend, pictures."""
 
 from __future__ import annotations
 

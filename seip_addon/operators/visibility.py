@@ -1,4 +1,4 @@
-"""Visibility of the scene: who sees what, and how long it takes to find out."""
+"""Operators that estimate and compute visibility."""
 
 from __future__ import annotations
 

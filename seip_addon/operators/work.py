@@ -1,4 +1,4 @@
-"""How operators run: errors become reports, long work leaves Blender responsive and can be stopped."""
+"""Base classes of operators: error reports, and long work that can be stopped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The button of long work, which turns into its progress."""
+"""Button of a long operator, which shows its progress while it runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sentences that are longer than a sidebar is wide."""
+"""Wrapped text for the sidebar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all panels have in common: their place."""
+"""Mixin that places a panel in the sidebar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a modelled site to a Blender scene that a person is glad to open."""
+"""Build a Blender scene from a modelled site."""
 
 from __future__ import annotations
 

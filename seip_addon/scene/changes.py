@@ -1,4 +1,4 @@
-"""Whether a scene is still as it was read, told without reading it again.
+"""Detection of changes to a scene since it was read.
 
 Blender reports what it evaluates anew: objects that move or change their shape.
 What it does not report, such as objects that come and go, is in a digest of

@@ -1,4 +1,4 @@
-"""What a scene holds, faulty or not, for a check of the site: where `read_scene` stops, this goes on and names it."""
+"""Contents of a scene for the site check, faults included."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C while Blender's own code runs."""
+"""Handling of Ctrl-C during Blender's own code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scene to arrays: evaluated meshes by collection, as docs/architecture.md names them."""
+"""Read a scene into arrays: evaluated meshes by collection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What objects mean to the placement: which collections of the contract they are linked to."""
+"""Roles of objects: their collections in the scene contract."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sensors that hang in a scene: empties in ``SEIP Sensors``, wherever a result or a hand put them."""
+"""Sensors in the scene: empties in ``SEIP Sensors``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The result in the scene: sensors as empties, coverage as coloured squares on the road."""
+"""Write results into the scene: sensors as empties, coverage as coloured squares."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What is drawn into the viewport and stays no part of the scene."""
+"""Viewport overlays, which are no part of the scene."""

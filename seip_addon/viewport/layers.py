@@ -1,4 +1,4 @@
-"""What is drawn over the viewport: points, lines and faces, computed once and drawn again as they are.
+"""Overlay layers of points, lines and faces, with cached geometry.
 
 Everything belongs to a scene and shows in that one's views alone. Blender's
 draw handlers are there while there is something to draw, and no longer.

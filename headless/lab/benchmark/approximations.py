@@ -1,4 +1,4 @@
-"""Simplifications of a scan that a user is tempted by, each as a site and models of its own."""
+"""Simplified scans and scenes (fewer rays or channels, coarser grids, simpler objects) to compare with the full ones."""
 
 from __future__ import annotations
 

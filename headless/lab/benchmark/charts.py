@@ -1,4 +1,4 @@
-"""The benchmark's charts: what the findings have to do with each axis."""
+"""Charts of the benchmark."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a piece of work takes: processor time, time on the clock, memory."""
+"""Processor time, wall-clock time and peak memory of a piece of work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How time and memory grow with the numbers of candidates, targets and triangles, each size in a process of its own."""
+"""Growth of time and memory with the numbers of candidates, targets and triangles, each size in its own process."""
 
 from __future__ import annotations
 

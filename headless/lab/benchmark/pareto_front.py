@@ -1,4 +1,4 @@
-"""What of several ways to an answer is worth its time, and how times grow."""
+"""Pareto front of error against run time, and exponents of growth."""
 
 from __future__ import annotations
 

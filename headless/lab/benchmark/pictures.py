@@ -1,4 +1,4 @@
-"""Charts of what is gained and what is lost by each way to an answer, and of how costs grow."""
+"""Scatter plots of error against run time, and log-log plots of growth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Time and gap of ways to place sensors, on one instance after the other."""
+"""Time and gap of placement methods over a set of instances."""
 
 from __future__ import annotations
 

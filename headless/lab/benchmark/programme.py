@@ -1,4 +1,4 @@
-"""What the benchmark measures of a scene and of synthetic streets, and in which order."""
+"""The sequence of measurements of the benchmark."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark's findings as one JSON file and one page of Markdown."""
+"""The benchmark's results as JSON and as a Markdown page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Other ways to place sensors, as one would first think of them: to hold the project's own against.
+"""Alternative placement methods, as baselines: spopt, plain integer programs, simple greedy.
 
 They know the plain problem alone: so many sensors, at most one at each position.
 """

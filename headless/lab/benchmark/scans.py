@@ -1,4 +1,4 @@
-"""Frames of scans: static returns kept and road users cast in their own axes, against everything cast anew."""
+"""Frames with cached static returns against frames cast anew."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Time and error of ways to a visibility grid: full scans, the lazy engine, and what simplifications cost."""
+"""Time and error of full scans, the lazy engine and simplified scans."""
 
 from __future__ import annotations
 

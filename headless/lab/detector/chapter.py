@@ -1,4 +1,4 @@
-"""Where the detector fails on a scene: trained as an evaluation trains it, and tried until it fails."""
+"""The detector's chapter of the stability page: train on a scene, then test under disturbances."""
 
 from __future__ import annotations
 

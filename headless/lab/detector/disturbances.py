@@ -1,4 +1,4 @@
-"""What may be wrong with measurements when a detector is used: each a kind, with a size.
+"""Disturbances of measurements (noise, loss, rain, pose and clock errors), each with a size.
 
 A disturbance changes what hangs there, who is on the road, how a frame is
 taken, what a frame shows, or how a detector looks at it, and leaves the rest as

@@ -1,4 +1,4 @@
-"""Average precision of several trainings, and by how much it changes, with intervals over traffic and trainings."""
+"""Paired differences of average precision, with intervals over traffic and trainings."""
 
 from __future__ import annotations
 

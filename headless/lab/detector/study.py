@@ -1,4 +1,4 @@
-"""Where the detector begins to fail: average precision against the size of each disturbance, and away from home.
+"""Average precision against the size of each disturbance, and on other types, traffic and sites.
 
 Trained detectors, alike but for their seeds, are tried on the same test frames
 again and again, each time with one thing wrong. A disturbance begins to harm

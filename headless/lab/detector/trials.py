@@ -1,4 +1,4 @@
-"""Detectors tried under disturbances: what each makes of the test frames, kept so that nothing is done twice."""
+"""Trials of detectors under disturbances, with their results kept on disk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where arithmetic fails: both ray casters against float64 on scenes that are hard on them.
+"""Both ray casters against float64 on numerically hard scenes.
 
 Two questions are asked of each scene. Of its hits: how many are others than float64's,
 and does any lie where no rounding explains it? Of V: does any entry differ where the

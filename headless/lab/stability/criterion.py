@@ -1,4 +1,4 @@
-"""Where the criterion of visibility fails: coverage and placement against δ, the grids, and the beams' azimuth.
+"""Sensitivity of coverage and placement to δ, grid spacings and beam azimuth.
 
 Each setting is varied alone. An answer is judged twice: as its own settings see it, and on
 one fine grid of targets with the δ asked for, the same for all.

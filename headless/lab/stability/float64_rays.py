@@ -1,4 +1,4 @@
-"""Rays in float64, and how sure their hits are: what float32 ray casters are held to.
+"""A float64 ray caster with error bounds, as reference for float32 ray casters.
 
 Every ray meets every triangle, without a tree, so that nothing can be missed. A ray of
 direction d from o passes the line through p and q at the signed distance

@@ -1,4 +1,4 @@
-"""Small scenes that are hard on ray casters, each with the rays that are hardest on them."""
+"""Small scenes with numerically hard rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often something happens in a number of trials."""
+"""Binomial proportions with confidence intervals."""
 
 from __future__ import annotations
 

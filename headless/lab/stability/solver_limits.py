@@ -1,4 +1,4 @@
-"""Where solvers fail: weights and prices far apart, near-ties, symmetry, little time, and greedy's worst case."""
+"""Solvers under extreme weights and prices, near-ties, symmetry and short time limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each format of datasets provides."""
+"""Interface of a dataset format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What several formats share: a text file of boxes for each sample, and one of samples for each split."""
+"""Label and split text files that several formats share."""
 
 from __future__ import annotations
 

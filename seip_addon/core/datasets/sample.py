@@ -1,4 +1,4 @@
-"""What a dataset is made of: traffic runs, and of each its frames with the labels that are to be written."""
+"""Samples of a dataset: frames of traffic runs with their labels."""
 
 from __future__ import annotations
 

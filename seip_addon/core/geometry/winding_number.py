@@ -1,4 +1,4 @@
-"""Which points a mesh surrounds, by its winding number: quick where the mesh is large, and never wrong for it."""
+"""Point-in-mesh test by generalised winding number, with a hierarchy of cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LiDAR models: what a sensor type's beams are, what they cost, and how its returns are disturbed.
+"""LiDAR models: beams, price, returns and noise.
 
 Visibility uses the beam pattern and the range alone. Noise, intensity and
 drop-off are for scans of traffic, and seeded by the generator that is passed in.

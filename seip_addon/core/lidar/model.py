@@ -1,4 +1,4 @@
-"""What a LiDAR model is: its beams, its price, and how its returns are disturbed."""
+"""The LiDAR model: beam table, ranges, rates, price and noise parameters."""
 
 from __future__ import annotations
 

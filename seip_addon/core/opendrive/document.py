@@ -1,4 +1,4 @@
-"""XML as OpenDRIVE uses it: hostile files are refused, numbers are checked, namespaces do not matter."""
+"""Validated access to OpenDRIVE's XML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the XML of an OpenDRIVE file to a `RoadMap`.
+"""Read an OpenDRIVE file into a `RoadMap`.
 
 Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have
 the standard's defaults.

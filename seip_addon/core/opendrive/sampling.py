@@ -1,4 +1,4 @@
-"""Where to sample smooth curves so that their chords stay within a tolerance."""
+"""Sampling of smooth curves with a tolerance on chords."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where to put labels on a picture so that none hides another."""
+"""Placement of labels without overlaps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the colours of the targets in the viewport mean: by whom they are seen, or how much they weigh."""
+"""Colours of targets in the viewport: coverage, weight, comparison."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pictures have in common: sensors with their labels, the title, and the file."""
+"""Elements that pictures share: sensors with labels, title, PNG output."""
 
 from __future__ import annotations
 

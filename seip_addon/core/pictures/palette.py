@@ -1,4 +1,4 @@
-"""Colours and words that pictures and the scene share; told apart by colour-blind people and on grey paper."""
+"""Colours shared by pictures and the scene; distinct for colour-blind readers and in greyscale."""
 
 INK = "#1d2b36"
 SOFT_INK = "#5d6b76"

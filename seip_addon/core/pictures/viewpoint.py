@@ -1,4 +1,4 @@
-"""Where a camera has to stand to have all points in its picture, and where they are on it."""
+"""Camera position that frames a set of points, and their pixel coordinates."""
 
 from __future__ import annotations
 

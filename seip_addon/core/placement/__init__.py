@@ -1,4 +1,4 @@
-"""Which candidates to choose: maximal covering with a certificate."""
+"""Sensor placement: the maximal covering location problem, solved with a certificate."""
 
 from .cheapest import cheapest_for_coverage
 from .problem import Placement, PlacementProblem

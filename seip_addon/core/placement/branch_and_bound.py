@@ -1,4 +1,4 @@
-"""Branch and bound on what each sensor adds, first where the bound is largest.
+"""Best-first branch and bound on the marginal gains of sensors.
 
 A placement is built in greedy order: each sensor adds no more than the one
 before it, because coverage is submodular. At a node with k sensors still to

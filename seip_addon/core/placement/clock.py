@@ -1,4 +1,4 @@
-"""How much of a limit of time, or of counted work, is left."""
+"""Remaining budget of a search, in seconds or in units of counted work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Upper bounds by districts, for many sensors: where shares of sensors would cover all, whole ones do not.
+r"""Upper bounds by Lagrangian decomposition into districts, for many sensors.
 
 The linear relaxation counts a target twice that two sensors see. Here the
 candidates are parted into districts, and only a target that several districts

@@ -1,4 +1,4 @@
-"""The chosen sensors and what they see: the one thing that every table, file and picture is drawn from."""
+"""A deployment: the chosen sensors with their coverage and price."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A first choice that meets the mandatory groups, or the reason why there is none."""
+"""A first feasible choice for mandatory groups, or the reason why there is none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user asks of a placement, and the problem that it makes of a site."""
+"""Objective and constraints of a placement, and the problem that they make of a site."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Greedy choice with its certificate, and improvement by exchange."""
+"""Greedy selection with its certificate, and swap local search."""
 
 from __future__ import annotations
 

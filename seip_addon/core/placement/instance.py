@@ -1,4 +1,4 @@
-"""The problem in canonical order, reduced to what can matter; every reduction here is exact."""
+"""The problem in canonical order, after exact reductions."""
 
 from __future__ import annotations
 

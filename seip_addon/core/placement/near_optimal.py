@@ -1,4 +1,4 @@
-"""How flat the top is: all placements whose coverage comes near the best one's."""
+"""The near-optimal set: all placements whose coverage is within a share of the best."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The placement problem and its answer."""
+"""The placement problem and its solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Weights and prices too small to decide beside the others, in words."""
+"""Notes on weights and prices too small to decide beside the others."""
 
 from __future__ import annotations
 

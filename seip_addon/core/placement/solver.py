@@ -1,4 +1,4 @@
-"""The placement that covers most, proven optimal or with a bound."""
+"""Maximal covering: an optimal placement, or the best found with a bound."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The canonical one among equally good placements.
+"""Tie-breaking: the canonical one among equally good placements.
 
 Stages, each within the optima of those before: largest coverage, fewest
 sensors, lowest price, largest doubly covered weight, and first in the

@@ -1,1 +1,1 @@
-"""What a run leaves on disk of its result: record, tables, CARLA spawns."""
+"""Result files: placement record, tables, CARLA spawns."""

@@ -1,4 +1,4 @@
-"""Two placements on the same targets: what one gains over the other, and what it loses."""
+"""Comparison of two placements on the same targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Candidate poses in the order of what they are worth, alone or beside a placement."""
+"""Candidates ranked by coverage, alone or added to a placement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What poses see when they are not quite as planned: visibility grids of many draws of pose errors."""
+"""Visibility grids of poses under draws of pose errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Estimates from draws, each with the interval in which the true value lies with a confidence of 95 %."""
+"""Estimates from samples with 95 % confidence intervals."""
 
 from __future__ import annotations
 

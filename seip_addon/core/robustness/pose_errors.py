@@ -1,4 +1,4 @@
-r"""Where sensors really hang: errors of position, height, yaw and tilt, drawn from normal distributions.
+r"""Pose errors: normally distributed position, height, yaw and tilt.
 
 A sensor planned at p with the yaw ψ and the tilt θ hangs at p + e and is turned as
 

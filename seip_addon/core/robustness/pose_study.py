@@ -1,4 +1,4 @@
-"""What a placement covers when its sensors do not hang quite where and as they were planned.
+"""Coverage of a placement under pose errors, jointly, per sensor and per kind of error.
 
 All sensors err in each draw. The same draws tell what comes of it when one
 sensor alone errs: a first-order effect, that of its own row of V beside the

@@ -1,4 +1,4 @@
-r"""What a placement is judged by when poses err, sensors fail and one look is not enough.
+r"""Risk measures of robust placement: expectation, worst case, CVaR, failures, multi-cover.
 
 In scenario k the chosen sensors S see target j :math:`n_{jk}(S)` times. The
 outcome of the scenario is the weight of the targets seen often enough,

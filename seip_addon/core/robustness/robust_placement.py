@@ -1,4 +1,4 @@
-r"""The placement that holds when poses are not as planned, sensors fail or one look is not enough.
+r"""Robust placement over scenarios of pose errors, sensor failures or traffic.
 
 With K scenarios of pose errors, V of each known for every candidate,
 

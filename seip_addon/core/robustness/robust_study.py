@@ -1,4 +1,4 @@
-"""What it costs to place for pose errors, and what that saves: judged by draws that no placement was chosen on."""
+"""Price and benefit of robust placements, judged on unseen draws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Instants of traffic, and the vehicles that stand there."""
+"""Sampled instants of traffic with the vehicles present."""
 
 from __future__ import annotations
 

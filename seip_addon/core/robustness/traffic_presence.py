@@ -1,4 +1,4 @@
-"""Where road users really are: for how long they stand or move over each target's square."""
+"""Time that road users spend on each target's square."""
 
 from __future__ import annotations
 

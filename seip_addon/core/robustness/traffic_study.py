@@ -1,4 +1,4 @@
-"""What a placement for the empty road holds in traffic, and what placing on traffic wins back.
+"""Coverage that traffic leaves of a placement, and what optimising for traffic regains.
 
 Placements are chosen at some instants of traffic and judged at others, of other runs. What is judged is a share of
 time: of each target, and of the targets' weight. Instants near in time see the same queues, so that intervals come of

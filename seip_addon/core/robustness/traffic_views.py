@@ -1,4 +1,4 @@
-r"""What poses see while vehicles stand in the way, at instants of traffic.
+r"""Visibility grids at instants of traffic, with vehicles as occluders.
 
 Two things are asked for, of all rays of a sensor's scan, each of which ends at the
 distance d on the first of the scene's triangles or of the bodies of road users:

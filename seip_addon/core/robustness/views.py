@@ -1,4 +1,4 @@
-"""What poses see in several circumstances: as they may err, or with the traffic of several instants."""
+"""Visibility over scenarios: pose errors or instants of traffic."""
 
 from __future__ import annotations
 

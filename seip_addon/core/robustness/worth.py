@@ -1,4 +1,4 @@
-"""What a target is worth by the number of sensors that see it, and what those to come may add at most."""
+"""Multi-cover objective: value of a target by the number of sensors that see it, and its upper bound."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which rays of a sensor can meet something whose corners are known: its window of channels and azimuths."""
+"""Windows of channels and azimuths in which an object can be hit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where road users are while a revolution lasts."""
+"""Poses of road users during a revolution."""
 
 from __future__ import annotations
 

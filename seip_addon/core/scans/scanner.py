@@ -1,4 +1,4 @@
-"""One sensor's scans: its static returns, found once, and those of the traffic before them.
+"""Scans of one sensor: cached static returns, and returns of traffic.
 
 What moves is cast against in its own axes, in which its shape never changes, and only by the rays that pass through
 its bounding box. A ray ends at the nearest of what it meets.

@@ -1,4 +1,4 @@
-"""A LiDAR where it hangs."""
+"""A mounted sensor: LiDAR model, position and orientation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does not move, as scans need it."""
+"""Static geometry of a scene for scans."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Candidate poses: where a sensor may hang, and what rules a place out."""
+"""Candidate poses, and the rules that exclude positions."""
 
 from __future__ import annotations
 

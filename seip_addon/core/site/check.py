@@ -1,4 +1,4 @@
-"""What a scene holds for a survey, and what in it would harm the answer: counts, and problems with their cure."""
+"""Checks of a scene: counts, and problems with their remedies."""
 
 from __future__ import annotations
 

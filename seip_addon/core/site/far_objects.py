@@ -1,4 +1,4 @@
-"""What lies beyond every sensor's range is left out, and said.
+"""Removal of geometry beyond every sensor's range of the region.
 
 Ray casters compute in float32 about the middle of all triangles, whose steps grow with the extent: one object
 that was forgotten far away costs every return its accuracy, and the search for near surfaces its speed.

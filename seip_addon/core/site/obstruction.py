@@ -1,4 +1,4 @@
-"""What keeps a sensor or its post from standing somewhere: objects around it or too near."""
+"""Obstruction of posts and sensors by objects around or near them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the bridge reads from a scene: plain arrays and polygons, nothing of Blender's."""
+"""Scene geometry as plain arrays and polygons, without Blender types."""
 
 from __future__ import annotations
 

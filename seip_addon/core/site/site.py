@@ -1,4 +1,4 @@
-"""The site: targets, candidate poses and the static triangles between them."""
+"""The site: targets, candidates and static triangles."""
 
 from __future__ import annotations
 

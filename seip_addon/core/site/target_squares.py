@@ -1,4 +1,4 @@
-"""The part of the road that each target stands for, to draw coverage with."""
+"""Squares of road that targets stand for, draped over the road surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of named arrays and a header, of which nothing is believed before it has been checked."""
+"""Files of named arrays with a header, validated before use."""
 
 from __future__ import annotations
 

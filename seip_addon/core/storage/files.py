@@ -1,4 +1,4 @@
-"""Files that are whole or absent, and digests of what went into them."""
+"""Atomic file writes, folder locks and digests."""
 
 from __future__ import annotations
 

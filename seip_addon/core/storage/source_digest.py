@@ -1,4 +1,4 @@
-"""Digests of program code, by which stored results are told from those of another version of it."""
+"""Digests of program code, as part of the keys of stored results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Road users that stand in one another: simulated ones collide now and then, bodies cannot."""
+"""Removal of overlapping road users from simulated traffic."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether two runs of traffic are independent: how often their vehicles are in one place at the same instant."""
+"""Overlap of two runs of traffic: share of vehicles at the same place at the same instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where each road user is at any time."""
+"""Trajectories of road users."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Which candidate pose sees which target: exact, and casting only rays that can matter."""
+"""Visibility of targets from candidates, by ray casting with culling."""

@@ -1,4 +1,4 @@
-r"""Which rays of a scan can return from near which targets.
+r"""Beam culling: the rays of a scan that can return from near a target.
 
 Returns within δ of a target lie in its patch: an upright cylinder of radius δ
 about it, between the heights at which there is anything (`near_surfaces`). A

@@ -1,4 +1,4 @@
-"""How long a visibility grid will take, and how much memory, found by beginning it.
+"""Estimate of a visibility grid's run time and memory, from its first candidates.
 
 What comes before the first ray is done and timed; then a few places drawn by lot
 are looked from, on as many threads as the whole would run on. Their pace is that

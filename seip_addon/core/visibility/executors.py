@@ -1,4 +1,4 @@
-"""Who works on the pieces: threads of this process, or the workers of a Dask scheduler on any number of machines."""
+"""Executors for chunks of the visibility grid: threads or a Dask cluster."""
 
 from __future__ import annotations
 

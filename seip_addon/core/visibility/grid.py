@@ -1,4 +1,4 @@
-"""Which candidate pose sees which target.
+"""The visibility grid: candidates × targets.
 
 V_ij = 1 if and only if some return of candidate i's full scan lies nearer than
 δ to target j and, where a least intensity is asked for, is at least as strong.

@@ -1,4 +1,4 @@
-"""At which heights something stands within δ of a target.
+"""Surfaces within δ of each target, and the heights that they span.
 
 A return within δ of a target lies on a triangle that meets the ball of radius δ
 about it. The triangle's plane, at the signed distance h from the target, cuts a

@@ -1,4 +1,4 @@
-"""Which triangles can stand between a candidate and a target, and why the others cannot.
+"""Triangles that can lie between a candidate and a target; the others are dropped.
 
 Every ray that decides whether a target is seen runs from a candidate to a point
 within δ of a target: within the convex hull of the candidates and of the balls of

@@ -1,4 +1,4 @@
-"""The poses of a site and what they see, in pieces that can be worked on anywhere and in any order."""
+"""The visibility task in chunks that run in any order, on any machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bundles of rays that one triangle stops, proven without casting them.
+"""Bundles of rays that a single triangle blocks, found without casting them.
 
 A bundle is a row of neighbouring azimuth steps of one channel, its rays
 u(a) = (cos a, sin a, σ) for azimuths a within w of a₀. For a half-space n·x > 0

@@ -1,4 +1,4 @@
-"""Where δ and the grid spacing cannot resolve a sensor's rings, in words.
+"""Warnings where rings are too far apart for δ and the grid spacing.
 
 On a level road h below the sensor the channel of elevation -φ draws a ring of
 radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets

@@ -1,4 +1,4 @@
-"""What sensors see that hang anywhere and are turned anyhow: knocked, tilted, or moved by hand."""
+"""Visibility of sensors at arbitrary positions and orientations."""
 
 from __future__ import annotations
 

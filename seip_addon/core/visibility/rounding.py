@@ -1,4 +1,4 @@
-"""Where float32, in which scenes are stored and rays are cast, is too coarse for a scene: in words.
+"""Warnings where float32 is too coarse for a scene.
 
 Blender keeps coordinates in float32, whose steps grow with the distance from the
 scene's origin; ray casters take float32 coordinates about the middle of all that

@@ -1,4 +1,4 @@
-"""What the sensors at one place see: by casting every ray, or only those that can change the answer.
+"""Scans of the sensors at one position, full or lazy.
 
 A target is seen if some return of the scan lies nearer than δ to it. So
 

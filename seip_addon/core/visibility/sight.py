@@ -1,4 +1,4 @@
-"""What sensors see that hang anywhere and are turned anyhow.
+"""Views of sensors at arbitrary positions and orientations, with shared ray casts.
 
 What an upright sensor sees is computed in the site's axes. For any other all is
 computed in the sensor's own axes, where its channels are cones about z as those

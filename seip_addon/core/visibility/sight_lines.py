@@ -1,4 +1,4 @@
-"""What one sensor sees of the targets, as lines to draw, and which targets in its range it does not see."""
+"""Sight lines of one sensor, and the targets in range that it does not see."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A visibility grid on disk that is computed once and used again while its inputs stay the same."""
+"""On-disk cache of visibility grids, keyed by their inputs."""
 
 from __future__ import annotations
 

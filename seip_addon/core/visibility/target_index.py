@@ -1,4 +1,4 @@
-"""Which targets lie within δ of some return."""
+"""Spatial index of targets within δ of returns."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Whole jobs, as the panel and the commands run them: survey, robust placement, placement by hand, recording."""
+"""Whole jobs that the panel and the commands share: survey, robust placement, recording."""

@@ -1,4 +1,4 @@
-"""A deployment whose sensors hang where a hand has put them, judged as what it is."""
+"""Deployments of sensors that were moved by hand, evaluated as they are."""
 
 from __future__ import annotations
 

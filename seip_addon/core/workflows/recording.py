@@ -1,4 +1,4 @@
-"""A recording: what the sensors of a scene measure of its traffic, frame by frame, as a run and as datasets.
+"""Recordings: a scene's sensors scan its traffic, written as a run and as datasets.
 
 Panel and batch both go this way.
 """

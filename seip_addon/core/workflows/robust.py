@@ -1,4 +1,4 @@
-"""A plan that holds where poses err, sensors fail, or one look is not enough. Panel and batch both go this way."""
+"""Robust placement as one job, from scenarios to deployment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A survey: a place laid out for a choice of sensors, and who sees what there. Panel and batch both go this way."""
+"""Surveys: site layout, visibility grid and placement as one job."""
 
 from __future__ import annotations
 
