@@ -1,4 +1,4 @@
-"""Simplified scans and scenes (fewer rays or channels, coarser grids, simpler objects) to compare with the full ones."""
+"""Simplified scans and scenes (fewer rays, channels or targets, simpler objects), to compare with the full ones."""
 
 from __future__ import annotations
 
