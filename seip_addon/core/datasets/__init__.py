@@ -4,8 +4,8 @@ Each module is one format; `FORMATS` names them and `write_dataset` writes them.
 """
 
 from . import kitti, las, mmdetection3d, openpcdet, opv2v, pcd
-from .folder import load_manifest, write_dataset
-from .format import Format
+from .dataset_folder import load_manifest, write_dataset
+from .format_interface import Format
 from .sample import SPLITS, Sample, SensorPose, TrafficRun
 
 FORMATS: dict[str, Format] = {

@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 
 from ..arrays import Float
-from .format import Format
+from .format_interface import Format
 from .label_files import image_sets
 from .sample import Sample, cloud, shortest
 

@@ -15,7 +15,7 @@ from types import ModuleType
 import numpy as np
 
 from ..errors import SeipError
-from .format import Format
+from .format_interface import Format
 from .sample import Sample, TrafficRun
 
 RESOLUTION = 0.001

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from .format import Format
+from .format_interface import Format
 from .label_files import CLASSES, image_sets, label_lines, read_labels
 from .sample import Sample, cloud
 

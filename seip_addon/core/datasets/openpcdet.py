@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Float
-from .format import Format
+from .format_interface import Format
 from .label_files import CLASSES, image_sets, label_lines, read_labels
 from .sample import Sample, cloud
 

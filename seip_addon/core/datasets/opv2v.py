@@ -27,7 +27,7 @@ from functools import partial
 import numpy as np
 
 from ..arrays import Float
-from .format import Format
+from .format_interface import Format
 from .pcd import encode
 from .sample import Sample, SensorPose, TrafficRun, subset
 

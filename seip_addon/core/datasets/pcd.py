@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SeipError
-from .format import Format
+from .format_interface import Format
 from .sample import Sample, TrafficRun, cloud
 
 MERGED = "merged"

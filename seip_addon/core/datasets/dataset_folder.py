@@ -14,7 +14,7 @@ from ..progress import Progress
 from ..results.placement_record import versions
 from ..scans.frame import Frame
 from ..storage.files import digest, save_json, whole_file
-from .format import Format
+from .format_interface import Format
 from .sample import FATES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
 
 SCHEMA = "seip-dataset/1"
