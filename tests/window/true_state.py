@@ -98,8 +98,10 @@ def _stopped_work_leaves_no_trace(window: Window) -> Steps:
     yield from _press(window, "seip.solve_placement(")
     before = _record()
     _scene().seip.goal.count = 3
-    yield from window.click("seip.solve_placement(")
-    while not state.running.work.ended:  # the window stands still: it cannot look at the result before Stop
+    with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("UI")):
+        bpy.ops.seip.solve_placement("INVOKE_DEFAULT")
+    work = state.running.work
+    while not work.ended:  # the window stands still: it cannot look at the result before Stop
         time.sleep(0.05)
     bpy.ops.seip.stop()
     yield from window.until(lambda: state.running is None, 1)
