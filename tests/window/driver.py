@@ -111,6 +111,7 @@ class Window:
     def press(self, key: str, place: tuple[int, int] | None = None, **held: bool) -> Steps:
         """Press and let go of a key or button of the mouse, with shift, ctrl or alt held."""
         where = place or self.middle
+        yield from self._hover(where, 2 * BEAT)  # a button takes no click before the mouse has moved onto it
         for value in ("PRESS", "RELEASE"):
             self.event(key, value, where, **held)
             yield BEAT
