@@ -1,9 +1,9 @@
-"""Build the Blender extension: the add-on with the wheels of all it imports, one zip for each platform.
+"""Build the Blender extension: the add-on with the wheels of all it imports, one zip for each Blender and platform.
 
     python -m headless.build_extension --platforms linux-x64 windows-x64 macos-arm64
 
 The wheels are the group ``extension`` of the pins in ``pyproject.toml``, in
-`wheels/`, checked against ``wheels.lock``; each zip serves every Python that a supported Blender runs on.
+`wheels/`, checked against ``wheels.lock``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 
 from headless.set_up import LOCK
@@ -25,9 +27,6 @@ WHEELS = ROOT / "wheels"
 STAGING = ROOT / "build" / "extension"
 CONTENTS = ("__init__.py", "LICENSE", "seip_addon")
 
-PYTHONS = ("3.11", "3.13", "3.14")
-"""Blender 4.5 LTS; Blender 5.1 and later; Blender 5.2 as Debian builds it."""
-
 WHEEL_TAGS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
     "windows-x64": ("win_amd64",),
@@ -36,22 +35,47 @@ WHEEL_TAGS = {
 """Wheel tags by Blender's name of a platform: no newer system than Blender itself asks for."""
 
 
+@dataclass(frozen=True)
+class Build:
+    """A build of Blender that has a zip of its own: wheels are compiled for its Python.
+
+    Parameters
+    ----------
+    first, limit : str
+        The zip installs in this version of Blender and later ones, and in none from the limit on, where there is one.
+    """
+
+    python: str
+    first: str
+    limit: str = ""
+    platforms: Collection[str] = tuple(WHEEL_TAGS)
+
+
+BUILDS = {
+    "blender4.5": Build("3.11", "4.5.0", "5.1.0"),
+    "blender5.1": Build("3.13", "5.1.0"),
+    "debian": Build("3.14", "5.1.0", platforms=("linux-x64",)),
+}
+"""Blender 4.5 LTS to 5.0; Blender 5.1, 5.2 LTS and later; Blender 5.2 LTS as Debian builds it."""
+
+
 def main(arguments: list[str]) -> None:
-    """Build and check one zip for each of the platforms asked for."""
+    """Build and check a zip for each build of Blender, on each of the platforms asked for."""
     parser = argparse.ArgumentParser(prog="build_extension", description="Build the Blender extension into dist/.")
     parser.add_argument("--platforms", nargs="+", choices=WHEEL_TAGS, default=["linux-x64"])
+    parser.add_argument("--builds", nargs="+", choices=BUILDS, default=list(BUILDS), help="of Blender (default: all)")
     parser.add_argument("--output", type=Path, default=ROOT / "dist", help="folder of the zips (default: dist)")
     options = parser.parse_args(arguments)
     for platform in options.platforms:
-        print(build(platform, options.output))  # noqa: T201  # a command's output
+        for name in (name for name in options.builds if platform in BUILDS[name].platforms):
+            print(build(name, platform, options.output))  # noqa: T201  # a command's output
 
 
-def build(platform: str, output: Path) -> Path:
-    """Return the finished zip for a platform, validated by Blender's own tool."""
-    wheels = fetch_wheels(platform)
-    staged = stage(platform, wheels)
+def build(name: str, platform: str, output: Path) -> Path:
+    """Return the finished zip for a build of Blender on a platform, validated by Blender's own tool."""
+    staged = stage(name, platform, fetch_wheels(BUILDS[name].python, platform))
     output.mkdir(parents=True, exist_ok=True)
-    target = output.resolve() / f"seip-{manifest()['version']}-{platform.replace('-', '_')}.zip"
+    target = output.resolve() / f"seip-{manifest()['version']}-{name}-{platform.replace('-', '_')}.zip"
     blender_extension("build", "--source-dir", str(staged), "--output-filepath", str(target))
     blender_extension("validate", str(target))
     return target
@@ -68,23 +92,21 @@ def manifest() -> dict[str, object]:
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
-def fetch_wheels(platform: str) -> list[Path]:
-    """Return the wheels for a platform, downloaded when the pins have changed since the last time.
+def fetch_wheels(python: str, platform: str) -> list[Path]:
+    """Return the wheels for a Python and platform, downloaded when the pins have changed since the last time.
 
-    A wheel without compiled code serves all Pythons; for the other pins there
-    is one for each.
+    A wheel without compiled code is taken where there is one: it is the same file in every zip.
     """
-    folder = WHEELS / platform
+    folder = WHEELS / f"{platform}-python{python}"
     stamp = folder / "pins.json"
-    wanted = json.dumps({"pins": pins(), "pythons": PYTHONS, "tags": WHEEL_TAGS[platform]})
+    wanted = json.dumps({"pins": pins(), "tags": WHEEL_TAGS[platform]})
     if not stamp.is_file() or stamp.read_text(encoding="utf-8") != wanted:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         tags = [f"--platform={tag}" for tag in WHEEL_TAGS[platform]]
-        compiled = [pin for pin in pins() if not download(folder, [pin], PYTHONS[0], ["--platform=any", "--abi=none"])]
-        for python in PYTHONS:
-            if not download(folder, compiled, python, ["--implementation=cp", *tags]):
-                sys.exit(f"cannot download the wheels for {platform}, Python {python}: see pip's message above")
+        compiled = [pin for pin in pins() if not download(folder, [pin], python, ["--platform=any", "--abi=none"])]
+        if not download(folder, compiled, python, ["--implementation=cp", *tags]):
+            sys.exit(f"cannot download the wheels for {platform}, Python {python}: see pip's message above")
         stamp.write_text(wanted, encoding="utf-8")
     wheels = sorted(folder.glob("*.whl"))
     check_wheels(wheels)
@@ -113,25 +135,35 @@ def download(folder: Path, requirements: list[str], python: str, tags: list[str]
     return outcome.returncode == 0
 
 
-def stage(platform: str, wheels: list[Path]) -> Path:
+def stage(name: str, platform: str, wheels: list[Path]) -> Path:
     """Return a folder that holds what goes into the zip, the completed manifest included."""
-    staged = STAGING / platform
+    staged = STAGING / name / platform
     shutil.rmtree(staged, ignore_errors=True)
     (staged / "wheels").mkdir(parents=True)
-    for name in CONTENTS:
-        source = ROOT / name
+    for content in CONTENTS:
+        source = ROOT / content
         if source.is_dir():
-            shutil.copytree(source, staged / name, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, staged / content, ignore=shutil.ignore_patterns("__pycache__"))
         else:
-            shutil.copy2(source, staged / name)
+            shutil.copy2(source, staged / content)
     for wheel in wheels:
         shutil.copy2(wheel, staged / "wheels" / wheel.name)
-    kept = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
-    top, permissions, rest = kept.partition("[permissions]")
-    lists = {"platforms": [platform], "wheels": [f"./wheels/{wheel.name}" for wheel in wheels]}
-    added = "".join(f"{key} = {json.dumps(values, indent=4)}\n" for key, values in lists.items())
-    (staged / "blender_manifest.toml").write_text(f"{top}{added}\n{permissions}{rest}", encoding="utf-8")
+    (staged / "blender_manifest.toml").write_text(completed_manifest(name, platform, wheels), encoding="utf-8")
     return staged
+
+
+def completed_manifest(name: str, platform: str, wheels: list[Path]) -> str:
+    """Return the text of the manifest with the build of Blender, the platform and the wheels."""
+    kept = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
+    build_of = BUILDS[name]
+    added: dict[str, object] = {"blender_version_min": build_of.first}
+    if build_of.limit:
+        added["blender_version_max"] = build_of.limit
+    added |= {"platforms": [platform], "wheels": [f"./wheels/{wheel.name}" for wheel in wheels]}
+    lines = "".join(f"{key} = {json.dumps(value, indent=4)}\n" for key, value in added.items())
+    top, permissions, rest = kept.partition("[permissions]")
+    top = "".join(line for line in top.splitlines(keepends=True) if not line.startswith("blender_version_min"))
+    return f"{top}{lines}\n{permissions}{rest}"
 
 
 def blender_extension(*arguments: str) -> None:

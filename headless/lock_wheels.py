@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from headless.build_extension import PYTHONS, WHEEL_TAGS, pins
+from headless.build_extension import BUILDS, WHEEL_TAGS, pins
 from headless.set_up import LOCK, SUPPORTED, UNLOCKED, requirements
 
 from packaging.requirements import Requirement
@@ -36,10 +36,10 @@ def main() -> None:
     for version in SUPPORTED:
         found |= wheels(everything, "{}.{}".format(*version), linux)
     for pin in pins():  # the extension carries wheels without compiled code where there are any
-        found |= wheels([pin], PYTHONS[0], ["any"], pure=True)
-    for tags in WHEEL_TAGS.values():
-        for python in PYTHONS:
-            found |= wheels(pins(), python, list(tags))
+        found |= wheels([pin], BUILDS["blender4.5"].python, ["any"], pure=True)
+    for build in BUILDS.values():
+        for platform in build.platforms:
+            found |= wheels(pins(), build.python, list(WHEEL_TAGS[platform]))
     LOCK.write_text("".join(f"{found[name]}  {name}\n" for name in sorted(found)), encoding="utf-8")
     sys.stdout.write(f"{LOCK.name}: {len(found)} wheels\n")
 

@@ -26,8 +26,8 @@ def built(tmp_path, monkeypatch):
     with zipfile.ZipFile(wheel, "w") as archive:
         archive.writestr("thing-1.0.dist-info/WHEEL", "Wheel-Version: 1.0\n")
     monkeypatch.setattr(build_extension, "STAGING", tmp_path / "staging")
-    monkeypatch.setattr(build_extension, "fetch_wheels", lambda _platform: [wheel])
-    return build_extension.build("linux-x64", tmp_path / "out")
+    monkeypatch.setattr(build_extension, "fetch_wheels", lambda _python, _platform: [wheel])
+    return build_extension.build("blender4.5", "linux-x64", tmp_path / "out")
 
 
 def test_a_wheel_that_is_another_than_the_locked_one_is_not_bundled(tmp_path):
@@ -62,6 +62,14 @@ def test_the_manifest_in_the_zip_lists_platform_and_wheels(built):
     assert {key: manifest[key] for key in kept} == kept
 
 
+@pytest.mark.parametrize("name", build_extension.BUILDS)
+def test_the_manifest_lets_the_zip_into_its_own_blender_alone(name):
+    manifest = tomllib.loads(build_extension.completed_manifest(name, "linux-x64", []))
+    build = build_extension.BUILDS[name]
+    assert manifest["blender_version_min"] == build.first
+    assert manifest.get("blender_version_max", "") == build.limit
+
+
 def test_one_version_stands_in_manifest_and_project():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert build_extension.manifest()["version"] == project["version"]
@@ -92,20 +100,18 @@ def test_the_root_package_is_lazy():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("platform", build_extension.WHEEL_TAGS)
-def test_every_pin_has_one_wheel_for_each_python(platform, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "platform"), [(name, at) for name, build in build_extension.BUILDS.items() for at in build.platforms]
+)
+def test_every_pin_has_one_wheel(name, platform, tmp_path, monkeypatch):
+    build = build_extension.BUILDS[name]
     if platform != "linux-x64":
         monkeypatch.setattr(build_extension, "WHEELS", tmp_path)
-    wheels = [parse_wheel_filename(path.name) for path in build_extension.fetch_wheels(platform)]
-    for pin in map(Requirement, build_extension.pins()):
-        for python in build_extension.PYTHONS:
-            tag = python.replace(".", "")
-            fitting = [
-                version
-                for name, version, _, tags in wheels
-                if name == canonicalize_name(pin.name)
-                if {t.interpreter for t in tags} & {"py3", f"cp{tag}"}
-            ]
-            assert len(fitting) == 1, (pin.name, python)
-            assert fitting[0] in pin.specifier
-    assert len({name for name, *_ in wheels}) == len(build_extension.pins())
+    files = build_extension.fetch_wheels(build.python, platform)
+    wheels = {name: (version, tags) for name, version, _, tags in (parse_wheel_filename(file.name) for file in files)}
+    pins = [Requirement(pin) for pin in build_extension.pins()]
+    assert len(files) == len(pins)
+    for pin in pins:
+        version, tags = wheels[canonicalize_name(pin.name)]
+        assert version in pin.specifier
+        assert {tag.interpreter for tag in tags} & {"py3", f"cp{build.python.replace('.', '')}"}
