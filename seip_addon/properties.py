@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import pointing, scans, state
+from . import live_scan, scene_status, selection
 from .core.datasets import FORMATS, SPLITS
 from .core.placement.goal import DEFAULT_COUNT, Goal
 from .core.robustness.pose_errors import STEEPEST, WIDEST, PoseErrors
@@ -392,7 +392,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     position: StringProperty(
         name="Position",
         description="Name of a position, as laid out: type to search",
-        search=pointing.search_positions,
+        search=selection.search_positions,
     )
 
     def goal(self) -> Goal:
@@ -459,7 +459,7 @@ class SEIP_PG_result(SEIP_PG_placement):
     active_sensor: IntProperty(
         name="Sensor",
         description="Click to select the sensor in the scene",
-        update=pointing.select_sensor,
+        update=selection.select_sensor,
     )
     order: EnumProperty(
         name="Order",
@@ -473,7 +473,7 @@ class SEIP_PG_result(SEIP_PG_placement):
     active_ranked: IntProperty(
         name="Candidate",
         description="Click to put the 3D cursor at the candidate",
-        update=pointing.show_candidate,
+        update=selection.show_candidate,
     )
     folder: StringProperty(
         name="Folder",
@@ -488,11 +488,11 @@ class SEIP_PG_result(SEIP_PG_placement):
 
 
 def _recolour(_own: object, context: bpy.types.Context) -> None:
-    scans.show_cloud(context.scene)
+    live_scan.show_cloud(context.scene)
 
 
 def _follow(_own: object, _context: bpy.types.Context) -> None:
-    scans.keep_following()
+    live_scan.keep_following()
 
 
 class SEIP_PG_view(bpy.types.PropertyGroup):
@@ -630,7 +630,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
 class SEIP_PG_scene(bpy.types.PropertyGroup):
     """All that SEIP keeps with a scene."""
 
-    version: IntProperty(name="Version", default=state.VERSION, options={"HIDDEN"})
+    version: IntProperty(name="Version", default=scene_status.FILE_VERSION, options={"HIDDEN"})
     site: PointerProperty(type=SEIP_PG_site)
     survey: PointerProperty(type=SEIP_PG_survey)
     goal: PointerProperty(type=SEIP_PG_goal)

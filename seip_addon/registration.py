@@ -10,9 +10,10 @@ import bpy
 PARTS = (
     "preferences",
     "properties",
-    "state",
+    "session",
+    "scene_survey",
     "sensor_types",
-    "scans",
+    "live_scan",
     "viewport.beam_preview",
     "viewport.layers",
     "operators.work",
@@ -20,7 +21,7 @@ PARTS = (
     "operators.sensors",
     "operators.visibility",
     "operators.placement",
-    "live",
+    "live_coverage",
     "operators.results",
     "operators.view",
     "operators.traffic",
@@ -32,7 +33,11 @@ PARTS = (
     "panels.view",
     "panels.traffic",
 )
-"""Modules with ``CLASSES``, and with ``attach`` and ``detach`` for what is no class: handlers, properties, menus."""
+"""Modules with ``CLASSES``.
+
+Some have ``attach`` and ``detach`` for what is no class: handlers, properties,
+menus; and some ``forget``, for what must not outlive the open file.
+"""
 
 _registered: list[ModuleType] = []
 
@@ -49,16 +54,27 @@ def register() -> None:
         _registered.append(part)
         if hasattr(part, "attach"):
             part.attach()
+    bpy.app.handlers.load_pre.append(_forget)
 
 
 def unregister() -> None:
     """Remove all parts, the last first."""
+    bpy.app.handlers.load_pre.remove(_forget)
+    _forget()
     while _registered:
         part = _registered.pop()
         if hasattr(part, "detach"):
             part.detach()
         for one in reversed(part.CLASSES):
             bpy.utils.unregister_class(one)
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _forget(*_: object) -> None:
+    """Let go of the open file: another is about to be opened, or the add-on is disabled."""
+    for part in reversed(_registered):
+        if hasattr(part, "forget"):
+            part.forget()
 
 
 def _incomplete(error: ImportError) -> ModuleType:

@@ -1,8 +1,4 @@
-"""Sensor types known to the add-on, and each scene's list of them.
-
-The catalogue is held in memory, for panels that only look; scenes keep keys
-and whether each is to be used.
-"""
+"""Sensor types: the catalogue in the session, for panels that only look, and each scene's list of keys."""
 
 from __future__ import annotations
 
@@ -10,26 +6,20 @@ import bpy
 
 from . import preferences
 from .core.errors import SeipError
-from .core.lidar import LidarModel, load_catalogue
+from .core.lidar import load_catalogue
 from .core.site.candidates import CandidateSettings
-
-known: dict[str, LidarModel] = {}
-"""By catalogue key: the shipped types and those of the user's own files."""
-
-complaint = ""
-"""What is wrong with one of the user's catalogues; empty where nothing is."""
+from .session import session
 
 
 def refresh() -> None:
     """Read the catalogues anew, and list what is new in all scenes; where a file is at fault the shipped types stay."""
-    global complaint  # noqa: PLW0603  # there is one catalogue
-    known.clear()
-    complaint = ""
+    session.sensor_types.clear()
+    session.catalogue_error = ""
     try:
-        known.update(preferences.catalogue())
+        session.sensor_types.update(preferences.catalogue())
     except SeipError as error:
-        known.update(load_catalogue())
-        complaint = str(error)
+        session.sensor_types.update(load_catalogue())
+        session.catalogue_error = str(error)
     for scene in bpy.data.scenes:
         if scene.library is None:
             list_types(scene)
@@ -43,9 +33,9 @@ def list_types(scene: bpy.types.Scene) -> None:
     types = scene.seip.survey.types
     default = () if len(types) else CandidateSettings().sensors
     for number in reversed(range(len(types))):
-        if types[number].name not in known and not types[number].use:
+        if types[number].name not in session.sensor_types and not types[number].use:
             types.remove(number)
-    for key in known:
+    for key in session.sensor_types:
         if key not in types:
             one = types.add()
             one.name = key
@@ -79,4 +69,4 @@ def detach() -> None:
     if bpy.app.timers.is_registered(_once):
         bpy.app.timers.unregister(_once)
     bpy.app.handlers.load_post.remove(_after_load)
-    known.clear()
+    session.sensor_types.clear()

@@ -10,7 +10,7 @@ from typing import Literal
 
 import bpy
 
-from .. import pointing, state
+from .. import scene_survey, selection
 from ..core.errors import SeipError
 from ..core.placement.goal import Goal, check_goal
 from ..core.progress import Progress
@@ -18,24 +18,25 @@ from ..core.results.placement_record import versions
 from ..core.workflows.robust import Precaution, check_precaution, place_robustly
 from ..core.workflows.survey import Circumstances, place, record_of
 from ..scene.write import write_result
+from ..session import SceneSurvey
 from .results import keep_result
 from .work import ForReadyScene, LongWork, Outcome, attempt
 
 
-class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Operator):
+class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):
     """Choose the sensors that cover most, or the cheapest that cover enough, and put them into the scene"""
 
     bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Read the scene where it has changed, and state the goal."""
         asked = scene.seip.goal
         precaution = asked.precaution()
         self._pose_errors = asked.pose_errors and precaution is None
-        return _placed(state.survey(scene), asked.goal(), precaution, pose_errors=self._pose_errors)
+        return _placed(scene_survey.survey(scene), asked.goal(), precaution, pose_errors=self._pose_errors)
 
-    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
         if result.plan is None or result.grid is None:
             raise RuntimeError("the work ended without a placement")
@@ -50,17 +51,17 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
 
 
 def _placed(
-    surveying: Generator[Progress, None, state.Held],
+    surveying: Generator[Progress, None, SceneSurvey],
     goal: Goal,
     precaution: Precaution | None,
     *,
     pose_errors: bool = False,
-) -> Generator[Progress, None, state.Held]:
+) -> Generator[Progress, None, SceneSurvey]:
     if precaution is not None:
         check_precaution(goal)
     known = yield from surveying
     check_goal(known.layout.site, known.layout.models, goal)
-    known, grid = yield from state.seen(known)
+    known, grid = yield from scene_survey.with_visibility(known)
     began = time.perf_counter()
     if precaution is None:
         plan = yield from place(known.layout, grid, goal, pose_errors=pose_errors)
@@ -88,7 +89,7 @@ class SEIP_OT_add_rule(bpy.types.Operator):
 
     def _add(self, context: bpy.types.Context, rule: Literal["MANDATORY", "FORBIDDEN"]) -> None:
         goal = context.scene.seip.goal
-        name = goal.position or pointing.position_of(context.scene, context.object)
+        name = goal.position or selection.position_of(context.scene, context.object)
         if not name:
             raise SeipError("name a position, or select a pole or a sensor")
         entry = goal.rules.get(name) or goal.rules.add()

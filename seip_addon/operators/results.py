@@ -12,13 +12,13 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from .. import hand, live, pointing, preferences, state
+from .. import live_coverage, preferences, scene_status, scene_survey, selection
 from ..core.errors import SeipError
 from ..core.geometry.orientation import tilt_in_words
 from ..core.placement.goal import Plan, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.results.placement_record import Record, versions
+from ..core.results.placement_record import Record, parsed_record, versions
 from ..core.results.ranking import Ranked, rank_added, rank_alone
 from ..core.scans.sensor import MountedSensor
 from ..core.storage.files import check_folder, digest
@@ -31,6 +31,8 @@ from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.write import coverage_of, recolour, show_seen_by, take_over
+from ..sensor_edits import position_names, sensor_edits
+from ..session import SceneSurvey, session
 from .work import LongWork, Outcome, attempt, begun
 
 MOST_RANKED = 50
@@ -44,16 +46,16 @@ class ForPlacement:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether it works, and why not."""
-        sentence = state.obstacle(context.scene) or no_placement(context.scene)
+        sentence = scene_status.obstacle(context.scene) or no_placement(context.scene)
         if sentence:
-            cls.poll_message_set(sentence)
+            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
         return not sentence
 
 
 def no_placement(scene: bpy.types.Scene) -> str:
     """Say that there is no placement that can be shown; empty if there is one."""
-    if state.is_newer(scene):
-        return state.NEWER
+    if scene_status.is_newer(scene):
+        return scene_status.NEWER
     return "" if scene.seip.result.record else "There is no placement yet: place sensors first."
 
 
@@ -80,7 +82,7 @@ class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
     def _look(self, context: bpy.types.Context) -> None:
         result = context.scene.seip.result
         label = result.sensors[result.active_sensor].name if result.sensors else ""
-        empty = pointing.sensor_empties(context.scene).get(label)
+        empty = selection.sensor_empties(context.scene).get(label)
         if empty is None:
             raise SeipError(f"the sensor {label} is no longer in the scene: undo, or place again")
         if context.space_data is None or context.space_data.type != "VIEW_3D":
@@ -101,20 +103,20 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     return sum(corners, Vector()) / len(corners) if corners else Vector()
 
 
-class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Ranked]]], bpy.types.Operator):
+class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ranked]]], bpy.types.Operator):
     """List the candidates that are worth most, alone or in addition to the placement"""
 
     bl_idname = "seip.rank_candidates"
     bl_label = "Rank Candidates"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, list[Ranked]]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, list[Ranked]]]:
         """Find the placement again."""
-        return _ranked(state.answered(scene), scene.seip.result.order)
+        return _ranked(scene_survey.with_placement(scene), scene.seip.result.order)
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, list[Ranked]]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, list[Ranked]]) -> None:
         """Fill the list."""
         known, lines = result
-        state.hold(scene, known)
+        session.keep_survey(scene, known)
         candidates = known.layout.site.candidates
         ranking = scene.seip.result.ranking
         ranking.clear()
@@ -127,8 +129,8 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[state.Held, list[Rank
 
 
 def _ranked(
-    finding: Generator[Progress, None, state.Held], order: str
-) -> Generator[Progress, None, tuple[state.Held, list[Ranked]]]:
+    finding: Generator[Progress, None, SceneSurvey], order: str
+) -> Generator[Progress, None, tuple[SceneSurvey, list[Ranked]]]:
     known = yield from finding
     plan, grid = _plan_and_grid(known)
     site, visible = known.layout.site, grid.visible
@@ -139,7 +141,7 @@ def _ranked(
     return known, rank_added(visible, weight, plan.deployment.seen_by > 0, free, MOST_RANKED)
 
 
-def _plan_and_grid(known: state.Held) -> tuple[Plan, VisibilityGrid]:
+def _plan_and_grid(known: SceneSurvey) -> tuple[Plan, VisibilityGrid]:
     if known.plan is None or known.grid is None:
         raise RuntimeError("the work ended without a placement")
     return known.plan, known.grid
@@ -239,7 +241,7 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[state.Held, Onlooker]], bpy.types.Operator):
+class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Onlooker]], bpy.types.Operator):
     """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
 
     bl_idname = "seip.follow_sensors"
@@ -248,50 +250,55 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[state.Held, Onlooker]]
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """End it at once, or begin in a thread."""
-        return self.execute(context) if live.following is not None else super().invoke(context, event)
+        return self.execute(context) if session.following is not None else super().invoke(context, event)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """End it, or begin."""
-        if live.following is not None:
-            live.stop()
+        if session.following is not None:
+            live_coverage.stop()
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, Onlooker]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, Onlooker]]:
         """Find the placement again."""
-        return _set_up(state.answered(scene))
+        return _set_up(scene_survey.with_placement(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, Onlooker]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, Onlooker]) -> None:
         """Begin to follow."""
         known, looker = result
-        state.hold(scene, known)
-        live.start(scene, known, looker)
+        session.keep_survey(scene, known)
+        live_coverage.start(scene, known, looker)
 
 
 def _set_up(
-    finding: Generator[Progress, None, state.Held],
-) -> Generator[Progress, None, tuple[state.Held, Onlooker]]:
+    finding: Generator[Progress, None, SceneSurvey],
+) -> Generator[Progress, None, tuple[SceneSurvey, Onlooker]]:
     known = yield from finding
     settings = known.layout.settings
     yield Progress(0, 0, "getting ready to cast")
     return known, onlooker(known.layout.site, settings.visibility, settings.engine)
 
 
-class SEIP_OT_judge_sensors(ForPlacement, LongWork[state.Held], bpy.types.Operator):
+class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
     """Take the sensors as hands have moved, deleted and added them for the placement: what they see there counts"""
 
     bl_idname = "seip.judge_sensors"
     bl_label = "Judge as They Hang"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Read where the sensors hang."""
         hung = read_sensors(scene, preferences.catalogue(), hidden=True)
-        return _judged(state.seen_again(scene), state.record_of(scene.seip.result.record), hung, hand.places(scene))
+        return _judged(
+            scene_survey.with_grid_of_placement(scene),
+            parsed_record(scene.seip.result.record),
+            hung,
+            position_names(scene),
+        )
 
-    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Make them the placement, where they hang."""
         plan, grid = _plan_and_grid(result)
-        live.stop()
+        live_coverage.stop()
         take_over(scene, result.layout.site, plan.deployment, labelled_sensors(scene, hidden=True))
         circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         keep_result(scene, result, record_of(result.layout, grid, plan, circumstances, render=False))
@@ -299,16 +306,16 @@ class SEIP_OT_judge_sensors(ForPlacement, LongWork[state.Held], bpy.types.Operat
 
 
 def _judged(
-    finding: Generator[Progress, None, tuple[state.Held, VisibilityGrid]],
+    finding: Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]],
     record: Record,
     hung: Sequence[MountedSensor],
     places: Mapping[str, str],
-) -> Generator[Progress, None, state.Held]:
+) -> Generator[Progress, None, SceneSurvey]:
     known, grid = yield from finding
     return replace(known, plan=(yield from judge(known.layout, grid, recorded_goal(record), hung, places)))
 
 
-def keep_result(scene: bpy.types.Scene, known: state.Held, record: Record) -> None:
+def keep_result(scene: bpy.types.Scene, known: SceneSurvey, record: Record) -> None:
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
     plan, _ = _plan_and_grid(known)
     kept = scene.seip.result
@@ -319,16 +326,16 @@ def keep_result(scene: bpy.types.Scene, known: state.Held, record: Record) -> No
     for sensor in plan.deployment.sensors:
         kept.sensors.add().name = sensor.label
     kept.ranking.clear()
-    state.hold(scene, replace(known, record=kept.record))
+    session.keep_survey(scene, replace(known, record=kept.record))
 
 
 def not_judged(scene: bpy.types.Scene) -> str:
     """Say what was done by hand to the sensors since they were placed or judged; empty if nothing was."""
-    sentence = hand.changes(scene).in_words
+    sentence = sensor_edits(scene).describe()
     return f"{sentence} Press {SEIP_OT_judge_sensors.bl_label}, or undo." if sentence else ""
 
 
-class SEIP_OT_export_result(ForPlacement, LongWork[state.Held], bpy.types.Operator):
+class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
     """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
 
     bl_idname = "seip.export_result"
@@ -345,22 +352,22 @@ class SEIP_OT_export_result(ForPlacement, LongWork[state.Held], bpy.types.Operat
             cls.poll_message_set(sentence)
         return not sentence
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """See that the folder can be written, save the scene as it is, and find the placement again."""
         self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
         check_folder(self._folder)
         return begun(_exported(self._folder, scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Say where the files are."""
-        state.hold(scene, result)
+        session.keep_survey(scene, result)
         self.report({"INFO"}, f"written to {self._folder}")
 
 
-def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
     """Write a result: the scene before the first report, which is the part that needs Blender's data."""
     render, name = scene.seip.result.render, scene.name
-    finding = state.answered(scene)
+    finding = scene_survey.with_placement(scene)
     if coverage_of(scene) is not None:
         show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
     with result_files(folder) as part:
@@ -368,7 +375,7 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         yield Progress(0, 0, "reading the scene")
         known = yield from finding
         plan, grid = _plan_and_grid(known)
-        record = {**state.record_of(known.record)}
+        record = {**parsed_record(known.record)}
         record["settings"] = {**record["settings"], "render": render}
         layout = known.layout
         yield from write_tables(part, layout.geometry, layout.site, plan, record, grid.visible, layout.models)

@@ -7,9 +7,10 @@ from pathlib import Path
 import bpy
 from bl_operators.presets import AddPresetBase
 
-from .. import preferences, sensor_types, state
+from .. import preferences, sensor_types
 from ..core.errors import SeipError
 from ..core.lidar import load_catalogue
+from ..session import session
 from ..viewport import beam_preview
 from .work import Outcome, attempt
 
@@ -24,10 +25,10 @@ class SEIP_OT_list_sensor_types(bpy.types.Operator):
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Read them."""
         sensor_types.refresh()
-        if sensor_types.complaint:
-            self.report({"ERROR"}, sensor_types.complaint)
+        if session.catalogue_error:
+            self.report({"ERROR"}, session.catalogue_error)
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(sensor_types.known)} sensor types")
+        self.report({"INFO"}, f"{len(session.sensor_types)} sensor types")
         return {"FINISHED"}
 
 
@@ -104,7 +105,7 @@ class SEIP_OT_empty_cache(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Tell whether there is anything to delete, and nothing that needs it."""
-        reason = "Wait for the work under way" if state.running is not None else preferences.why_not_empty()
+        reason = "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
         if reason:
             cls.poll_message_set(reason)
         return not reason

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from .. import sensor_types, state
+from .. import scene_status, sensor_types
 from ..core.errors import SeipError
 from ..core.opendrive import read_map
 from ..core.opendrive.road_map import RoadMap
@@ -25,6 +25,7 @@ from ..scene import contract, roles
 from ..scene.build import build_scene
 from ..scene.changes import watch
 from ..scene.check import contents_of
+from ..session import CheckedScene, session
 from .work import LongWork, Outcome, attempt
 
 SHARE_OF_VIEW = 0.6
@@ -164,7 +165,7 @@ class _RoleOperator:
         """Tell whether anything is selected."""
         reason = why_no_role(context)
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]  # of Blender's operators
         return not reason
 
 
@@ -173,8 +174,8 @@ NOTHING_SELECTED = "Select objects first"
 
 def why_no_role(context: bpy.types.Context) -> str:
     """Say why no role can be given or taken, or nothing."""
-    if state.is_linked(context.scene):
-        return state.LINKED
+    if scene_status.is_linked(context.scene):
+        return scene_status.LINKED
     return "" if context.selected_objects else NOTHING_SELECTED
 
 
@@ -240,7 +241,7 @@ class SEIP_OT_add_area(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether objects can be added."""
-        reason = state.LINKED if state.is_linked(context.scene) else ""
+        reason = scene_status.LINKED if scene_status.is_linked(context.scene) else ""
         if not reason and context.mode != "OBJECT":
             reason = "Leave Edit Mode first"
         if reason:
@@ -273,7 +274,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SiteCheck]:
         """Read the scene as it is now."""
-        self._check = state.Check(watch(scene), state.checked_settings(scene))
+        self._check = CheckedScene(watch(scene), scene_status.checked_settings(scene))
         contents = contents_of(scene)
         settings: SurveySettings | SeipError
         try:
@@ -284,7 +285,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
 
     def conclude(self, scene: bpy.types.Scene, result: SiteCheck) -> None:
         """List what was found."""
-        state.checked[scene.session_uid] = self._check
+        session.checks[scene.session_uid] = self._check
         site = scene.seip.site
         site.checked = True
         site.counts.clear()

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import bpy
 
-from .. import preferences, scans, state
+from .. import live_scan, preferences, scene_status, scene_survey
 from ..core.errors import SeipError
 from ..core.placement.goal import target_weights
 from ..core.progress import Progress, finish
-from ..core.results.placement_record import versions
+from ..core.results.placement_record import parsed_record, versions
 from ..core.robustness.traffic_instants import check_runs, spread_instants
 from ..core.robustness.traffic_study import IN_TRAFFIC, tried_in_traffic
 from ..core.scans import MountedSensor
@@ -28,6 +28,7 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
+from ..session import LastScan, SceneSurvey, SceneTraffic, session
 from .results import no_placement, not_judged
 from .work import LongWork, Outcome, Result
 
@@ -43,8 +44,8 @@ NO_SENSORS = "There is no sensor to scan with: place sensors first."
 
 def why_no_load(scene: bpy.types.Scene) -> str:
     """Return why no traffic can be loaded; nothing where it can."""
-    if state.is_linked(scene):
-        return state.LINKED
+    if scene_status.is_linked(scene):
+        return scene_status.LINKED
     return "" if scene.seip.traffic.file else NO_FILE
 
 
@@ -59,9 +60,9 @@ def why_no_scan(scene: bpy.types.Scene) -> str:
 
 def why_no_trial(scene: bpy.types.Scene) -> str:
     """Return why the placement cannot be tried in traffic; nothing where it can."""
-    if no_placement(scene) or scene.session_uid not in scans.traffic:
+    if no_placement(scene) or scene.session_uid not in session.traffic:
         return no_placement(scene) or NO_LOADED
-    record = state.record_of(scene.seip.result.record)
+    record = parsed_record(scene.seip.result.record)
     elsewhere = any(line["pose"] is None for line in record["sensors"])
     return NOT_AT_CANDIDATES if elsewhere else not_judged(scene)
 
@@ -74,7 +75,7 @@ class _Scanning(LongWork[Result]):
         """Tell whether there is anything to scan."""
         sentence = why_no_scan(context.scene)
         if sentence:
-            cls.poll_message_set(sentence)
+            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
         return not sentence
 
 
@@ -95,13 +96,13 @@ class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LoadedTraffic]:
         """Read the scene that the traffic is to stand on."""
         self._files = scene.seip.traffic.files()
-        self._changed = scans.changes(self._files)
+        self._changed = live_scan.changes(self._files)
         return load_traffic(self._files, read_scene(scene).geometry)
 
     def conclude(self, scene: bpy.types.Scene, result: LoadedTraffic) -> None:
         """Animate the road users."""
         animate(scene, result.trajectories)
-        scans.traffic[scene.session_uid] = scans.HeldTraffic(self._files, self._changed, result.trajectories)
+        session.traffic[scene.session_uid] = SceneTraffic(self._files, self._changed, result.trajectories)
         scene.seip.traffic.loaded = "\n".join((*_facts(result.trajectories), *result.warnings))
         for sentence in result.warnings:
             self.report({"WARNING"}, sentence)
@@ -127,13 +128,13 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
         """Take it out."""
         scene = context.scene
         clear_traffic(scene)
-        scans.traffic.pop(scene.session_uid, None)
-        scans.hide_cloud(scene)
+        session.traffic.pop(scene.session_uid, None)
+        live_scan.hide_cloud(scene)
         scene.seip.traffic.loaded = ""
         return {"FINISHED"}
 
 
-class SEIP_OT_try_in_traffic(LongWork[tuple[state.Held, str]], bpy.types.Operator):
+class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operator):
     """Find what the placement sees of the road with the loaded traffic in the way, on average over time"""
 
     bl_idname = "seip.try_in_traffic"
@@ -147,11 +148,11 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[state.Held, str]], bpy.types.Operato
             cls.poll_message_set(reason)
         return not reason
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[state.Held, str]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, str]]:
         """Find the placement again, and the traffic."""
-        return _tried(state.answered(scene), scans.traffic[scene.session_uid].trajectories)
+        return _tried(scene_survey.with_placement(scene), session.traffic[scene.session_uid].trajectories)
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[state.Held, str]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, str]) -> None:
         """Note it with the placement."""
         known, sentence = result
         kept = scene.seip.result
@@ -161,13 +162,13 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[state.Held, str]], bpy.types.Operato
         if plan is not None:
             plan = replace(plan, placement=replace(plan.placement, notes=tuple(record["notes"])))
         kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
-        state.hold(scene, replace(known, plan=plan, record=kept.record))
+        session.keep_survey(scene, replace(known, plan=plan, record=kept.record))
         self.report({"INFO"}, sentence)
 
 
 def _tried(
-    finding: Generator[Progress, None, state.Held], traffic: Trajectories
-) -> Generator[Progress, None, tuple[state.Held, str]]:
+    finding: Generator[Progress, None, SceneSurvey], traffic: Trajectories
+) -> Generator[Progress, None, tuple[SceneSurvey, str]]:
     known = yield from finding
     if known.plan is None:
         raise RuntimeError("the work ended without a placement")
@@ -179,35 +180,35 @@ def _tried(
     return known, sentence
 
 
-class SEIP_OT_scan_frame(_Scanning[scans.HeldScan], bpy.types.Operator):
+class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):
     """Show what the placed sensors measure at the current frame of the timeline"""
 
     bl_idname = "seip.scan_frame"
     bl_label = "Scan This Frame"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, scans.HeldScan]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, LastScan]:
         """Read what is scanned."""
         self._scene_read = _SceneRead(scene)
-        return _scanned(self._scene_read, scans.now(scene), scans.find(scene))
+        return _scanned(self._scene_read, live_scan.now(scene), session.scan_of(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: scans.HeldScan) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: LastScan) -> None:
         """Show the points."""
         self._scene_read.keep_traffic(scene)
-        scans.keep(scene, result)
+        live_scan.keep(scene, result)
         for sentence in result.simulation.warnings:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, f"{len(result.frame):,} points in {1e3 * result.seconds:.0f} ms")
 
 
-def _scanned(read: _SceneRead, at: float, before: scans.HeldScan | None) -> Generator[Progress, None, scans.HeldScan]:
+def _scanned(read: _SceneRead, at: float, before: LastScan | None) -> Generator[Progress, None, LastScan]:
     run = yield from read.run()
     if before is not None and before.run.key == run.key:
         run, simulation = before.run, before.simulation
     else:
         simulation = yield from simulation_of(run)
     yield Progress(0, 0, "scan")
-    return scans.measure(run, simulation, at)
+    return live_scan.measure(run, simulation, at)
 
 
 class SEIP_OT_hide_scan(bpy.types.Operator):
@@ -218,7 +219,7 @@ class SEIP_OT_hide_scan(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Hide it."""
-        scans.hide_cloud(context.scene)
+        live_scan.hide_cloud(context.scene)
         return {"FINISHED"}
 
 
@@ -265,8 +266,8 @@ class _SceneRead:
         if self._files is None:
             self._trajectories = finish(read_traffic(scene))
         else:
-            self._changed = scans.changes(self._files)
-            self._trajectories = scans.known_traffic(scene, self._files, self._geometry.origin)
+            self._changed = live_scan.changes(self._files)
+            self._trajectories = live_scan.known_traffic(scene, self._files, self._geometry.origin)
 
     def run(self) -> Generator[Progress, None, Run]:
         """Read the traffic, where that is still to be done, and gather everything."""
@@ -279,7 +280,7 @@ class _SceneRead:
     def keep_traffic(self, scene: bpy.types.Scene) -> None:
         """Hold what was read from files, so that the next scan need not."""
         if self._files is not None and self._trajectories is not None:
-            scans.traffic[scene.session_uid] = scans.HeldTraffic(self._files, self._changed, self._trajectories)
+            session.traffic[scene.session_uid] = SceneTraffic(self._files, self._changed, self._trajectories)
 
 
 def _folder(scene: bpy.types.Scene) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from .. import state
+from .. import scene_survey
 from ..core.errors import SeipError
 from ..core.placement.goal import Plan
 from ..core.progress import Progress
@@ -19,6 +19,7 @@ from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of
 from ..scene.write import colour_coverage, coverage_of
+from ..session import SceneSurvey, session
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
@@ -113,7 +114,7 @@ def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple
     return _items
 
 
-class SEIP_OT_show_sight_lines(ForPlacement, LongWork[state.Held], bpy.types.Operator):
+class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
     """Draw lines from a sensor to the targets that it sees, and dark squares on those in its range that it does not"""
 
     bl_idname = "seip.show_sight_lines"
@@ -122,13 +123,13 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[state.Held], bpy.types.Ope
 
     sensor: bpy.props.EnumProperty(name="Sensor", description="From which the lines start", items=_sensors)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Find the placement again."""
-        return state.answered(scene)
+        return scene_survey.with_placement(scene)
 
-    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Draw them."""
-        state.hold(scene, result)
+        session.keep_survey(scene, result)
         thing = placed_sensors(scene).get(self.sensor)
         if result.grid is None or thing is None:
             raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
@@ -153,7 +154,7 @@ class SEIP_OT_hide_sight_lines(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operator):
+class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
     """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
 
     bl_idname = "seip.save_picture"
@@ -170,15 +171,15 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operato
         """Tell whether it works, and why not."""
         return super().poll(context) and _can(cls, not_judged(context.scene))
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Find the placement again, and render it where that is asked for."""
         self._path = _free(_named(scene.seip.view.picture))
         self._is_view = scene.seip.view.picture_of == "VIEW"
-        return state.answered(scene) if self._is_view else begun(_rendered_sheet(self._path, scene))
+        return scene_survey.with_placement(scene) if self._is_view else begun(_rendered_sheet(self._path, scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: state.Held) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Take the picture of a viewport."""
-        state.hold(scene, result)
+        session.keep_survey(scene, result)
         if self._is_view:
             area = getattr(self, "_area", None) or bpy.context.area
             if bpy.app.background or area not in _viewports():
@@ -187,7 +188,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[state.Held], bpy.types.Operato
         self.report({"INFO"}, f"written {self._path}")
 
 
-def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, held: state.Held) -> None:
+def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, held: SceneSurvey) -> None:
     """Write what a viewport shows, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
 
@@ -196,13 +197,13 @@ def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area
     _save_sheet(path, held, Image.fromarray(view_pixels(scene, area)))
 
 
-def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, state.Held]:
+def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
     """Write the rendered view that batch commands make, and the plan beside it; the scene is saved before the rest."""
     from PIL import Image  # noqa: PLC0415  # as above
 
     from ..scene.render import render_elsewhere  # noqa: PLC0415  # as above
 
-    finding, name = state.answered(scene), scene.name
+    finding, name = scene_survey.with_placement(scene), scene.name
     with TemporaryDirectory(prefix="seip-") as folder:
         blend, view = (Path(folder) / file for file in ("scene.blend", "view.png"))
         save_blend(blend)
@@ -214,7 +215,7 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
     return held
 
 
-def _save_sheet(path: Path, held: state.Held, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
+def _save_sheet(path: Path, held: SceneSurvey, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
     from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
@@ -229,7 +230,7 @@ def _save_sheet(path: Path, held: state.Held, view: Any) -> None:  # noqa: ANN40
             save_sheet(path, view, picture)
 
 
-def _plan(held: state.Held) -> Plan:
+def _plan(held: SceneSurvey) -> Plan:
     if held.plan is None:
         raise RuntimeError("a placement was found without its plan")
     return held.plan

@@ -7,10 +7,11 @@ from typing import Generic, TypeVar
 
 import bpy
 
-from .. import state
+from .. import scene_status
 from ..background import Background
 from ..core.errors import SeipError
 from ..core.progress import Progress, finish
+from ..session import RunningWork, scene_of, session
 
 Result = TypeVar("Result")
 Outcome = set[str]
@@ -46,9 +47,9 @@ class ForReadyScene:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether it works, and why not."""
-        sentence = state.obstacle(context.scene)
+        sentence = scene_status.obstacle(context.scene)
         if sentence:
-            cls.poll_message_set(sentence)
+            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
         return not sentence
 
 
@@ -93,15 +94,15 @@ class LongWork(Generic[Result]):
         """Look how far the work is, and write its result once it is done."""
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        if self._running is not state.running or self._running.stop:
+        if self._running is not session.running or self._running.stop:
             self._end(context)
-            self.report({"INFO"}, self.stopped)
+            self.report({"INFO"}, self.stopped)  # type: ignore[attr-defined]  # of Blender's operators
             return {"CANCELLED"}
         if not self._running.work.ended:
             _redraw(context)
             return {"PASS_THROUGH"}
         self._end(context)
-        return attempt(self, lambda: self.conclude(state.scene_of(self._scene), self._running.work.result()))
+        return attempt(self, lambda: self.conclude(scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop because Blender ends, closes the window or opens another file; no thread may outlive its data."""
@@ -109,11 +110,11 @@ class LongWork(Generic[Result]):
         self._running.work.join(PATIENCE)
 
     def _begin(self, context: bpy.types.Context) -> None:
-        if state.running is not None:
+        if session.running is not None:
             raise SeipError("other work is under way: wait for it, or stop it with the button beside its bar")
         self._scene = context.scene.session_uid
-        name = type(self).bl_idname  # as panels know it: the instance's own is another spelling, SEIP_OT_…
-        self._running = state.running = state.Running(name, Background(self.prepare(context.scene)))
+        name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators; as panels know it: the instance's own is another spelling, SEIP_OT_…
+        self._running = session.running = RunningWork(name, Background(self.prepare(context.scene)))
         self._running.timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
         context.window_manager.modal_handler_add(self)
 
@@ -122,13 +123,13 @@ class LongWork(Generic[Result]):
         _redraw(context)
 
 
-def _put_away(running: state.Running) -> None:
+def _put_away(running: RunningWork) -> None:
     running.work.stop()
     if running.timer is not None:
         bpy.context.window_manager.event_timer_remove(running.timer)
         running.timer = None
-    if state.running is running:
-        state.running = None
+    if session.running is running:
+        session.running = None
 
 
 def _redraw(context: bpy.types.Context) -> None:
@@ -148,14 +149,14 @@ class SEIP_OT_stop(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Tell whether there is anything to stop."""
-        if state.running is None:
+        if session.running is None:
             cls.poll_message_set("nothing is under way")
-        return state.running is not None
+        return session.running is not None
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
         """Ask the work to stop."""
-        if state.running is not None:
-            state.running.stop = True
+        if session.running is not None:
+            session.running.stop = True
         return {"FINISHED"}
 
 
@@ -164,7 +165,7 @@ CLASSES = (SEIP_OT_stop,)
 
 def detach() -> None:
     """Stop what is under way: Blender drops its operator with the add-on, and asks it nothing."""
-    if state.running is not None:
-        running = state.running
+    if session.running is not None:
+        running = session.running
         _put_away(running)
         running.work.join(PATIENCE)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from .. import hand, state
+from .. import scene_status
 from ..core.placement.goal import MOVED, MOVED_SENTENCE
-from ..core.results.placement_record import Record
+from ..core.results.placement_record import Record, parsed_record
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_judge_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
+from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -58,7 +59,7 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         if goal.weighting == "VALUE":
             column.prop(goal, "central_weight")
         column.prop(goal, "min_distance")
-        obstacle = state.obstacle(scene)
+        obstacle = scene_status.obstacle(scene)
         if obstacle:
             draw_sentence(layout, obstacle, icon="ERROR")
         draw_run(layout, SEIP_OT_solve_placement.bl_idname)
@@ -133,13 +134,13 @@ class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
 
 def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw what a placement is worth; what is proven of it as long as it is of the scene as it is, and no longer."""
-    record = state.record_of(scene.seip.result.record)
-    doubt, by_hand = state.doubt_of_placement(scene), hand.changes(scene).in_words
+    record = parsed_record(scene.seip.result.record)
+    doubt, by_hand = scene_status.stale_placement(scene), sensor_edits(scene).describe()
     box = layout.box()
     for sentence in (doubt, by_hand):
         if sentence:
             draw_sentence(box, sentence, icon="ERROR")
-    if doubt and doubt != state.ANOTHER_SITE:
+    if doubt and doubt != scene_status.ANOTHER_SITE:
         draw_run(box, SEIP_OT_compare_scene.bl_idname)
     if by_hand:
         draw_run(box, SEIP_OT_judge_sensors.bl_idname)

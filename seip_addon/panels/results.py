@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from .. import live, state
-from ..core.results.placement_record import Record
+from ..core.results.placement_record import Record, parsed_record
 from ..operators import results
+from ..session import FollowedSensors, session
 from .run_button import draw_run
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -28,7 +28,7 @@ class SEIP_UL_chosen(bpy.types.UIList):
         _active_property: str,
     ) -> None:
         """Draw a sensor: label, type, height, place and what it sees."""
-        record = state.record_of(context.scene.seip.result.record)
+        record = parsed_record(context.scene.seip.result.record)
         sensor = next((one for one in record["sensors"] if one["id"] == item.name), None)
         if sensor is None:
             layout.label(text=item.name)
@@ -106,14 +106,14 @@ class SEIP_PT_results(Sidebar, bpy.types.Panel):
         result = scene.seip.result
         layout.template_list(SEIP_UL_chosen.bl_idname, "", result, "sensors", result, "active_sensor", rows=4)
         layout.operator("seip.look_from_sensor", icon="HIDE_OFF")
-        if live.following is None:
+        if session.following is None:
             draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
         else:
             layout.operator("seip.follow_sensors", text="End Following", icon="PAUSE", depress=True)
-            _draw_followed(layout, live.following)
+            _draw_followed(layout, session.following)
 
 
-def _draw_followed(layout: bpy.types.UILayout, following: live.Live) -> None:
+def _draw_followed(layout: bpy.types.UILayout, following: FollowedSensors) -> None:
     if following.problem:
         draw_sentence(layout, following.problem, icon="ERROR", alert=True)
         return
@@ -154,8 +154,8 @@ class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
         if not 0 <= seip.active_kept < len(seip.kept):
             draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
             return
-        kept = state.record_of(seip.kept[seip.active_kept].record)
-        _draw_table(layout, kept, state.record_of(seip.result.record))
+        kept = parsed_record(seip.kept[seip.active_kept].record)
+        _draw_table(layout, kept, parsed_record(seip.result.record))
         layout.operator("seip.show_comparison").back = False
         layout.operator("seip.show_comparison", text="Show Coverage Again").back = True
 

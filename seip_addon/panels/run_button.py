@@ -6,12 +6,12 @@ import time
 
 import bpy
 
-from .. import state
+from ..session import session
 
 
 def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> None:
     """Draw an operator's button, or how far its work is with a button to stop it."""
-    running = state.running
+    running = session.running
     if running is None or not is_running(operator):
         layout.operator(operator, icon=icon)
         return
@@ -25,7 +25,7 @@ def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> N
 
 def is_running(operator: str) -> bool:
     """Return whether an operator's work is under way."""
-    return state.running is not None and state.running.operator == operator
+    return session.running is not None and session.running.operator == operator
 
 
 def in_words(seconds: float) -> str:

@@ -6,7 +6,6 @@ import math
 
 import bpy
 
-from .. import sensor_types
 from ..core.lidar import LidarModel
 from ..operators.sensors import (
     SEIP_MT_survey_presets,
@@ -16,6 +15,7 @@ from ..operators.sensors import (
     SEIP_OT_preview_beams,
 )
 from ..properties import SEIP_PG_sensor_type, SEIP_PG_survey
+from ..session import session
 from ..viewport import beam_preview
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -36,7 +36,7 @@ class SEIP_UL_sensor_types(bpy.types.UIList):
         _active_data: SEIP_PG_survey,
     ) -> None:
         """Draw whether a type is used, its key, and its main figures."""
-        model = sensor_types.known.get(item.name)
+        model = session.sensor_types.get(item.name)
         row = layout.row(align=True)
         row.prop(item, "use", text="")
         split = row.split(factor=0.38)
@@ -66,8 +66,8 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         """Draw the list, the heights and the tilts."""
         survey = context.scene.seip.survey
         layout = self.layout
-        if sensor_types.complaint:
-            draw_sentence(layout, sensor_types.complaint, icon="ERROR", alert=True)
+        if session.catalogue_error:
+            draw_sentence(layout, session.catalogue_error, icon="ERROR", alert=True)
         if not len(survey.types):
             draw_sentence(layout, "Types 1 to 3 of the study are used.", icon="INFO")
             layout.operator(SEIP_OT_list_sensor_types.bl_idname, text="Choose Types")
@@ -101,7 +101,7 @@ class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
             self.layout.label(text="No type is selected")
             return
         key = survey.types[survey.active_type].name
-        model = sensor_types.known.get(key)
+        model = session.sensor_types.get(key)
         if model is None:
             draw_sentence(self.layout, f"{key} is not in the catalogue: add the file that has it, or do not use it.")
             return

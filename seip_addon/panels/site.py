@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import state
+from .. import scene_status
 from ..core.streetscape.parts import Role
 from ..operators.site import (
     SEIP_OT_add_area,
@@ -147,7 +147,7 @@ class SEIP_PT_site_check(Sidebar, bpy.types.Panel):
         draw_run(layout, SEIP_OT_check_site.bl_idname)
         if not site.checked:
             return
-        doubt = state.doubt_of_check(context.scene)
+        doubt = scene_status.stale_check(context.scene)
         if doubt:
             draw_sentence(layout, doubt, icon="ERROR")
         if not site.problems:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from .. import scans
 from ..operators.traffic import (
     SEIP_OT_clear_traffic,
     SEIP_OT_load_traffic,
@@ -15,6 +14,7 @@ from ..operators.traffic import (
     why_no_scan,
     why_no_trial,
 )
+from ..session import session
 from .run_button import draw_run
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -70,8 +70,8 @@ class SEIP_PT_scan(Sidebar, bpy.types.Panel):
         why_not = why_no_scan(context.scene)
         if why_not:
             draw_sentence(layout, why_not, icon="INFO")
-        scan = scans.find(context.scene)
-        for line in scan.in_words if scan is not None else ():
+        scan = session.scan_of(context.scene)
+        for line in scan.facts if scan is not None else ():
             draw_sentence(layout, line)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from .. import scans
 from ..operators.results import no_placement, not_judged
 from ..operators.view import (
     SEIP_OT_colour_coverage,
@@ -16,6 +15,7 @@ from ..operators.view import (
     why_no_coverage,
 )
 from ..scene.write import ASPECT, coverage_of
+from ..session import session
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
 from .run_button import draw_run, is_running
@@ -76,7 +76,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.label(text="Point Cloud")
         row = column.row(align=True)
-        there = scans.find(context.scene) is not None
+        there = session.scan_of(context.scene) is not None
         row.enabled = there
         row.prop(context.scene.seip.view, "cloud_colour", expand=True)
         if there:

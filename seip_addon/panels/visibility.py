@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from .. import state
+from .. import scene_status
 from ..core.visibility.estimate import Estimate
 from ..operators.visibility import SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility
+from ..session import session
 from .run_button import draw_run, in_words
 from .sentence import draw_sentence
 from .sidebar import Sidebar
@@ -57,14 +58,14 @@ class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
 
 def _draw_state(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Say what is missing, or what is known and whether it still holds."""
-    obstacle = state.obstacle(scene)
+    obstacle = scene_status.obstacle(scene)
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
         return
-    known = state.find(scene)
+    known = session.survey_of(scene)
     if known is None:
         return
-    doubt = state.doubt(scene)
+    doubt = scene_status.stale_survey(scene)
     if doubt:
         draw_sentence(layout, doubt, icon="ERROR")
         return

@@ -10,12 +10,12 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from .. import sensor_types
 from ..core.arrays import Float
 from ..core.lidar.model import LidarModel
 from ..core.lidar.rings import BeamRings, beam_rings
 from ..core.visibility.ring_resolution import unresolved_from
 from ..scene import contract
+from ..session import session
 
 DENSE, WIDE, CONE = (0.30, 0.75, 1.0, 0.9), (1.0, 0.55, 0.10, 0.9), (1.0, 1.0, 1.0, 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
@@ -110,16 +110,16 @@ def preview_of(context: bpy.types.Context) -> Preview | None:
     scene = context.scene
     survey = scene.seip.survey
     active = context.object
-    if active is not None and active.get(contract.SENSOR) in sensor_types.known:
+    if active is not None and active.get(contract.SENSOR) in session.sensor_types:
         matrix = np.array(active.matrix_world, dtype=np.float64)
         axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-9)
         height = active.get("seip_height", survey.preview_height)
         return Preview(
-            sensor_types.known[active[contract.SENSOR]], matrix[:3, 3], axes, float(height), float(survey.delta)
+            session.sensor_types[active[contract.SENSOR]], matrix[:3, 3], axes, float(height), float(survey.delta)
         )
     if not 0 <= survey.active_type < len(survey.types):
         return None
-    model = sensor_types.known.get(survey.types[survey.active_type].name)
+    model = session.sensor_types.get(survey.types[survey.active_type].name)
     if model is None:
         return None
     place = np.add(scene.cursor.location, (0.0, 0.0, survey.preview_height))
@@ -153,21 +153,10 @@ def _draw() -> None:
     gpu.state.depth_test_set(before[1])
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
-def _before_load(*_: object) -> None:
-    hide()
-
-
 CLASSES: tuple[type, ...] = ()
 
 
-def attach() -> None:
-    """Hide beams whenever another file is opened."""
-    bpy.app.handlers.load_pre.append(_before_load)
-
-
-def detach() -> None:
-    """Leave nothing in the viewport."""
-    bpy.app.handlers.load_pre.remove(_before_load)
+def forget() -> None:
+    """Leave nothing in the viewport: another file is opened, or the add-on is disabled."""
     if is_shown():
         hide()

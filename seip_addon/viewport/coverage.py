@@ -6,8 +6,8 @@ import bpy
 
 from ..core.pictures.palette import rgb
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
-from .layers import Overlay
 from .legend import Block, Entry
+from .overlay import Overlay
 
 NAME = "coverage"
 SHOWN_BY = {"MATERIAL", "VERTEX"}

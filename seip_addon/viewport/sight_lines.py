@@ -8,8 +8,8 @@ import numpy as np
 from ..core.pictures.palette import INK, rgb
 from ..core.visibility.sight_lines import SightLines
 from ..scene.write import LIFT
-from .layers import Layer, Overlay
 from .legend import Block, Colour, Entry
+from .overlay import Layer, Overlay
 
 NAME = "sight lines"
 LINE_COLOUR: Colour = (1.0, 0.85, 0.25, 0.30)

@@ -9,12 +9,14 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import hand, live, pointing, state
+from seip_addon import live_coverage, selection
 from seip_addon.core.placement.goal import MOVED, MOVED_SENTENCE
 from seip_addon.core.results.comparison import unpacked_counts
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
+from seip_addon.sensor_edits import sensor_edits
+from seip_addon.session import session
 from tests.json_schema import violations
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,7 +38,7 @@ def placed(add_on, tmp_path):
 
 def move(scene: bpy.types.Scene) -> None:
     """Lower and turn S1 in all ways, and delete S3."""
-    sensors = pointing.sensor_empties(scene)
+    sensors = selection.sensor_empties(scene)
     sensors["S1"].location.z -= 3.0
     sensors["S1"].rotation_euler = (0.1, 0.2, 0.3)
     bpy.data.objects.remove(sensors["S3"])
@@ -50,9 +52,9 @@ def record(scene: bpy.types.Scene) -> dict:
 def full_scan(scene: bpy.types.Scene) -> np.ndarray:
     """Return which targets the sensors see as followed sensors do, which go another way through the code."""
     bpy.ops.seip.follow_sensors()
-    seen = np.sum([row for _, row in live.following.sensors.values()], axis=0)
-    assert live.following.moved == ()
-    live.stop()
+    seen = np.sum([row for _, row in session.following.sensors.values()], axis=0)
+    assert session.following.moved == ()
+    live_coverage.stop()
     return seen
 
 
@@ -66,10 +68,10 @@ def test_moved_sensors_are_neither_exported_nor_kept_as_what_they_were(placed):
 def test_moved_sensors_are_judged_where_they_hang(placed):
     before = record(placed)
     move(placed)
-    pose = pointing.sensor_empties(placed)["S1"].matrix_world.copy()
+    pose = selection.sensor_empties(placed)["S1"].matrix_world.copy()
     assert bpy.ops.seip.judge_sensors() == {"FINISHED"}
-    assert pointing.sensor_empties(placed)["S1"].matrix_world == pose
-    assert not hand.changes(placed)
+    assert selection.sensor_empties(placed)["S1"].matrix_world == pose
+    assert not sensor_edits(placed)
     now = record(placed)
     assert [line["id"] for line in now["sensors"]] == ["S1", "S2"]
     first, second = now["sensors"]
@@ -105,9 +107,9 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     placed.seip.active_kept = 0
     assert bpy.ops.seip.show_comparison() == {"FINISHED"}
     assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
-    there = {name: thing.matrix_world.copy() for name, thing in pointing.sensor_empties(placed).items()}
+    there = {name: thing.matrix_world.copy() for name, thing in selection.sensor_empties(placed).items()}
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    assert {name: thing.matrix_world for name, thing in pointing.sensor_empties(placed).items()} == there
+    assert {name: thing.matrix_world for name, thing in selection.sensor_empties(placed).items()} == there
     out = tmp_path / "out"
     written = load_placement_record(out / "placement.json")
     assert comparable(written) == comparable(record(placed))
@@ -121,17 +123,17 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert spawned["rotation"]["pitch"] == pytest.approx(-math.degrees(0.2), abs=1e-4)
     bpy.ops.wm.open_mainfile(filepath=str(out / "placed.blend"))
     scene = bpy.context.scene
-    assert {name: thing.matrix_world for name, thing in pointing.sensor_empties(scene).items()} == there
-    assert not hand.changes(scene)
+    assert {name: thing.matrix_world for name, thing in selection.sensor_empties(scene).items()} == there
+    assert not sensor_edits(scene)
     assert bpy.ops.seip.export_result() == {"FINISHED"}  # found again from the file and the cache
     assert comparable(load_placement_record(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
-    assert state.find(scene).plan.certificate == MOVED_SENTENCE
+    assert session.survey_of(scene).plan.certificate == MOVED_SENTENCE
 
 
 def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):
-    first = pointing.sensor_empties(placed)["S1"]
+    first = selection.sensor_empties(placed)["S1"]
     copy = first.copy()
     copy.location.x += 5.0
     bpy.data.collections["SEIP Sensors"].objects.link(copy)
@@ -155,7 +157,7 @@ def test_undo_brings_the_placement_back_that_was_moved(placed):
     bpy.ops.ed.undo()
     scene = bpy.context.scene
     assert scene.seip.result.record == before
-    assert not hand.changes(scene)
+    assert not sensor_edits(scene)
 
 
 def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed, tmp_path, monkeypatch):

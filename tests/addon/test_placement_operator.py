@@ -12,12 +12,14 @@ from headless import place, robust
 import bpy
 import pytest
 
-from seip_addon import pointing, state
+from seip_addon import scene_status, selection
+from seip_addon import session as session_data
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.scene.write import MARK
+from seip_addon.session import session
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--no-render"]
@@ -38,14 +40,14 @@ def junction(add_on):
 
 
 def labels(scene: bpy.types.Scene) -> list[str]:
-    return sorted(pointing.sensor_empties(scene))
+    return sorted(selection.sensor_empties(scene))
 
 
 def test_panel_and_batch_write_the_same_placement(junction, tmp_path):
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     junction.seip.result.folder = str(tmp_path / "panel")
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    key = state.find(junction).grid.key
+    key = session.survey_of(junction).grid.key
     place.main([str(SCENE), *OPTIONS, "-o", str(tmp_path / "batch")])
     panel, batch = (load_placement_record(tmp_path / name / "placement.json") for name in ("panel", "batch"))
     assert comparable(panel) == comparable(batch)
@@ -79,13 +81,13 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
     junction.seip.survey.time_limit = 30.0
-    before = state.find(junction)
+    before = session.survey_of(junction)
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.plan.deployment.sensors) == 3
     for name in ("compute_visibility", "estimate_visibility", "rank_candidates", "follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
-        assert state.find(junction) is before
+        assert session.survey_of(junction) is before
         assert vars(before) == seen
 
 
@@ -114,7 +116,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    assert state.find(scene) is None
+    assert session.survey_of(scene) is None
     assert json.loads(scene.seip.result.record) == before
     for forbidden in ("compute_visibility", "make_plan"):
         monkeypatch.setattr(f"seip_addon.core.visibility.store.{forbidden}", None, raising=False)
@@ -128,7 +130,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
 
 def test_an_emptied_cache_is_said(junction, tmp_path):
     bpy.ops.seip.solve_placement()
-    state.forget()
+    session_data.forget()
     for file in (tmp_path / "cache").glob("*.npz"):
         file.unlink()
     with pytest.raises(RuntimeError, match="no longer holds the visibility of this placement: press Compute"):
@@ -151,7 +153,7 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     assert labels(scene) == ["S1", "S2"]
     assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
     bpy.ops.seip.rank_candidates()
-    assert len(state.find(scene).plan.deployment.sensors) == 2
+    assert len(session.survey_of(scene).plan.deployment.sensors) == 2
     bpy.ops.ed.redo()
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
 
@@ -179,30 +181,30 @@ def test_nothing_of_the_users_is_changed(junction):
 
 def test_rules_come_from_what_is_selected_and_hold(junction):
     bpy.ops.seip.solve_placement()
-    first = pointing.sensor_empties(junction)["S1"]
+    first = selection.sensor_empties(junction)["S1"]
     position = first["seip_position"]
     bpy.context.view_layer.objects.active = first
     assert bpy.ops.seip.add_rule(rule="FORBIDDEN") == {"FINISHED"}
     bpy.ops.seip.solve_placement()
-    assert position not in {thing["seip_position"] for thing in pointing.sensor_empties(junction).values()}
+    assert position not in {thing["seip_position"] for thing in selection.sensor_empties(junction).values()}
     junction.seip.goal.position = position
     bpy.ops.seip.add_rule(rule="MANDATORY")
     assert [(one.name, one.rule) for one in junction.seip.goal.rules] == [(position, "MANDATORY")]
     bpy.ops.seip.solve_placement()
-    assert position in {thing["seip_position"] for thing in pointing.sensor_empties(junction).values()}
+    assert position in {thing["seip_position"] for thing in selection.sensor_empties(junction).values()}
     assert bpy.ops.seip.remove_rule() == {"FINISHED"}
     assert not bpy.ops.seip.remove_rule.poll()
 
 
 def test_a_file_of_a_newer_version_is_refused(junction, tmp_path):
-    junction.seip.version = state.VERSION + 1
-    assert "newer version" in state.obstacle(junction)
+    junction.seip.version = scene_status.FILE_VERSION + 1
+    assert "newer version" in scene_status.obstacle(junction)
     with pytest.raises(RuntimeError, match="newer version of SEIP"):
         bpy.ops.seip.solve_placement()
     path = tmp_path / "newer.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
-    assert bpy.context.scene.seip.version == state.VERSION + 1
+    assert bpy.context.scene.seip.version == scene_status.FILE_VERSION + 1
 
 
 def test_the_version_is_in_the_file(junction, tmp_path, monkeypatch):

@@ -6,9 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live, pointing, state
+from seip_addon import live_coverage, selection
 from seip_addon.core.errors import SeipError
 from seip_addon.core.results.comparison import unpacked_counts
+from seip_addon.core.results.placement_record import parsed_record
+from seip_addon.session import scene_of, session
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 
@@ -34,7 +36,7 @@ def shown(scene: bpy.types.Scene) -> np.ndarray:
 
 def test_candidates_are_ranked_as_a_slow_loop_does(placed):
     bpy.ops.seip.rank_candidates()
-    known = state.find(placed)
+    known = session.survey_of(placed)
     visible, site = known.grid.visible, known.layout.site
     chosen = [sensor.pose for sensor in known.plan.deployment.sensors]
     taken = {int(site.candidates.position_of[pose]) for pose in chosen}
@@ -95,42 +97,42 @@ def test_kept_placements_have_names_and_can_be_forgotten(placed):
 
 def test_moved_sensors_are_followed(placed):
     before = shown(placed)
-    coverage = state.record_of(placed.seip.result.record)["coverage"]["whole"]
+    coverage = parsed_record(placed.seip.result.record)["coverage"]["whole"]
     assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
-    assert live.following.coverage == pytest.approx(coverage, abs=1e-9)
+    assert session.following.coverage == pytest.approx(coverage, abs=1e-9)
     assert (shown(placed) == before).all()
-    assert live.following.moved == ()
+    assert session.following.moved == ()
 
-    first = pointing.sensor_empties(placed)["S1"]
+    first = selection.sensor_empties(placed)["S1"]
     there = first.location.copy()
     first.location.z -= 4.0
     bpy.context.view_layer.update()
-    assert bpy.app.timers.is_registered(live.look)
-    live.look()
-    assert live.following.moved == ("S1",)
+    assert bpy.app.timers.is_registered(live_coverage.update)
+    live_coverage.update()
+    assert session.following.moved == ("S1",)
     assert (shown(placed) != before).any()
-    assert live.following.coverage == pytest.approx((shown(placed) > 0).mean())
+    assert session.following.coverage == pytest.approx((shown(placed) > 0).mean())
 
     first.location = there
-    live.look()
-    assert live.following.moved == ()
+    live_coverage.update()
+    assert session.following.moved == ()
     assert (shown(placed) == before).mean() > 0.99  # the place is in single precision
 
     first.rotation_euler.x = 0.4  # tilted: every ray is cast
-    live.look()
-    assert live.following.moved == ("S1",)
+    live_coverage.update()
+    assert session.following.moved == ("S1",)
     bpy.data.objects.remove(first)
-    live.look()
+    live_coverage.update()
     assert (shown(placed) <= 1).all()
 
 
 def test_a_level_turn_of_a_whole_step_sees_the_same(placed):
     bpy.ops.seip.follow_sensors()
     before = shown(placed)
-    first = pointing.sensor_empties(placed)["S1"]
+    first = selection.sensor_empties(placed)["S1"]
     first.rotation_euler.z += np.pi
-    live.look()
-    assert live.following.moved == ("S1",)
+    live_coverage.update()
+    assert session.following.moved == ("S1",)
     assert (shown(placed) == before).mean() > 0.97
 
 
@@ -140,19 +142,19 @@ def test_following_leaves_nothing_behind(placed):
     bpy.ops.seip.follow_sensors()
     assert len(handlers) == count + 1
     bpy.ops.seip.follow_sensors()
-    assert live.following is None
+    assert session.following is None
     assert len(handlers) == count
     bpy.ops.seip.follow_sensors()
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    assert live.following is None
+    assert session.following is None
 
 
 def test_following_stops_where_the_scene_has_changed(placed):
     bpy.ops.seip.follow_sensors()
     bpy.data.objects["Building 1"].location.x += 1.0
     bpy.context.view_layer.update()
-    live.look()
-    assert "the scene has changed" in live.following.problem
+    live_coverage.update()
+    assert "the scene has changed" in session.following.problem
 
 
 def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
@@ -160,25 +162,25 @@ def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
     bpy.ops.scene.new(type="NEW")
     bpy.data.scenes.remove(placed)
     with pytest.raises(SeipError, match="is gone: nothing was written"):
-        state.scene_of(number)
+        scene_of(number)
 
 
 def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them(placed):
     placed.seip.survey.tilts = "12"
     bpy.ops.seip.solve_placement()
-    known = state.find(placed)
+    known = session.survey_of(placed)
     assert {sensor.tilt for sensor in known.plan.deployment.sensors} == {np.radians(12)}
     bpy.ops.seip.rank_candidates()
     assert all("8 m, tilted 12° " in line.name for line in placed.seip.result.ranking)
     bpy.ops.seip.show_sight_lines(sensor="S1")
 
     bpy.ops.seip.follow_sensors()
-    assert live.following.moved == ()
-    coverage = live.following.coverage
-    first = pointing.sensor_empties(placed)["S1"]
+    assert session.following.moved == ()
+    coverage = session.following.coverage
+    first = selection.sensor_empties(placed)["S1"]
     first.rotation_euler.y = 0.0
-    live.look()
-    assert live.following.moved == ("S1",)
-    assert live.following.coverage != coverage
+    live_coverage.update()
+    assert session.following.moved == ("S1",)
+    assert session.following.coverage != coverage
     with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
         bpy.ops.seip.show_sight_lines(sensor="S1")

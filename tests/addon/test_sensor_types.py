@@ -8,13 +8,14 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import preferences, sensor_types
+from seip_addon import preferences
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.ray_casting import MOST_THREADS
 from seip_addon.core.visibility.ring_resolution import unresolved_from
+from seip_addon.session import session
 from seip_addon.viewport import beam_preview
 
 OWN = """
@@ -87,7 +88,7 @@ def test_an_unknown_type_that_is_used_stays_and_one_that_is_not_goes(survey):
     assert bpy.ops.seip.list_sensor_types() == {"FINISHED"}
     assert "gone" not in survey.types
     assert "lost" in survey.types
-    assert "lost" not in sensor_types.known
+    assert "lost" not in session.sensor_types
 
 
 def test_no_type_is_a_mistake(survey):
@@ -126,8 +127,8 @@ def test_a_catalogue_that_broke_leaves_the_shipped_types(survey, own, catalogue)
     catalogue.unlink()
     with pytest.raises(RuntimeError, match="cannot read the LiDAR catalogue"):
         bpy.ops.seip.list_sensor_types()
-    assert sensor_types.complaint
-    assert list(sensor_types.known) == list(load_catalogue())
+    assert session.catalogue_error
+    assert list(session.sensor_types) == list(load_catalogue())
 
 
 def test_without_preferences_catalogues_cannot_be_kept(survey, catalogue):
@@ -232,7 +233,7 @@ def test_tilts_are_degrees_in_the_panel_and_radians_inside(survey):
 
 
 def test_the_preview_of_a_tilted_sensor_says_what_lies_before_it(survey):
-    model = sensor_types.known["type1"]
+    model = session.sensor_types["type1"]
     place = np.array([0.0, 0.0, 5.4])
     upright, tilted = (beam_preview.Preview(model, place, orientation(0.5, tilt), 5.4, 1.0) for tilt in (0.0, 0.2))
     assert upright.tilt == 0.0

@@ -5,7 +5,9 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import hand, pointing, state
+from seip_addon import scene_status, selection
+from seip_addon.sensor_edits import sensor_edits
+from seip_addon.session import SceneSurvey, session
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 
@@ -18,12 +20,12 @@ def known(add_on):
     scene.seip.survey.grid = 4.0
     scene.seip.survey.spacing = 12.0
     bpy.ops.seip.compute_visibility()
-    return state.find(scene)
+    return session.survey_of(scene)
 
 
-def read_again(known: state.Held) -> bool:
+def read_again(known: SceneSurvey) -> bool:
     bpy.ops.seip.compute_visibility()
-    return state.find(bpy.context.scene).layout.geometry is not known.layout.geometry
+    return session.survey_of(bpy.context.scene).layout.geometry is not known.layout.geometry
 
 
 def building() -> bpy.types.Object:
@@ -60,12 +62,12 @@ def forbid() -> None:
 
 @pytest.mark.parametrize("change", [move, reshape, delete, add, modify, hide])
 def test_a_change_is_noticed_at_once_and_read(known, change):
-    assert state.doubt(bpy.context.scene) == ""
+    assert scene_status.stale_survey(bpy.context.scene) == ""
     change()
     bpy.context.view_layer.update()
-    assert state.doubt(bpy.context.scene) == "The scene has changed since it was computed."
+    assert scene_status.stale_survey(bpy.context.scene) == "The scene has changed since it was computed."
     assert read_again(known)
-    assert state.doubt(bpy.context.scene) == ""
+    assert scene_status.stale_survey(bpy.context.scene) == ""
 
 
 def test_a_property_is_noticed_at_the_next_click(known):
@@ -78,7 +80,7 @@ def test_a_change_that_is_undone_is_noticed(known):
     reshape()
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.seip.compute_visibility()
-    reshaped = state.find(bpy.context.scene)
+    reshaped = session.survey_of(bpy.context.scene)
     bpy.ops.ed.undo()
     assert read_again(reshaped)
 
@@ -99,20 +101,20 @@ def place_sensors() -> None:
 def test_what_does_not_matter_is_not_read_again(known, change):
     change()
     bpy.context.view_layer.update()
-    assert state.doubt(bpy.context.scene) == ""
+    assert scene_status.stale_survey(bpy.context.scene) == ""
     assert not read_again(known)
 
 
 def test_other_settings_lay_out_anew_from_the_same_reading(known):
     bpy.context.scene.seip.survey.grid = 5.0
-    assert state.doubt(bpy.context.scene) == "The settings have changed since it was computed."
+    assert scene_status.stale_survey(bpy.context.scene) == "The settings have changed since it was computed."
     assert not read_again(known)
-    assert state.find(bpy.context.scene).layout.site.targets.spacing == 5.0
+    assert session.survey_of(bpy.context.scene).layout.site.targets.spacing == 5.0
 
 
 def test_a_slip_in_the_settings_is_said_by_the_panel(known):
     bpy.context.scene.seip.survey.heights = "x"
-    assert "neither a height" in state.doubt(bpy.context.scene)
+    assert "neither a height" in scene_status.stale_survey(bpy.context.scene)
 
 
 def reopened(tmp_path: Path) -> bpy.types.Scene:
@@ -123,14 +125,14 @@ def reopened(tmp_path: Path) -> bpy.types.Scene:
 
 
 def doubt_once_compared(scene: bpy.types.Scene) -> str:
-    assert state.doubt_of_placement(scene) == state.NOT_COMPARED
+    assert scene_status.stale_placement(scene) == scene_status.NOT_COMPARED
     assert bpy.ops.seip.compare_scene() == {"FINISHED"}
-    return state.doubt_of_placement(scene)
+    return scene_status.stale_placement(scene)
 
 
 def test_a_placement_that_is_opened_again_holds_once_it_is_compared(known, tmp_path):
     bpy.ops.seip.solve_placement()
-    assert state.doubt_of_placement(bpy.context.scene) == ""
+    assert scene_status.stale_placement(bpy.context.scene) == ""
     assert doubt_once_compared(reopened(tmp_path)) == ""
 
 
@@ -143,7 +145,7 @@ def weigh() -> None:
 def test_a_change_before_saving_shows_once_the_file_is_open_again(known, change, tmp_path):
     bpy.ops.seip.solve_placement()
     change()
-    assert doubt_once_compared(reopened(tmp_path)) == state.ANOTHER_SITE
+    assert doubt_once_compared(reopened(tmp_path)) == scene_status.ANOTHER_SITE
 
 
 def test_visibility_of_other_settings_does_not_make_an_older_placement_hold(known):
@@ -151,43 +153,43 @@ def test_visibility_of_other_settings_does_not_make_an_older_placement_hold(know
     bpy.ops.seip.solve_placement()
     scene.seip.survey.heights = "5"
     bpy.ops.seip.compute_visibility()
-    assert state.doubt(scene) == ""
-    assert state.doubt_of_placement(scene) == state.ANOTHER_SITE
+    assert scene_status.stale_survey(scene) == ""
+    assert scene_status.stale_placement(scene) == scene_status.ANOTHER_SITE
     scene.seip.survey.heights = "8"
     bpy.ops.seip.compute_visibility()
-    assert state.doubt_of_placement(scene) == ""
+    assert scene_status.stale_placement(scene) == ""
 
 
 def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
     scene = bpy.context.scene
     bpy.ops.seip.check_site()
-    assert state.doubt_of_check(scene) == ""
+    assert scene_status.stale_check(scene) == ""
     scene.seip.survey.time_limit = 30.0  # nothing that a check looks at
-    assert state.doubt_of_check(scene) == ""
+    assert scene_status.stale_check(scene) == ""
     scene.seip.survey.heights = "5 8"
-    assert state.doubt_of_check(scene) == "The settings have changed since the check."
+    assert scene_status.stale_check(scene) == "The settings have changed since the check."
     bpy.ops.seip.check_site()
     move()
     bpy.context.view_layer.update()
-    assert state.doubt_of_check(scene) == "The scene has changed since the check."
+    assert scene_status.stale_check(scene) == "The scene has changed since the check."
     bpy.ops.seip.check_site()
-    assert state.doubt_of_check(reopened(tmp_path)) == state.OLD_CHECK
+    assert scene_status.stale_check(reopened(tmp_path)) == scene_status.OLD_CHECK
 
 
 def test_what_a_hand_did_to_the_sensors_is_said(known):
     scene = bpy.context.scene
     bpy.ops.seip.solve_placement()
     bpy.data.collections["SEIP Sensors"].hide_viewport = True
-    assert not hand.changes(scene)
+    assert not sensor_edits(scene)
     bpy.data.collections["SEIP Sensors"].hide_viewport = False
-    sensors = pointing.sensor_empties(scene)
+    sensors = selection.sensor_empties(scene)
     sensors["S1"].location.z -= 2.0
     sensors["S2"].rotation_euler.x = 0.2
     sensors["S4"]["seip_sensor"] = "vlp16"
     copy = sensors["S1"].copy()
     bpy.data.collections["SEIP Sensors"].objects.link(copy)
     bpy.context.view_layer.update()
-    assert hand.changes(scene).in_words == "By hand: S1, S2, S4 moved; S5 added."
+    assert sensor_edits(scene).describe() == "By hand: S1, S2, S4 moved; S5 added."
     bpy.data.objects.remove(copy)
     bpy.data.objects.remove(sensors["S3"])
-    assert hand.changes(scene).in_words == "By hand: S1, S2, S4 moved; S3 deleted."
+    assert sensor_edits(scene).describe() == "By hand: S1, S2, S4 moved; S3 deleted."

@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import scans
 from seip_addon.core.results.placement_record import load_placement_record
 from seip_addon.core.scans import Frame
 from seip_addon.scene.write import write_result
+from seip_addon.session import session
 from seip_addon.viewport import layers
 from seip_addon.viewport.point_cloud import NAME as CLOUD
 from tests.scene_by_hand import make_scene
@@ -98,14 +98,14 @@ def test_a_scan_at_a_time_of_the_run_is_the_runs_frame(placed, tmp_path):
     bpy.ops.seip.write_dataset()
     placed.frame_set(21 * placed.render.fps)
     bpy.ops.seip.scan_frame()
-    recorded, shown = Frame.load(tmp_path / "run" / "frames" / "000001.npz"), scans.find(placed).frame
+    recorded, shown = Frame.load(tmp_path / "run" / "frames" / "000001.npz"), session.scan_of(placed).frame
     assert shown.points.tobytes() == recorded.points.tobytes()
     assert shown.labels.points.tolist() == recorded.labels.points.tolist()
 
 
 def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
     bpy.ops.seip.scan_frame()
-    frame = scans.find(placed).frame
+    frame = session.scan_of(placed).frame
     seen = []
     for by in ("sensor", "intensity", "instance"):
         placed.seip.view.cloud_colour = by
@@ -123,11 +123,11 @@ def test_animated_objects_are_scanned_as_the_file_is(placed):
     bpy.ops.seip.load_traffic()
     placed.frame_set(480)
     bpy.ops.seip.scan_frame()
-    from_file = scans.find(placed).frame
+    from_file = session.scan_of(placed).frame
     placed.seip.traffic.file = ""
     placed.frame_start, placed.frame_end = 479, 481
     bpy.ops.seip.scan_frame()
-    animated = scans.find(placed).frame
+    animated = session.scan_of(placed).frame
     assert len(animated.labels) == len(from_file.labels)
     assert np.allclose(np.sort(animated.labels.centre[:, 0]), np.sort(from_file.labels.centre[:, 0]), atol=0.01)
 
@@ -138,10 +138,10 @@ def test_following_scans_at_each_frame_and_leaves_no_handler(placed):
     placed.seip.traffic.follow = True
     assert len(bpy.app.handlers.frame_change_post) == before + 1
     placed.frame_set(480)
-    assert scans.find(placed).frame.time == pytest.approx(480 / placed.render.fps)
+    assert session.scan_of(placed).frame.time == pytest.approx(480 / placed.render.fps)
     placed.seip.traffic.follow = False
     placed.frame_set(490)
-    assert scans.find(placed).frame.time == pytest.approx(480 / placed.render.fps)
+    assert session.scan_of(placed).frame.time == pytest.approx(480 / placed.render.fps)
     assert len(bpy.app.handlers.frame_change_post) == before
 
 
@@ -176,14 +176,14 @@ def test_a_folder_beside_a_file_that_was_never_saved_has_its_sentence(add_on):
 
 def test_a_second_scan_of_the_same_scene_needs_no_preparation(placed):
     bpy.ops.seip.scan_frame()
-    first = scans.find(placed).simulation
+    first = session.scan_of(placed).simulation
     placed.frame_set(300)
     bpy.ops.seip.scan_frame()
-    assert scans.find(placed).simulation is first
+    assert session.scan_of(placed).simulation is first
     empty = next(thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY")
     empty.location.z += 1.0
     bpy.ops.seip.scan_frame()
-    assert scans.find(placed).simulation is not first
+    assert session.scan_of(placed).simulation is not first
 
 
 def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
@@ -195,4 +195,4 @@ def test_floating_car_data_are_put_on_the_road(placed, tmp_path):
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}
     assert placed.seip.traffic.loaded.startswith("1 road users, 0 to 5 s\n1 car")
     bpy.ops.seip.scan_frame()
-    assert scans.find(placed).run.trajectories.source == "run.fcd.xml"
+    assert session.scan_of(placed).run.trajectories.source == "run.fcd.xml"

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 import seip_addon
-from seip_addon import state
 from seip_addon.scene import render
+from seip_addon.session import session
 from seip_addon.viewport import layers
 from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT
@@ -52,7 +52,7 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
 
 
 def test_sight_lines_are_the_row_of_the_grid(placed):
-    held = state.find(placed)
+    held = session.survey_of(placed)
     sensor = held.plan.deployment.sensors[1]
     assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
     overlay = layers.find(placed, SIGHT)

@@ -7,13 +7,14 @@ from pathlib import Path
 import bpy
 import pytest
 
-from seip_addon import live, preferences, state
+from seip_addon import live_coverage, preferences, registration, scene_status, scene_survey
 from seip_addon.background import Background
 from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import results, work
 from seip_addon.panels import incomplete
 from seip_addon.scene import contract
 from seip_addon.scene.sensors import placed_sensors
+from seip_addon.session import RunningWork, session
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 
@@ -51,17 +52,17 @@ def test_a_linked_scene_is_not_written_into(linked, button):
 
 def test_an_object_in_edit_mode_counts_as_it_is_shown_there(scene):
     bpy.ops.seip.compute_visibility()
-    key = state.find(scene).grid.key
+    key = session.survey_of(scene).grid.key
     bpy.context.view_layer.objects.active = bpy.data.objects["Building 1"]
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.seip.compute_visibility()
-    assert state.find(scene).grid.key == key
+    assert session.survey_of(scene).grid.key == key
 
 
 def test_a_record_of_a_newer_version_is_not_shown(placed):
     placed.seip.result.record = json.dumps({"what": "nobody knows"})
     assert not results.no_placement(placed)
-    placed.seip.version = state.VERSION + 1
+    placed.seip.version = scene_status.FILE_VERSION + 1
     assert "newer version" in results.no_placement(placed)
 
 
@@ -118,16 +119,15 @@ def endless():
 
 
 def test_work_under_way_ends_with_the_add_on(add_on):
-    running = state.running = state.Running("seip.check_site", Background(endless()))
+    running = session.running = RunningWork("seip.check_site", Background(endless()))
     running.timer = bpy.context.window_manager.event_timer_add(1.0, window=bpy.context.window)
     work.detach()
-    assert state.running is None
+    assert session.running is None
     assert running.timer is None
     assert running.work.join(5.0)
 
 
 def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
-    from seip_addon import registration  # noqa: PLC0415  # registered here by hand
 
     def broken(name, package=None):
         if name == ".properties":
@@ -150,15 +150,15 @@ def test_an_undo_is_followed(placed):
     bpy.context.scene.cursor.location.x += 1.0
     bpy.ops.ed.undo_push(message="something else")
     bpy.ops.ed.undo()
-    assert bpy.app.timers.is_registered(live.look)
-    live.stop()
+    assert bpy.app.timers.is_registered(live_coverage.update)
+    live_coverage.stop()
 
 
 def test_work_asks_blender_for_nothing_once_it_is_under_way(scene, monkeypatch):
     def asked():
         pytest.fail("the preferences were asked from the work")
 
-    seeing = state.seen(finish(state.survey(scene)))
+    seeing = scene_survey.with_visibility(finish(scene_survey.survey(scene)))
     for name in ("cache_folder", "cores", "own"):
         monkeypatch.setattr(preferences, name, asked)
     _, grid = finish(seeing)

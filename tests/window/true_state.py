@@ -18,9 +18,10 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import preferences, state
+from bl_ext.user_default.seip.seip_addon import preferences
 from bl_ext.user_default.seip.seip_addon.core.visibility import ray_casting
 from bl_ext.user_default.seip.seip_addon.panels import placement, results, site
+from bl_ext.user_default.seip.seip_addon.session import session
 from driver import Steps, Window, play
 from mathutils import Vector
 
@@ -76,7 +77,7 @@ def _open(window: Window, path: Path) -> Steps:
 def _press(window: Window, what: str, seconds: float = 200) -> Steps:
     """Press a button, and wait for its work."""
     yield from window.click(what)
-    yield from window.until(lambda: state.running is None, seconds)
+    yield from window.until(lambda: session.running is None, seconds)
     yield 0.3
 
 
@@ -100,11 +101,11 @@ def _stopped_work_leaves_no_trace(window: Window) -> Steps:
     _scene().seip.goal.count = 3
     with bpy.context.temp_override(window=window.window, area=window.area, region=window.region("UI")):
         bpy.ops.seip.solve_placement("INVOKE_DEFAULT")
-    work = state.running.work
+    work = session.running.work
     while not work.ended:  # the window stands still: it cannot look at the result before Stop
         time.sleep(0.05)
     bpy.ops.seip.stop()
-    yield from window.until(lambda: state.running is None, 1)
+    yield from window.until(lambda: session.running is None, 1)
     assert _record() == before
     yield from _export(window)
     _agree(before)
@@ -113,8 +114,8 @@ def _stopped_work_leaves_no_trace(window: Window) -> Steps:
 def _escape_is_for_the_animation(window: Window) -> Steps:
     _scene().seip.survey.heights, _scene().seip.survey.grid = "3:8:0.5", 0.5  # a minute and more
     yield from window.click("seip.compute_visibility(")
-    yield from window.until(lambda: state.running is not None, 10)
-    work = state.running.work
+    yield from window.until(lambda: session.running is not None, 10)
+    work = session.running.work
     yield from window.press("SPACE")
     yield from window.until(lambda: window.window.screen.is_animation_playing, 5)
     for _ in range(2):
@@ -122,9 +123,9 @@ def _escape_is_for_the_animation(window: Window) -> Steps:
         yield 0.5
     assert not window.window.screen.is_animation_playing
     assert not work.ended, "the work ended before Esc was pressed"
-    assert state.running is not None, "Esc stopped the computation"
+    assert session.running is not None, "Esc stopped the computation"
     bpy.ops.seip.stop()
-    yield from window.until(lambda: state.running is None, 1)
+    yield from window.until(lambda: session.running is None, 1)
 
 
 def _changes_show_after_opening(window: Window) -> Steps:
@@ -158,7 +159,7 @@ def _checks_grow_old(window: Window) -> Steps:
 
 def _poles_have_feet(window: Window) -> Steps:
     yield from _press(window, "seip.compute_visibility(")
-    candidates = state.find(_scene()).layout.site.candidates
+    candidates = session.survey_of(_scene()).layout.site.candidates
     foot = next(
         place for place, on_pole in zip(candidates.position.tolist(), candidates.on_pole, strict=True) if not on_pole
     )
@@ -169,7 +170,7 @@ def _poles_have_feet(window: Window) -> Steps:
     yield from _press(window, "seip.check_site(")
     assert any("'Cylinder' is not at the foot" in problem.text for problem in _scene().seip.site.problems)
     yield from _press(window, "seip.compute_visibility(")
-    candidates = state.find(_scene()).layout.site.candidates
+    candidates = session.survey_of(_scene()).layout.site.candidates
     names = candidates.position_name[candidates.position_of].tolist()
     heights = {z for name, z in zip(names, candidates.xyz[:, 2].tolist(), strict=True) if name == "Cylinder"}
     assert {round(z - foot[2], 3) for z in heights} == {5.0}, heights
@@ -208,11 +209,11 @@ def _exports_leave_the_window_alone(window: Window) -> Steps:
     assert gaps.longest < AT_MOST, f"the window did not answer for {gaps.longest:.1f} s"
     before = {path.name: path.read_bytes() for path in FOLDER.iterdir()}
     yield from window.click("seip.export_result(")
-    yield from window.until(lambda: state.running.work.progress.what == "rendering", 60)
-    yield from window.until(lambda: state.running.work.progress.done > 0, 60)
+    yield from window.until(lambda: session.running.work.progress.what == "rendering", 60)
+    yield from window.until(lambda: session.running.work.progress.done > 0, 60)
     yield from window.picture("export")
     bpy.ops.seip.stop()
-    yield from window.until(lambda: state.running is None, 1)
+    yield from window.until(lambda: session.running is None, 1)
     yield 2.0
     assert {path.name: path.read_bytes() for path in FOLDER.iterdir()} == before, "a stopped export left something"
 
@@ -258,7 +259,7 @@ def _save_and_open(window: Window) -> Steps:
     yield from window.press("S", ctrl=True)
     yield from window.until(lambda: file.stat().st_mtime_ns > before and not bpy.data.is_dirty, 10)
     yield from _open(window, file)
-    yield from window.until(lambda: state.running is None, 30)
+    yield from window.until(lambda: session.running is None, 30)
     yield 1.0
 
 

@@ -13,8 +13,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import bpy
-from bl_ext.user_default.seip.seip_addon import preferences, state
+from bl_ext.user_default.seip.seip_addon import preferences, scene_status
 from bl_ext.user_default.seip.seip_addon.panels import run_button
+from bl_ext.user_default.seip.seip_addon.session import SceneSurvey, session
 from driver import Steps, Window, play
 
 TIMES: list[str] = []
@@ -63,7 +64,7 @@ def _begin(window: Window) -> Steps:
 
 def _check(window: Window) -> Steps:
     yield from window.click("seip.check_site(")
-    yield from window.until(lambda: state.running is None, 60)
+    yield from window.until(lambda: session.running is None, 60)
     yield from window.find("seip.check_site(")
     yield from window.picture("2-check")
 
@@ -78,20 +79,20 @@ def _choose(window: Window) -> Steps:
 def _compute(window: Window) -> Steps:
     button = yield from window.find("seip.compute_visibility(")
     yield from window.press("LEFTMOUSE", button)
-    yield from window.until(lambda: state.running is not None, 10)
+    yield from window.until(lambda: session.running is not None, 10)
     stop = yield from _bar_moves(window, button)
     yield from window.press("LEFTMOUSE", stop)
-    yield from window.until(lambda: state.running is None, 0.5)
+    yield from window.until(lambda: session.running is None, 0.5)
     yield 0.5  # until the sidebar is drawn anew, with the button back in its place
     yield from window.press("LEFTMOUSE", button)
-    yield from window.until(lambda: state.running is not None, 10)
+    yield from window.until(lambda: session.running is not None, 10)
     bpy.ops.seip.stop()
-    yield from window.until(lambda: state.running is None, 0.5)
+    yield from window.until(lambda: session.running is None, 0.5)
     assert _known() is None or _known().grid is None, "the run that was stopped went on"
     yield from window.click("seip.estimate_visibility(")
-    yield from window.until(lambda: state.running is None and _known() and _known().estimate, 60)
+    yield from window.until(lambda: session.running is None and _known() and _known().estimate, 60)
     yield from window.click("seip.compute_visibility(")
-    yield from window.until(lambda: state.running is None and _known().grid is not None, 120)
+    yield from window.until(lambda: session.running is None and _known().grid is not None, 120)
     yield from window.find("seip.compute_visibility(")
     yield from window.picture("4-visibility")
 
@@ -102,7 +103,7 @@ def _bar_moves(window: Window, button: tuple[int, int]) -> Generator[float, None
     before = window.filled(stop)
     yield from window.until(lambda: window.filled(stop) > before + 0.02, 60)
     yield from window.until(lambda: any("left" in words for words in TIMES), 10)
-    assert state.running is not None, "the work ended before it could be stopped"
+    assert session.running is not None, "the work ended before it could be stopped"
     return stop
 
 
@@ -141,8 +142,8 @@ def _save_and_reopen(window: Window) -> Steps:
     yield from window.open_sidebar("SEIP")
     yield from window.press("NUMPAD_0")  # the camera's view
     assert _scene().seip.result.record == record
-    yield from window.until(lambda: state.running is None and _known() is not None, 30)  # compared with the scene
-    assert not state.doubt_of_placement(_scene())
+    yield from window.until(lambda: session.running is None and _known() is not None, 30)  # compared with the scene
+    assert not scene_status.stale_placement(_scene())
     yield from window.open_below("seip.follow_sensors(", "seip.rank_candidates(")
     yield from window.click("seip.rank_candidates(")
     yield from window.until(lambda: len(_scene().seip.result.ranking), 60)
@@ -153,10 +154,10 @@ def _save_and_reopen(window: Window) -> Steps:
 def _scan(window: Window) -> Steps:
     _scene().seip.traffic.file = str(TRAFFIC)  # in place of the file browser
     yield from window.click("seip.load_traffic(")
-    yield from window.until(lambda: state.running is None and "SEIP Traffic" in bpy.data.collections, 60)
+    yield from window.until(lambda: session.running is None and "SEIP Traffic" in bpy.data.collections, 60)
     _scene().frame_set(600)
     yield from window.click("seip.scan_frame(")
-    yield from window.until(lambda: state.running is None, 60)
+    yield from window.until(lambda: session.running is None, 60)
     yield 1.0
     yield from window.picture("9-scan")
 
@@ -170,8 +171,8 @@ def _scene() -> bpy.types.Scene:
     return bpy.context.window_manager.windows[0].scene
 
 
-def _known() -> state.Held | None:
-    return state.find(_scene())
+def _known() -> SceneSurvey | None:
+    return session.survey_of(_scene())
 
 
 def _empties() -> list[bpy.types.Object]:

@@ -11,6 +11,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,13 @@ def versions(**more: str) -> dict[str, str]:
     there = {name for name in LIBRARIES if importlib.util.find_spec(name)}  # HiGHS need not be
     libraries = {name: metadata.version(name) for name in LIBRARIES if name in there}
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
+
+
+@lru_cache(maxsize=8)
+def parsed_record(text: str) -> Record:
+    """Return the record of a JSON text; panels ask for it at every redraw."""
+    record: Record = json.loads(text)
+    return record
 
 
 def placement_record(site: Site, plan: Plan, run: Run) -> Record:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import bpy
 from mathutils import Vector
 
-from . import state
 from .scene import contract
+from .session import session
 
 
 def sensor_empties(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
@@ -31,7 +31,7 @@ def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -
 
 def show_candidate(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """Put the 3D cursor at the candidate that was clicked on in the ranking."""
-    known = state.find(context.scene)
+    known = session.survey_of(context.scene)
     pose = result.ranking[result.active_ranked].pose
     if known is not None and pose < len(known.layout.site.candidates):
         context.scene.cursor.location = Vector(known.layout.site.candidates.xyz[pose])
@@ -40,7 +40,7 @@ def show_candidate(result: bpy.types.PropertyGroup, context: bpy.types.Context) 
 def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:
     """Yield the names of positions that hold a text: those that were laid out, or else the poles."""
     scene = context.scene
-    known = state.find(scene)
+    known = session.survey_of(scene)
     if known is not None:
         names = known.layout.site.candidates.position_name.tolist()
     else:

@@ -9,9 +9,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import state
 from .core.arrays import Float
 from .core.errors import SeipError
+from .core.results.placement_record import parsed_record
 from .core.workflows.by_hand import BY_HAND, recorded_orientation
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of
@@ -21,7 +21,7 @@ SAME_PLACE = 1e-5
 
 
 @dataclass(frozen=True)
-class Changes:
+class SensorEdits:
     """How the sensors in a scene differ from those of its placement, by their labels.
 
     Parameters
@@ -38,27 +38,26 @@ class Changes:
         """Whether there are any."""
         return bool(self.moved or self.gone or self.added)
 
-    @property
-    def in_words(self) -> str:
-        """What was done, in a sentence; empty where nothing was."""
+    def describe(self) -> str:
+        """Return what was done, in a sentence; empty where nothing was."""
         done = (("moved", self.moved), ("deleted", self.gone), ("added", self.added))
         parts = [f"{', '.join(labels)} {what}" for what, labels in done if labels]
         return f"By hand: {'; '.join(parts)}." if parts else ""
 
 
-def changes(scene: bpy.types.Scene) -> Changes:
+def sensor_edits(scene: bpy.types.Scene) -> SensorEdits:
     """Compare the sensors in a scene, hidden or not, with its placement."""
     text = scene.seip.result.record
-    placed = {line["id"]: line for line in state.record_of(text)["sensors"]} if text else {}
+    placed = {line["id"]: line for line in parsed_record(text)["sensors"]} if text else {}
     there = labelled_sensors(scene, hidden=True)
-    return Changes(
+    return SensorEdits(
         tuple(label for label, thing in there.items() if label in placed and not _is_there(thing, placed[label])),
         tuple(label for label in placed if label not in there),
         tuple(label for label in there if label not in placed),
     )
 
 
-def places(scene: bpy.types.Scene) -> dict[str, str]:
+def position_names(scene: bpy.types.Scene) -> dict[str, str]:
     """Return names for where the scene's sensors hang, by their labels, for those at no candidate pose."""
     named = {
         label: str(thing.get(contract.POSITION, "")) for label, thing in labelled_sensors(scene, hidden=True).items()

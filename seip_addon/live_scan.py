@@ -1,0 +1,94 @@
+"""Live scans: the last frame of each scene, shown as a point cloud and scanned again as the timeline moves."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+import numpy as np
+
+from .core.arrays import Float
+from .core.scans import Simulation
+from .core.scans.run_folder import Run
+from .core.traffic import Trajectories
+from .core.traffic.source import TrafficFiles
+from .core.workflows.recording import frame_number
+from .session import LastScan, session
+from .viewport import layers
+from .viewport.point_cloud import NAME, cloud_overlay
+
+
+def known_traffic(scene: bpy.types.Scene, files: TrafficFiles, origin: Float) -> Trajectories | None:
+    """Return the traffic of files that were read before and are still the same, None otherwise."""
+    own = session.traffic.get(scene.session_uid)
+    if own is None or (own.files, own.changed) != (files, changes(files)):
+        return None
+    return own.trajectories if np.array_equal(own.trajectories.origin, origin) else None
+
+
+def changes(files: TrafficFiles) -> tuple[float, ...]:
+    """Return when each of the files was last written; 0 for one that is not there."""
+    paths = (files.path, *files.routes, *([files.net] if files.net else []))
+    return tuple(path.stat().st_mtime if path.is_file() else 0.0 for path in paths)
+
+
+def now(scene: bpy.types.Scene) -> float:
+    """Return the time of a scene's current frame in seconds: 0 at frame 0."""
+    return float(scene.frame_current_final * scene.render.fps_base / scene.render.fps)
+
+
+def measure(run: Run, simulation: Simulation, at: float) -> LastScan:
+    """Scan at a time in seconds."""
+    began = time.perf_counter()
+    frame = simulation.frame(*frame_number(run, at))
+    return LastScan(run, simulation, frame, time.perf_counter() - began)
+
+
+def keep(scene: bpy.types.Scene, scan: LastScan) -> None:
+    """Keep a scan and show its points."""
+    session.scans[scene.session_uid] = scan
+    keep_following()  # a file may have been saved while it followed
+    show_cloud(scene)
+
+
+def show_cloud(scene: bpy.types.Scene) -> None:
+    """Show the points of a scene's last scan, in the colours that its panel asks for."""
+    scan = session.scan_of(scene)
+    if scan is not None:
+        layers.show(scene, NAME, cloud_overlay(scan.frame, scan.run.sensors, scene.seip.view.cloud_colour))
+
+
+def hide_cloud(scene: bpy.types.Scene) -> None:
+    """Let go of a scene's scan."""
+    session.scans.pop(scene.session_uid, None)
+    layers.hide(scene, NAME)
+
+
+def keep_following() -> None:
+    """Have a handler of frame changes while a scene follows its timeline."""
+    handlers = bpy.app.handlers.frame_change_post
+    wanted = any(scene.seip.traffic.follow for scene in bpy.data.scenes)
+    if wanted and _frame_changed not in handlers:
+        handlers.append(_frame_changed)
+    if not wanted:
+        _unfollow()
+
+
+def _unfollow() -> None:
+    if _frame_changed in bpy.app.handlers.frame_change_post:
+        bpy.app.handlers.frame_change_post.remove(_frame_changed)
+
+
+def _frame_changed(scene: bpy.types.Scene, *_: object) -> None:
+    scan = session.scan_of(scene)
+    busy = session.running is not None or bpy.app.is_job_running("RENDER")
+    if scan is not None and scene.seip.traffic.follow and not busy:
+        keep(scene, measure(scan.run, scan.simulation, now(scene)))
+
+
+CLASSES: tuple[type, ...] = ()
+
+
+def forget() -> None:
+    """Follow no timeline: another file is opened, or the add-on is disabled."""
+    _unfollow()

@@ -1,0 +1,99 @@
+"""Status of a scene: what keeps it from being surveyed, and whether what is known of it is stale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+
+from .core.errors import SeipError
+from .core.results.placement_record import Record, parsed_record
+from .core.workflows.survey import SurveySettings
+from .scene import contract
+from .session import SceneSurvey, session
+
+FILE_VERSION = 1
+"""Of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
+
+NEWER = "This file was saved by a newer version of SEIP: install that version to go on."
+LINKED = "This scene is linked from another file: open that file to work on it."
+NOT_COMPARED = "Not compared with the scene since the file was opened."
+ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
+OLD_CHECK = "Checked before the file was opened: check again."
+
+
+def is_linked(scene: bpy.types.Scene) -> bool:
+    """Return whether a scene belongs to another file: nothing can be written into it."""
+    return scene.library is not None
+
+
+def is_newer(scene: bpy.types.Scene) -> bool:
+    """Return whether a newer add-on saved the scene: nobody here knows what its record looks like."""
+    return bool(scene.seip.version > FILE_VERSION)
+
+
+def obstacle(scene: bpy.types.Scene) -> str:
+    """Return why nothing can be computed for a scene, in a sentence for panels and buttons alike; empty if it can."""
+    if is_linked(scene):
+        return LINKED
+    if is_newer(scene):
+        return NEWER
+    for name, what in ((contract.REGION, "region"), (contract.ROADS, "road")):
+        if not contract.has_members(scene, name):
+            return f"There is no {what}: put a mesh into the collection {name!r}."
+    return ""
+
+
+def stale_survey(scene: bpy.types.Scene) -> str:
+    """Return why the survey of a scene is not of the scene as it is, in a sentence; empty if it is."""
+    survey = session.survey_of(scene)
+    if survey is None:
+        return ""
+    if survey.watch.changed:
+        return "The scene has changed since it was computed."
+    try:
+        same = same_grid(scene.seip.survey.settings(), survey.layout.settings)
+    except SeipError as error:
+        return str(error)
+    return "" if same else "The settings have changed since it was computed."
+
+
+def stale_placement(scene: bpy.types.Scene) -> str:
+    """Return why the scene's placement is not of the scene as it is, in a sentence; empty if it is."""
+    survey = session.survey_of(scene)
+    if survey is None:
+        return NOT_COMPARED
+    return stale_survey(scene) or ("" if is_of(parsed_record(scene.seip.result.record), survey) else ANOTHER_SITE)
+
+
+def stale_check(scene: bpy.types.Scene) -> str:
+    """Return why the scene's check is not of the scene as it is, in a sentence; empty if it is."""
+    check = session.checks.get(scene.session_uid)
+    if check is None:
+        return OLD_CHECK
+    if check.watch.changed:
+        return "The scene has changed since the check."
+    return "" if check.settings == checked_settings(scene) else "The settings have changed since the check."
+
+
+def checked_settings(scene: bpy.types.Scene) -> SurveySettings | str:
+    """Return the settings that a check of a scene tells of, or what is wrong with them."""
+    try:
+        return _without_search(scene.seip.survey.settings())
+    except SeipError as error:
+        return str(error)
+
+
+def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
+    """Return whether settings differ in how a placement is searched at most."""
+    return _without_search(one) == _without_search(other)
+
+
+def is_of(record: Record, survey: SceneSurvey) -> bool:
+    """Return whether a record's placement was made on a survey; an older record holds fewer digests."""
+    return all(survey.inputs.get(name) == key for name, key in record["inputs"].items())
+
+
+def _without_search(settings: SurveySettings) -> SurveySettings:
+    default = SurveySettings()
+    return replace(settings, solver=default.solver, time_limit=default.time_limit, effort=default.effort)

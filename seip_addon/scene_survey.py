@@ -1,0 +1,181 @@
+"""Surveys of scenes: the work that reads a scene, lays it out, and finds its visibility and placement.
+
+Each function returns work for a thread: it touches neither Blender's data nor
+the session, and returns a `SceneSurvey` that its operator keeps.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+
+from . import preferences
+from .core.errors import SeipError
+from .core.placement.goal import MOVED
+from .core.progress import Progress
+from .core.results.placement_record import Record, parsed_record
+from .core.visibility.grid import VisibilityGrid
+from .core.workflows.by_hand import restored_by_hand
+from .core.workflows.survey import SurveySettings, inputs_of, lay_out, restored_plan, see
+from .scene.changes import Watch, on_update, watch
+from .scene.read import SceneReading, read_scene
+from .scene_status import FILE_VERSION, is_of, obstacle, same_grid
+from .session import Resources, SceneSurvey, session
+
+SOON = 0.2
+"""Seconds from the opening of a file to the work on it."""
+
+
+def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    """Return the work that lays out a scene as its panel asks; the scene is read at once, if it must be read at all.
+
+    Raises
+    ------
+    SeipError
+        The scene lacks something, or the panel asks for what makes no sense.
+    """
+    settings = scene.seip.survey.settings()
+    settings.models()  # refuses before the scene is read
+    catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
+    resources = Resources(preferences.cache_folder(), preferences.cores())
+    known = session.survey_of(scene)
+    if known is not None and not known.watch.look(scene) and known.catalogues == catalogues:
+        if same_grid(settings, known.layout.settings):
+            layout = replace(known.layout, settings=settings)
+            return _nothing_to_do(replace(known, layout=layout, resources=resources))
+        reading = SceneReading(known.layout.geometry, known.warnings)
+        return _laid_out(reading, settings, known.watch, resources, catalogues)
+    began = time.perf_counter()
+    watching = watch(scene)
+    reading = read_scene(scene)
+    return _laid_out(reading, settings, watching, resources, catalogues, time.perf_counter() - began)
+
+
+def with_visibility(known: SceneSurvey) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
+    """Compute the visibility grid of a survey, or take it from the cache; return the survey with it, and it alone."""
+    if known.grid is not None:
+        return known, known.grid
+    began = time.perf_counter()
+    known.resources.check()
+    file = known.resources.grid_file(known.inputs["visibility"])
+    grid = yield from see(known.layout, file, threads=known.resources.cores)
+    return replace(known, grid=grid, durations=known.timed("visibility", began)), grid
+
+
+def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    """Return the work that finds all about a scene's placement again, from what the file and the cache keep.
+
+    Raises
+    ------
+    SeipError
+        There is no placement. When the work runs: the scene or its settings are not what they were, or the cache is
+        empty.
+    """
+    text = scene.seip.result.record
+    if not text:
+        raise SeipError("there is no placement yet: place sensors first")
+    return _restored(survey(scene), text)
+
+
+def with_grid_of_placement(scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
+    """Return the work that finds again what a scene's placement was chosen from; raises as `with_placement` does."""
+    return _grid_again(survey(scene), parsed_record(scene.seip.result.record))
+
+
+def _nothing_to_do(known: SceneSurvey) -> Generator[Progress, None, SceneSurvey]:
+    yield from ()
+    return known
+
+
+def _laid_out(
+    reading: SceneReading,
+    settings: SurveySettings,
+    watching: Watch,
+    resources: Resources,
+    catalogues: tuple[tuple[Path, int], ...],
+    seconds: float = 0.0,
+) -> Generator[Progress, None, SceneSurvey]:
+    yield Progress(0, 0, "laying out the site")
+    began = time.perf_counter()
+    layout = lay_out(reading.geometry, settings, reading.warnings)
+    durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
+    return SceneSurvey(
+        layout, inputs_of(layout), watching, resources, catalogues, reading.warnings, durations=durations
+    )
+
+
+def _grid_again(
+    surveying: Generator[Progress, None, SceneSurvey], record: Record
+) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
+    known = yield from surveying
+    if not is_of(record, known):
+        raise SeipError("the scene or its settings have changed since the placement: place again")
+    if known.grid is None and not known.resources.grid_file(known.inputs["visibility"]).exists():
+        raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
+    return (yield from with_visibility(known))
+
+
+def _restored(surveying: Generator[Progress, None, SceneSurvey], text: str) -> Generator[Progress, None, SceneSurvey]:
+    record = parsed_record(text)
+    known, grid = yield from _grid_again(surveying, record)
+    if known.record == text and known.plan is not None:
+        return known
+    if record["objective"]["status"] == MOVED:
+        plan = yield from restored_by_hand(known.layout, grid, record)
+    else:
+        plan = restored_plan(known.layout, grid, record)
+    return replace(known, plan=plan, record=text)
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _after_load(*_: object) -> None:
+    """Compare the placement of the file with its scene, soon: Blender is not ready for work yet."""
+    if not bpy.app.background and not bpy.app.timers.is_registered(_compare):
+        bpy.app.timers.register(_compare, first_interval=SOON)
+
+
+def _compare() -> None:
+    """Compare each window's scene with its placement, one: there is one piece of work at a time."""
+    for window in bpy.context.window_manager.windows:
+        scene = window.scene
+        unknown = session.survey_of(scene) is None and scene.seip.result.record
+        if session.running is None and unknown and not obstacle(scene):
+            with (
+                bpy.context.temp_override(window=window),
+                suppress(RuntimeError),
+            ):  # the panel says that it is not known
+                bpy.ops.seip.compare_scene("INVOKE_DEFAULT")
+            return
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _before_save(*_: object) -> None:
+    """Say in the file by which layout its properties are to be read: Blender saves no defaults."""
+    for scene in bpy.data.scenes:
+        if scene.library is None and scene.seip.version <= FILE_VERSION and scene.is_property_set("seip"):
+            scene.seip.version = FILE_VERSION
+
+
+HANDLERS = (("load_post", _after_load), ("save_pre", _before_save), ("depsgraph_update_post", on_update))
+
+CLASSES: tuple[type, ...] = ()
+
+
+def attach() -> None:
+    """Watch scenes, and compare a placement with its scene whenever a file is opened."""
+    for event, handler in HANDLERS:
+        getattr(bpy.app.handlers, event).append(handler)
+    _after_load()
+
+
+def detach() -> None:
+    """Watch no longer."""
+    for event, handler in HANDLERS:
+        getattr(bpy.app.handlers, event).remove(handler)
+    if bpy.app.timers.is_registered(_compare):
+        bpy.app.timers.unregister(_compare)

@@ -1,0 +1,305 @@
+"""Session: all that the add-on keeps in memory of the open file, in one object.
+
+None of it is needed to go on: the file keeps what was asked and found, and the
+cache keeps visibility. Scenes are named by their session number, as undo and
+redo put another Python object in place of each.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from .background import Background
+from .core.arrays import Boolean
+from .core.errors import SeipError
+from .core.lidar import LidarModel
+from .core.placement.goal import Plan
+from .core.scans import Frame, MountedSensor, Simulation
+from .core.scans.run_folder import Run
+from .core.storage.files import check_folder
+from .core.traffic import Trajectories
+from .core.traffic.source import TrafficFiles
+from .core.visibility.estimate import Estimate
+from .core.visibility.grid import VisibilityGrid
+from .core.visibility.rotated_sensors import Onlooker
+from .core.workflows.survey import Layout, SurveySettings
+from .scene.changes import Watch
+from .viewport.overlay import Overlay
+
+
+@dataclass(frozen=True)
+class Resources:
+    """What the preferences give to work, which must not ask Blender itself once it is in a thread.
+
+    Parameters
+    ----------
+    cache : Path
+        Folder in which visibility is kept.
+    cores : int or None
+        Threads that may compute it, or None where nobody has said.
+    """
+
+    cache: Path
+    cores: int | None
+
+    def grid_file(self, key: str) -> Path:
+        """Return where the cache keeps a visibility grid."""
+        return self.cache / f"{key[:32]}.npz"
+
+    def check(self) -> None:
+        """See that visibility can be kept, and say where the folder is set if it cannot.
+
+        Raises
+        ------
+        SeipError
+            The folder cannot be written.
+        """
+        try:
+            check_folder(self.cache)
+        except SeipError as error:
+            raise SeipError(f"{error} as Cache in the add-on's preferences") from error
+
+
+@dataclass(frozen=True)
+class SceneSurvey:
+    """What is known of a scene: its layout, and, once they were computed, its visibility grid and its placement.
+
+    Parameters
+    ----------
+    layout : Layout
+        As the scene was when it was last read.
+    inputs : mapping of str to str
+        Digests of what a placement on that layout follows from; see `inputs_of`.
+    watch : Watch
+        Whether the scene has changed since.
+    resources : Resources
+        As the preferences were when this was asked for last.
+    catalogues : tuple
+        The user's catalogue files and when each was last written.
+    warnings : tuple of str
+        Of the scene's reading.
+    grid : VisibilityGrid or None
+        Of that layout.
+    estimate : Estimate or None
+        Of what the grid will take.
+    plan : Plan or None
+        Of that grid: the one that the scene's result tells of.
+    record : str
+        The result that the plan was taken from.
+    durations : mapping of str to float, seconds
+        How long each step took.
+    """
+
+    layout: Layout
+    inputs: Mapping[str, str]
+    watch: Watch
+    resources: Resources
+    catalogues: tuple[tuple[Path, int], ...]
+    warnings: tuple[str, ...] = ()
+    grid: VisibilityGrid | None = None
+    estimate: Estimate | None = None
+    plan: Plan | None = None
+    record: str = ""
+    durations: Mapping[str, float] = field(default_factory=dict)
+
+    def timed(self, step: str, began: float) -> dict[str, float]:
+        """Return the durations with that of a step that began at a reading of `time.perf_counter`."""
+        return {**self.durations, step: time.perf_counter() - began}
+
+
+@dataclass(frozen=True)
+class CheckedScene:
+    """What a check of a site was made on.
+
+    Parameters
+    ----------
+    watch : Watch
+        Whether the scene has changed since.
+    settings : SurveySettings or str
+        See `scene_status.checked_settings`.
+    """
+
+    watch: Watch
+    settings: SurveySettings | str
+
+
+@dataclass
+class RunningWork:
+    """Work that is under way.
+
+    Parameters
+    ----------
+    operator : str
+        Its ``bl_idname``.
+    began : float
+        Reading of `time.monotonic`.
+    timer : bpy.types.Timer or None
+        Has somebody look at it from time to time.
+    stop : bool
+        Whether somebody asked to stop it.
+    """
+
+    operator: str
+    work: Background[Any]
+    began: float = field(default_factory=time.monotonic)
+    timer: bpy.types.Timer | None = None
+    stop: bool = False
+
+
+@dataclass
+class FollowedSensors:
+    """Sensors whose coverage is computed again whenever they are moved.
+
+    Parameters
+    ----------
+    scene : int
+        The scene's session number.
+    onlooker : Onlooker
+        Of its site.
+    sensors : dict of str to (MountedSensor, (t,) bool)
+        Where each was when it was looked from last, and what it saw.
+    coverage : float
+        Share of the targets that some sensor sees.
+    moved : tuple of str
+        Labels of those that are not where the placement put them.
+    seconds : float
+        How long the last update took.
+    problem : str
+        Why nothing is followed at the moment.
+    """
+
+    scene: int
+    survey: SceneSurvey
+    onlooker: Onlooker
+    sensors: dict[str, tuple[MountedSensor, Boolean]] = field(default_factory=dict)
+    coverage: float = 0.0
+    moved: tuple[str, ...] = ()
+    seconds: float = 0.0
+    problem: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneTraffic:
+    """Traffic that was read from files.
+
+    Parameters
+    ----------
+    changed : tuple of float
+        When each of the files was written, as its system says.
+    trajectories : Trajectories
+        In the scene's axes.
+    """
+
+    files: TrafficFiles
+    changed: tuple[float, ...]
+    trajectories: Trajectories
+
+
+@dataclass
+class LastScan:
+    """Sensors that are ready to scan, and what they measured last.
+
+    Parameters
+    ----------
+    run : Run
+        What the scans follow from.
+    seconds : float
+        That the scan took.
+    facts : tuple of str
+        What came of it, one sentence each.
+    """
+
+    run: Run
+    simulation: Simulation
+    frame: Frame
+    seconds: float
+    facts: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        counts = np.bincount(self.frame.sensor, minlength=len(self.run.sensors)).tolist()
+        users = self.frame.labels.points.sum(axis=1)
+        lines = [f"{sensor.label}: {count:,} points" for sensor, count in zip(self.run.sensors, counts, strict=True)]
+        lines.append(f"{np.count_nonzero(users)} of {len(users)} road users seen")
+        lines.append(f"{self.frame.time:.2f} s, scanned in {1e3 * self.seconds:.0f} ms")
+        self.facts = tuple(lines)
+
+
+@dataclass
+class Session:
+    """All that the add-on keeps in memory; by scene, under the scene's session number.
+
+    Parameters
+    ----------
+    surveys, checks, traffic, scans : dict
+        Of each scene.
+    overlays : dict of int to dict of str to Overlay
+        What is drawn in the views of each scene, by name.
+    sensor_types : dict of str to LidarModel
+        By catalogue key: the shipped types and those of the user's own files.
+    catalogue_error : str
+        What is wrong with one of the user's catalogues; empty where nothing is.
+    running : RunningWork or None
+        There is one piece of work at a time.
+    following : FollowedSensors or None
+        One scene is followed at a time.
+    """
+
+    surveys: dict[int, SceneSurvey] = field(default_factory=dict)
+    checks: dict[int, CheckedScene] = field(default_factory=dict)
+    traffic: dict[int, SceneTraffic] = field(default_factory=dict)
+    scans: dict[int, LastScan] = field(default_factory=dict)
+    overlays: dict[int, dict[str, Overlay]] = field(default_factory=dict)
+    sensor_types: dict[str, LidarModel] = field(default_factory=dict)
+    catalogue_error: str = ""
+    running: RunningWork | None = None
+    following: FollowedSensors | None = None
+
+    def survey_of(self, scene: bpy.types.Scene) -> SceneSurvey | None:
+        """Return what is known of a scene, or None."""
+        return self.surveys.get(scene.session_uid)
+
+    def keep_survey(self, scene: bpy.types.Scene, survey: SceneSurvey) -> None:
+        """Keep what work has found of a scene, in place of what was known: for the main thread, once it has ended."""
+        self.surveys[scene.session_uid] = survey
+
+    def scan_of(self, scene: bpy.types.Scene) -> LastScan | None:
+        """Return the last scan of a scene, None where there is none."""
+        return self.scans.get(scene.session_uid)
+
+
+session = Session()
+"""There is one Blender, and one file open in it."""
+
+
+def scene_of(number: int) -> bpy.types.Scene:
+    """Return the scene with a session number.
+
+    Raises
+    ------
+    SeipError
+        It was deleted.
+    """
+    for scene in bpy.data.scenes:
+        if scene.session_uid == number:
+            return scene
+    raise SeipError("the scene that this was computed for is gone: nothing was written")
+
+
+CLASSES: tuple[type, ...] = ()
+
+
+def forget() -> None:
+    """Let go of what is known of the open file, and have work that is under way end."""
+    for kept in (session.surveys, session.checks, session.traffic, session.scans):
+        kept.clear()
+    if session.running is not None:
+        session.running.stop = True
+        session.running.work.stop()
+        session.running = None

@@ -1,0 +1,72 @@
+"""Overlays: points, lines and faces drawn over a viewport, with the legend that explains them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .legend import Block, Colour
+
+Kind = Literal["POINTS", "LINES", "TRIS"]
+
+POINT_SIZE = 2.0
+"""Pixels, at the interface's usual scale."""
+
+
+@dataclass
+class Layer:
+    """Primitives of one kind.
+
+    Parameters
+    ----------
+    kind : {"POINTS", "LINES", "TRIS"}
+    positions : (n, 3) float32, metres
+        One, two or three for each.
+    colours : (n, 4) float32, or one colour for all
+        sRGB and opacity.
+    """
+
+    kind: Kind
+    positions: NDArray[np.float32]
+    colours: NDArray[np.float32] | Colour
+    _batch: Any = field(default=None, repr=False)
+
+    def draw(self, scale: float) -> None:
+        """Draw it into the framebuffer that is bound."""
+        import gpu  # noqa: PLC0415  # is not there in the background
+        from gpu_extras.batch import batch_for_shader  # noqa: PLC0415  # as above
+
+        single = isinstance(self.colours, tuple)
+        prefix = "POINT_" if self.kind == "POINTS" else ""
+        shader = gpu.shader.from_builtin(f"{prefix}{'UNIFORM' if single else 'FLAT'}_COLOR")
+        if self._batch is None:
+            content = {"pos": self.positions} if single else {"pos": self.positions, "color": self.colours}
+            self._batch = batch_for_shader(shader, self.kind, content)
+        shader.bind()
+        if single:
+            shader.uniform_float("color", self.colours)
+        if self.kind == "POINTS":
+            shader.uniform_float("size", POINT_SIZE * scale)
+        self._batch.draw(shader)
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Layers that mean something together.
+
+    Parameters
+    ----------
+    legend : callable
+        From the scene to the block that explains the layers; called as the view is drawn, so it only reads.
+    about : str
+        What the panel calls it: a sensor's label.
+    """
+
+    layers: Sequence[Layer]
+    legend: Callable[[bpy.types.Scene], Block | None]
+    about: str = ""
