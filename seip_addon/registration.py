@@ -9,7 +9,13 @@ import bpy
 
 PARTS = (
     "preferences",
-    "properties",
+    "properties.site",
+    "properties.survey",
+    "properties.placement",
+    "properties.results",
+    "properties.view",
+    "properties.traffic",
+    "properties.scene",
     "session",
     "scene_survey",
     "sensor_types",

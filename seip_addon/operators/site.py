@@ -20,7 +20,7 @@ from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX, d
 from ..core.streetscape.model import SiteModel, site_model
 from ..core.streetscape.parts import Role
 from ..core.workflows.survey import SurveySettings, lay_out
-from ..properties import ROLE_ITEMS, SEIP_PG_site
+from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene
 from ..scene.changes import watch

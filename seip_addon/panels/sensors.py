@@ -14,7 +14,7 @@ from ..operators.sensors import (
     SEIP_OT_list_sensor_types,
     SEIP_OT_preview_beams,
 )
-from ..properties import SEIP_PG_sensor_type, SEIP_PG_survey
+from ..properties.survey import SEIP_PG_sensor_type, SEIP_PG_survey
 from ..session import session
 from ..viewport import beam_preview
 from .sentence import draw_sentence

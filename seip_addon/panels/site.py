@@ -18,7 +18,7 @@ from ..operators.site import (
     missing_for_build,
     why_no_role,
 )
-from ..properties import SEIP_PG_problem, SEIP_PG_site
+from ..properties.site import SEIP_PG_problem, SEIP_PG_site
 from ..scene import roles
 from .run_button import draw_run
 from .sentence import draw_sentence

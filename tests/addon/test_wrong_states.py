@@ -130,7 +130,7 @@ def test_work_under_way_ends_with_the_add_on(add_on):
 def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
 
     def broken(name, package=None):
-        if name == ".properties":
+        if name == ".properties.site":
             raise ImportError("libgeos.so: cannot open shared object file", name="shapely.lib")
         return come(name, package)
 

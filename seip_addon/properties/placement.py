@@ -1,0 +1,157 @@
+"""Properties of the placement: what is asked of it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from .. import selection
+from ..core.placement.goal import DEFAULT_COUNT, Goal
+from ..core.robustness.pose_errors import STEEPEST, WIDEST, PoseErrors
+from ..core.robustness.risk import Risk
+from ..core.workflows.robust import Precaution
+from .conversion import as_typed
+
+TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
+"""Share of the scenarios, the worst ones, that count, by objective."""
+
+
+class SEIP_PG_position_rule(bpy.types.PropertyGroup):
+    """A position with a demand of its own; its name is the position's."""
+
+    rule: EnumProperty(
+        name="Rule",
+        description="What must be at this position",
+        items=(("MANDATORY", "Sensor", "There must be a sensor"), ("FORBIDDEN", "No sensor", "There must be none")),
+    )
+
+
+class SEIP_PG_goal(bpy.types.PropertyGroup):
+    """What is asked of a placement."""
+
+    limit: EnumProperty(
+        name="Goal",
+        description="What limits the placement",
+        items=(
+            ("COUNT", "Number", "The most coverage for a number of sensors"),
+            ("BUDGET", "Budget", "The most coverage for a sum of money"),
+            ("COVERAGE", "Coverage", "A coverage for the least money"),
+        ),
+    )
+    count: IntProperty(name="Sensors", description="Largest number of sensors", default=DEFAULT_COUNT, min=1)
+    budget: FloatProperty(
+        name="Budget ($)", description="Largest total price in US dollars", default=50000.0, min=0.0, step=100000
+    )
+    coverage: FloatProperty(
+        name="Coverage",
+        description="Share of the targets to be seen, in per cent",
+        subtype="PERCENTAGE",
+        default=90.0,
+        min=0.1,
+        max=100.0,
+    )
+    weighting: EnumProperty(
+        name="Weights",
+        description="How targets in weighted regions count",
+        items=(
+            ("NONE", "All Alike", "Every target counts the same"),
+            ("SCENE", "By Region", "Each region's own weight counts"),
+            ("VALUE", "One Value", "One weight for all weighted regions"),
+        ),
+    )
+    central_weight: FloatProperty(
+        name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
+    )
+    min_distance: FloatProperty(
+        name="Least Distance", description="Between two sensors", unit="LENGTH", default=0.0, min=0.0
+    )
+    objective: EnumProperty(
+        name="Place for",
+        description="Whether the placement trusts the map, or is chosen for what may go wrong",
+        items=(
+            ("PLANNED", "Poses as Planned", "The coverage of sensors that hang just where they should"),
+            ("EXPECTED", "The Average", "Coverage on average over poses that err"),
+            ("CVAR", "The Worst Quarter", "Coverage on average over the worst quarter of poses that err"),
+            ("WORST", "The Worst Case", "Coverage in the worst of the poses that were tried"),
+        ),
+    )
+    position_error: FloatProperty(
+        name="Position Error",
+        description="Standard deviation of x, of y and of the height",
+        unit="LENGTH",
+        default=PoseErrors().position,
+        min=0.0,
+        max=WIDEST,
+    )
+    tilt_error: FloatProperty(
+        name="Tilt Error",
+        description="Standard deviation of yaw, of pitch and of roll",
+        subtype="ANGLE",
+        default=PoseErrors().tilt,
+        min=0.0,
+        max=STEEPEST,
+    )
+    seen_by: IntProperty(name="Seen by", description="Sensors that must see a target", default=1, min=1, max=8)
+    failure: EnumProperty(
+        name="A Sensor Fails",
+        description="Whether coverage is counted after one of the sensors has failed",
+        items=(
+            ("none", "None", "All of them work"),
+            ("worst", "The Most Important", "The one that is missed most has failed"),
+            ("mean", "Any", "On average over all of them"),
+        ),
+    )
+    pose_errors: BoolProperty(
+        name="Try Pose Errors",
+        description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",
+        default=False,
+    )
+    rules: CollectionProperty(type=SEIP_PG_position_rule)
+    active_rule: IntProperty(name="Position")
+    position: StringProperty(
+        name="Position",
+        description="Name of a position, as laid out: type to search",
+        search=selection.search_positions,
+    )
+
+    def goal(self) -> Goal:
+        """Return what is asked, as the core takes it.
+
+        Raises
+        ------
+        SeipError
+            It contradicts itself.
+        """
+        return Goal(
+            count=self.count if self.limit == "COUNT" else None,
+            budget=as_typed(self.budget) if self.limit == "BUDGET" else None,
+            coverage=as_typed(self.coverage) / 100 if self.limit == "COVERAGE" else None,
+            central_weight=self._weight(),
+            min_distance=as_typed(self.min_distance),
+            forbidden=tuple(one.name for one in self.rules if one.rule == "FORBIDDEN"),
+            mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
+        )
+
+    def precaution(self) -> Precaution | None:
+        """Return what the placement is to stand, None where it trusts the map.
+
+        Raises
+        ------
+        SeipError
+            It makes no sense.
+        """
+        if self.objective == "PLANNED":
+            return None
+        position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
+        risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
+        return Precaution(risk, PoseErrors(position, position, tilt, tilt))
+
+    def _weight(self) -> float | Literal["scene"] | None:
+        if self.weighting == "SCENE":
+            return "scene"
+        return as_typed(self.central_weight) if self.weighting == "VALUE" else None
+
+
+CLASSES = (SEIP_PG_position_rule, SEIP_PG_goal)

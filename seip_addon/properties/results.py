@@ -1,0 +1,65 @@
+"""Properties of the results: placements, and what is looked at of them."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from .. import selection
+
+
+class SEIP_PG_chosen(bpy.types.PropertyGroup):
+    """A sensor of the placement; its name is its label."""
+
+
+class SEIP_PG_ranked(bpy.types.PropertyGroup):
+    """A candidate pose in a ranking; its name says where it is."""
+
+    pose: IntProperty(name="Pose", description="Number of the candidate pose")
+    share: FloatProperty(name="Share", description="Of the targets' weight that it sees, or adds", subtype="FACTOR")
+
+
+class SEIP_PG_placement(bpy.types.PropertyGroup):
+    """A placement: enough to find all about it again from the scene and the visibility kept in the cache."""
+
+    record: StringProperty(name="Record", description="The placement as placement.json holds it")
+    targets: StringProperty(name="Targets", description="Digest of the targets that it was made on")
+    seen: StringProperty(name="Seen", description="By how many sensors each target is seen, packed")
+
+
+class SEIP_PG_result(SEIP_PG_placement):
+    """The placement that stands in the scene, and what is looked at of it."""
+
+    sensors: CollectionProperty(type=SEIP_PG_chosen)
+    active_sensor: IntProperty(
+        name="Sensor",
+        description="Click to select the sensor in the scene",
+        update=selection.select_sensor,
+    )
+    order: EnumProperty(
+        name="Order",
+        description="By what candidates are ranked",
+        items=(
+            ("ADDED", "Added", "What a pose would add to the placement, at positions that are free"),
+            ("ALONE", "Alone", "What a pose sees by itself"),
+        ),
+    )
+    ranking: CollectionProperty(type=SEIP_PG_ranked)
+    active_ranked: IntProperty(
+        name="Candidate",
+        description="Click to put the 3D cursor at the candidate",
+        update=selection.show_candidate,
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Where the result is written; // is the folder of the .blend",
+        subtype="DIR_PATH",
+        default="//seip-result/",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    render: BoolProperty(
+        name="Rendered View", description="Render a view of the scene as well, which takes a minute", default=False
+    )
+
+
+CLASSES = (SEIP_PG_chosen, SEIP_PG_ranked, SEIP_PG_placement, SEIP_PG_result)

@@ -1,0 +1,155 @@
+"""Properties of the site: where it comes from, what its check found, and what its objects mean."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..core.site.scene_geometry import DEFAULT_WEIGHT
+from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
+from ..scene import contract, roles
+from .conversion import as_typed
+
+
+class SEIP_PG_junction(bpy.types.PropertyGroup):
+    """A junction of the chosen map; its name is what the list shows."""
+
+    id: StringProperty(name="Id", description="Of the junction, as in the map")
+
+
+class SEIP_PG_count(bpy.types.PropertyGroup):
+    """Something that the check counted; its name is what."""
+
+    value: StringProperty(name="Count", description="How much there is")
+
+
+class SEIP_PG_problem(bpy.types.PropertyGroup):
+    """Something that the check found; its name is the object to look at, or empty."""
+
+    is_error: BoolProperty(name="Error", description="Whether a survey cannot go on")
+    text: StringProperty(name="Problem", description="What is wrong, and the cure")
+
+
+def _show_problem(site: SEIP_PG_site, context: bpy.types.Context) -> None:
+    """Select what was clicked at, and frame it; a problem of the scene has nothing to show."""
+    if site.problems[site.active_problem].name and context.area is not None and bpy.ops.seip.show_problem.poll():
+        bpy.ops.seip.show_problem()
+
+
+ROLE_ITEMS = tuple((role.name, role.value.capitalize(), f"{roles.WORDS[role].capitalize()}") for role in roles.ROLES)
+
+
+class SEIP_PG_site(bpy.types.PropertyGroup):
+    """Where the site comes from, and what the check found in it."""
+
+    source: StringProperty(
+        name="Map",
+        description="OpenDRIVE map, or site description that names one",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    junctions: CollectionProperty(type=SEIP_PG_junction)
+    junction: StringProperty(
+        name="Junction",
+        description="In the middle of the site; empty for the middle of the map, or the description's own place",
+    )
+    region_shape: EnumProperty(
+        name="Region",
+        description="Which part of the road about the junction is to be seen",
+        items=(
+            ("APPROACHES", "Approaches", "The junction, and the streets that lead to it up to a distance along them"),
+            ("CIRCLE", "Circle", "All road within a circle about the middle of the junction"),
+        ),
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="Of the region of interest; or how far it follows the approaches of the junction",
+        unit="LENGTH",
+        default=DEFAULT_RADIUS,
+        min=1.0,
+        soft_max=500.0,
+        step=1000,
+    )
+    role: EnumProperty(name="Role", description="What objects mean to the placement", items=ROLE_ITEMS)
+    checked: BoolProperty(name="Checked", description="Whether the check has looked at this scene")
+    counts: CollectionProperty(type=SEIP_PG_count)
+    problems: CollectionProperty(type=SEIP_PG_problem)
+    active_problem: IntProperty(
+        name="Problem",
+        description="Click to select the object and bring it into view",
+        update=_show_problem,
+    )
+
+    def is_described(self) -> bool:
+        """Return whether a site description says where the place is, and how large."""
+        return self.source.lower().endswith(DESCRIPTION_SUFFIX) and not self.junction
+
+    def follows_approaches(self) -> bool:
+        """Return whether the region follows the approaches of a chosen junction."""
+        return bool(self.junction) and self.region_shape == "APPROACHES"
+
+    def junction_id(self) -> str | None:
+        """Return the id of the chosen junction, what was typed where the map has no such, None where none is chosen."""
+        if not self.junction:
+            return None
+        found = self.junctions.get(self.junction)
+        return str(self.junction if found is None else found.id)
+
+
+def _region_weight(thing: bpy.types.Object) -> float:
+    value = thing.get(contract.WEIGHT, DEFAULT_WEIGHT)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number else DEFAULT_WEIGHT  # the check says what is wrong with it
+
+
+def _set_region_weight(thing: bpy.types.Object, value: float) -> None:
+    thing[contract.WEIGHT] = as_typed(value)
+
+
+_POLE_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
+
+
+def _pole_rule(thing: bpy.types.Object) -> int:
+    return next((number for number, mark in enumerate(_POLE_RULES) if mark and thing.get(mark)), 0)
+
+
+def _set_pole_rule(thing: bpy.types.Object, value: int) -> None:
+    for number, mark in enumerate(_POLE_RULES[1:], start=1):
+        if number == value:
+            thing[mark] = True
+        elif mark in thing:
+            del thing[mark]
+
+
+CLASSES = (SEIP_PG_junction, SEIP_PG_count, SEIP_PG_problem, SEIP_PG_site)
+
+
+def attach() -> None:
+    """Give objects the properties that stand for the contract's custom properties."""
+    bpy.types.Object.seip_region_weight = FloatProperty(
+        name="Weight",
+        description=f"How much each target in this region counts, where others count 1 ({contract.WEIGHT})",
+        get=_region_weight,
+        set=_set_region_weight,
+        min=0.001,
+        soft_max=10.0,
+        options=set(),
+    )
+    bpy.types.Object.seip_pole_rule = EnumProperty(
+        name="Rule",
+        description=f"What the placement does with this pole ({contract.FORBIDDEN}, {contract.MANDATORY})",
+        items=(
+            ("FREE", "Free", "It may carry a sensor"),
+            ("MANDATORY", "Sensor", "It must carry one"),
+            ("FORBIDDEN", "No Sensor", "It must carry none"),
+        ),
+        get=_pole_rule,
+        set=_set_pole_rule,
+        options=set(),
+    )
+
+
+def detach() -> None:
+    """Take them away."""
+    del bpy.types.Object.seip_pole_rule
+    del bpy.types.Object.seip_region_weight

@@ -1,0 +1,191 @@
+"""Properties of the survey: sensor types, candidates, targets, rays and solver."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..core.site.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
+from ..core.visibility.grid import VisibilitySettings
+from ..core.workflows.survey import SurveySettings
+from ..preferences import catalogue_files
+from .conversion import as_typed
+
+_LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
+_TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _LAYOUT.tilts)
+
+
+class SEIP_PG_sensor_type(bpy.types.PropertyGroup):
+    """A type of sensor that may be chosen; its name is its key in the catalogue."""
+
+    use: BoolProperty(name="Use", description="Let the placement choose sensors of this type", default=True)
+
+
+class SEIP_PG_survey(bpy.types.PropertyGroup):
+    """How the site is laid out and when a target counts as seen."""
+
+    types: CollectionProperty(type=SEIP_PG_sensor_type)
+    active_type: IntProperty(name="Sensor type", description="The type whose details are shown")
+    preview_height: FloatProperty(
+        name="Height",
+        description="Of the previewed sensor above the 3D cursor",
+        unit="LENGTH",
+        default=5.4,
+        min=0.1,
+        max=HIGHEST,
+        soft_max=20.0,
+        step=10,
+    )
+    heights: StringProperty(
+        name="Heights (m)",
+        description="Mounting heights above the ground in metres, like 3.5 5.4 8, or a range FROM:TO:STEP",
+        default=" ".join(f"{height:g}" for height in _LAYOUT.heights),
+    )
+    tilts: StringProperty(
+        name="Tilts (°)",
+        description="How far sensors may be turned nose down towards the region, in degrees, like 0 5 10, or a range "
+        "FROM:TO:STEP; 0 is upright, negative is up",
+        default=_TILTS,
+    )
+    grid: FloatProperty(
+        name="Target Grid",
+        description="Distance between neighbouring targets on the road",
+        unit="LENGTH",
+        default=_SURVEY.grid_spacing,
+        min=0.05,
+        soft_max=10.0,
+        step=10,
+    )
+    delta: FloatProperty(
+        name="δ",
+        description="A return nearer than this to a target sees it",
+        unit="LENGTH",
+        default=_SIGHT.delta,
+        min=0.01,
+        max=100.0,
+        soft_max=5.0,
+        step=10,
+    )
+    min_intensity: FloatProperty(
+        name="Least Intensity",
+        description="Least intensity of a return that sees; at 0 every return counts",
+        subtype="FACTOR",
+        default=_SIGHT.min_intensity,
+        min=0.0,
+        max=1.0,
+    )
+    spacing: FloatProperty(
+        name="Spacing",
+        description="Least distance between two new posts on the pavement",
+        unit="LENGTH",
+        default=_LAYOUT.spacing,
+        min=0.1,
+        soft_max=50.0,
+        step=50,
+    )
+    setback: FloatProperty(
+        name="Setback",
+        description="Distance of new posts from the kerb",
+        unit="LENGTH",
+        default=_LAYOUT.setback,
+        min=0.0,
+        soft_max=5.0,
+        step=10,
+    )
+    clearance: FloatProperty(
+        name="Clearance",
+        description="Distance of new posts and their sensors from walls and other objects",
+        unit="LENGTH",
+        default=_LAYOUT.clearance,
+        min=0.0,
+        soft_max=5.0,
+        step=10,
+    )
+    bracket: FloatProperty(
+        name="Bracket",
+        description="How far from an existing pole's axis a sensor hangs",
+        unit="LENGTH",
+        default=_LAYOUT.bracket,
+        min=0.0,
+        soft_max=5.0,
+        step=10,
+    )
+    assumed_poles: BoolProperty(
+        name="Assumed Poles",
+        description="Let poles carry sensors that are assumed, since the map has none for its traffic lights",
+        default=_LAYOUT.assumed_poles,
+    )
+    engine: EnumProperty(
+        name="Ray Caster",
+        description="What casts the rays",
+        items=(
+            ("auto", "Automatic", "Embree where it is installed, else BVHTree"),
+            ("embree", "Embree", "The faster one"),
+            ("bvh", "BVHTree", "Blender's own"),
+        ),
+        default="auto",
+    )
+    solver: EnumProperty(
+        name="Solver",
+        description="What solves the integer program",
+        items=(
+            ("auto", "Automatic", "HiGHS where it is installed, else CBC"),
+            ("highs", "HiGHS", "Comes with the extension"),
+            ("cbc", "CBC", "Comes with PuLP"),
+            ("gurobi", "Gurobi", "Needs your own installation and licence"),
+        ),
+        default="auto",
+    )
+    time_limit: FloatProperty(
+        name="Time Limit",
+        description="For the search of a placement, in seconds",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        default=_SURVEY.time_limit,
+        min=1.0,
+        soft_max=3600.0,
+    )
+    effort: FloatProperty(
+        name="Effort",
+        description=(
+            "Limit the search by counted work instead of time: about a second of one processor core for each unit, "
+            "and the same placement again on every run. 0: limit the time"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=3600.0,
+    )
+
+    def settings(self) -> SurveySettings:
+        """Return what is asked, as the core takes it.
+
+        Raises
+        ------
+        SeipError
+            It makes no sense.
+        """
+        used = tuple(one.name for one in self.types if one.use)
+        return SurveySettings(
+            candidates=CandidateSettings(
+                sensors=used if len(self.types) else _LAYOUT.sensors,
+                heights=heights_of(self.heights.split()),
+                tilts=tilts_of(self.tilts.split()),
+                spacing=as_typed(self.spacing),
+                setback=as_typed(self.setback),
+                clearance=as_typed(self.clearance),
+                bracket=as_typed(self.bracket),
+                assumed_poles=self.assumed_poles,
+            ),
+            visibility=VisibilitySettings(as_typed(self.delta), as_typed(self.min_intensity)),
+            grid_spacing=as_typed(self.grid),
+            catalogue=catalogue_files(),
+            engine=self.engine,
+            solver=self.solver,
+            time_limit=math.inf if self.effort else as_typed(self.time_limit),
+            effort=as_typed(self.effort) if self.effort else math.inf,
+        )
+
+
+CLASSES = (SEIP_PG_sensor_type, SEIP_PG_survey)

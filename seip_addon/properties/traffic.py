@@ -1,0 +1,118 @@
+"""Properties of the traffic: where it comes from, and how it is scanned."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from .. import live_scan
+from ..core.datasets import FORMATS, SPLITS
+from ..core.scans import ScanSettings
+from ..core.traffic.source import TrafficFiles
+from ..core.workflows.recording import RecordingSettings
+from .conversion import absolute, as_typed
+
+
+def _follow(_own: object, _context: bpy.types.Context) -> None:
+    live_scan.keep_following()
+
+
+class SEIP_PG_traffic(bpy.types.PropertyGroup):
+    """Where the traffic comes from, and how it is scanned."""
+
+    file: StringProperty(
+        name="Traffic",
+        description="Trajectories (.npz) or floating car data of SUMO (.xml, .csv, packed or not); "
+        "empty for objects that are animated in the scene",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    routes: StringProperty(
+        name="Routes",
+        description="SUMO's file with the vehicle types, which knows their sizes",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    net: StringProperty(
+        name="Network",
+        description="SUMO's .net.xml, which knows the offset from the map",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    loaded: StringProperty(name="Loaded", description="What was found in the file, one fact a line")
+    seed: IntProperty(name="Seed", description="Of noise and lost returns", default=0, min=0)
+    noise: BoolProperty(
+        name="Noise", description="Ranges are noisy and returns get lost, as in the sensors' data sheets", default=True
+    )
+    rolling_shutter: BoolProperty(
+        name="Rolling Shutter", description="Traffic moves while a sensor turns", default=False
+    )
+    follow: BoolProperty(
+        name="Follow the Timeline",
+        description="Scan again whenever the frame changes",
+        default=False,
+        update=_follow,
+    )
+    whole: BoolProperty(name="All of the Traffic", description="From its first moment to its last", default=True)
+    start: FloatProperty(
+        name="Start",
+        description="Time of the first frame, in seconds",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        min=0.0,
+    )
+    duration: FloatProperty(
+        name="Duration",
+        description="To the last frame, in seconds",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        default=10.0,
+        min=0.0,
+    )
+    rate: FloatProperty(
+        name="Rate (Hz)",
+        description="Frames a second; at 0 as often as the slowest sensor turns",
+        default=0.0,
+        min=0.0,
+        soft_max=20.0,
+        step=100,
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Of the run: its frames and its datasets; a run that was stopped goes on there",
+        subtype="DIR_PATH",
+        default="//scans",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    formats: EnumProperty(
+        name="Formats",
+        description="Datasets to write beside the frames",
+        items=tuple((key, kind.name, f"Write the dataset as {kind.name}") for key, kind in FORMATS.items()),
+        options={"ENUM_FLAG"},
+    )
+    split: EnumProperty(
+        name="Split",
+        description="Of the dataset that the run belongs to, whole",
+        items=tuple((split, split.capitalize(), f"The run belongs to the split {split!r}") for split in SPLITS),
+    )
+
+    def files(self) -> TrafficFiles | None:
+        """Return the files that traffic is read from, None where it is animated in the scene."""
+        if not self.file:
+            return None
+        routes = (absolute(self.routes),) if self.routes else ()
+        return TrafficFiles(absolute(self.file), routes, absolute(self.net) if self.net else None)
+
+    def recording(self) -> RecordingSettings:
+        """Return what is asked of scans, as the core takes it."""
+        return RecordingSettings(
+            scan=ScanSettings(self.seed, self.noise, self.rolling_shutter, self.id_data.seip.survey.engine),
+            start=None if self.whole else as_typed(self.start),
+            duration=None if self.whole else as_typed(self.duration),
+            rate=as_typed(self.rate) or None,
+            formats=tuple(key for key in FORMATS if key in self.formats),
+            split=self.split,
+        )
+
+
+CLASSES = (SEIP_PG_traffic,)

@@ -1,0 +1,49 @@
+"""Properties of the view: how results are shown."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+from .. import live_scan
+
+
+def _recolour(_own: object, context: bpy.types.Context) -> None:
+    live_scan.show_cloud(context.scene)
+
+
+class SEIP_PG_view(bpy.types.PropertyGroup):
+    """How what was found is shown."""
+
+    cloud_colour: EnumProperty(
+        name="Point Colours",
+        description="What the colours of the point cloud mean",
+        items=(
+            ("sensor", "Sensor", "Which sensor measured the point"),
+            ("intensity", "Intensity", "How strong the return is"),
+            ("instance", "Road User", "Which road user returned it"),
+        ),
+        update=_recolour,
+    )
+    picture: StringProperty(
+        name="Picture",
+        description="PNG to write; where one of that name is there already, the next gets a number",
+        subtype="FILE_PATH",
+        default="//placement.png",
+        options={"OUTPUT_PATH", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    picture_of: EnumProperty(
+        name="View",
+        description="What stands beside the plan",
+        items=(
+            ("VIEW", "This View", "What this viewport shows, with all that is drawn in it and its legend"),
+            (
+                "RENDER",
+                "Rendered",
+                "The rendered view that the batch command makes, which takes up to half a minute",
+            ),
+        ),
+    )
+
+
+CLASSES = (SEIP_PG_view,)
