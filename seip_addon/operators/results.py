@@ -73,7 +73,7 @@ class SEIP_OT_look_from_sensor(ForPlacement, bpy.types.Operator):
     """Set the view to the eye of the sensor that is active in the list, towards the road"""
 
     bl_idname = "seip.look_from_sensor"
-    bl_label = "Look from It"
+    bl_label = "View from Sensor"
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Set the view."""
@@ -151,7 +151,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
     """Keep the present placement under a name, to compare later ones with it"""
 
     bl_idname = "seip.keep_placement"
-    bl_label = "Keep"
+    bl_label = "Keep Placement"
     bl_options = {"REGISTER", "UNDO"}
 
     name: bpy.props.StringProperty(name="Name", description="Under which it is kept; empty for a number")
@@ -192,7 +192,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
     """Forget the kept placement that is active in the list"""
 
     bl_idname = "seip.drop_placement"
-    bl_label = "Forget"
+    bl_label = "Remove Kept Placement"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -213,7 +213,7 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
     """Colour the road by what the present placement gains over the kept one, and what it loses"""
 
     bl_idname = "seip.show_comparison"
-    bl_label = "Show Gains and Losses"
+    bl_label = "Show Difference"
     bl_options = {"REGISTER", "UNDO"}
 
     back: bpy.props.BoolProperty(
@@ -283,7 +283,7 @@ class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
     """Take the sensors as hands have moved, deleted and added them for the placement: what they see there counts"""
 
     bl_idname = "seip.judge_sensors"
-    bl_label = "Judge as They Hang"
+    bl_label = "Evaluate Moved Sensors"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Read where the sensors hang."""

@@ -198,7 +198,7 @@ class SEIP_OT_take_out_of_role(_RoleOperator, bpy.types.Operator):
     """Unlink the selected objects from the collections of a role; other roles and collections stay"""
 
     bl_idname = "seip.take_out_of_role"
-    bl_label = "Take Out"
+    bl_label = "Remove"
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Unlink them."""
@@ -233,7 +233,7 @@ class SEIP_OT_add_area(bpy.types.Operator):
     size: bpy.props.FloatVectorProperty(
         name="Size", description="Along x and y", size=2, unit="LENGTH", default=(40.0, 40.0), min=0.1, soft_max=500.0
     )
-    turn: bpy.props.FloatProperty(name="Turn", description="Counter-clockwise", subtype="ANGLE")
+    turn: bpy.props.FloatProperty(name="Rotation", description="Counter-clockwise", subtype="ANGLE")
     corners: bpy.props.IntProperty(
         name="Corners", description="Four make a rectangle, more an ellipse", default=4, min=3, soft_max=32, max=360
     )

@@ -138,7 +138,7 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operat
     """Find what the placement sees of the road with the loaded traffic in the way, on average over time"""
 
     bl_idname = "seip.try_in_traffic"
-    bl_label = "Try Placement in Traffic"
+    bl_label = "Test in Traffic"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -72,7 +72,7 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
 
     bl_idname = "SEIP_PT_placement_precaution"
     bl_parent_id = "SEIP_PT_placement"
-    bl_label = "What May Go Wrong"
+    bl_label = "Robustness"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -95,7 +95,7 @@ class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
 
     bl_idname = "SEIP_PT_placement_rules"
     bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Fixed and Forbidden Positions"
+    bl_label = "Required and Forbidden Positions"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:

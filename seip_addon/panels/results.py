@@ -109,7 +109,7 @@ class SEIP_PT_results(Sidebar, bpy.types.Panel):
         if session.following is None:
             draw_run(layout, results.SEIP_OT_follow_sensors.bl_idname, icon="ORIENTATION_GLOBAL")
         else:
-            layout.operator("seip.follow_sensors", text="End Following", icon="PAUSE", depress=True)
+            layout.operator("seip.follow_sensors", text="Stop Following", icon="PAUSE", depress=True)
             _draw_followed(layout, session.following)
 
 
@@ -126,7 +126,7 @@ class SEIP_PT_results_candidates(_Result, bpy.types.Panel):
     """Candidates by their worth."""
 
     bl_idname = "SEIP_PT_results_candidates"
-    bl_label = "Candidates Ranked"
+    bl_label = "Candidate Ranking"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the order, the button and the list."""
@@ -157,7 +157,7 @@ class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
         kept = parsed_record(seip.kept[seip.active_kept].record)
         _draw_table(layout, kept, parsed_record(seip.result.record))
         layout.operator("seip.show_comparison").back = False
-        layout.operator("seip.show_comparison", text="Show Coverage Again").back = True
+        layout.operator("seip.show_comparison", text="Show Coverage").back = True
 
 
 def _draw_table(layout: bpy.types.UILayout, kept: Record, present: Record) -> None:

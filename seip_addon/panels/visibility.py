@@ -39,7 +39,7 @@ class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
 
     bl_idname = "SEIP_PT_visibility_details"
     bl_parent_id = "SEIP_PT_visibility"
-    bl_label = "Layout and Rays"
+    bl_label = "Candidates and Rays"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:

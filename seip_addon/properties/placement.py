@@ -56,25 +56,25 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         name="Weights",
         description="How targets in weighted regions count",
         items=(
-            ("NONE", "All Alike", "Every target counts the same"),
-            ("SCENE", "By Region", "Each region's own weight counts"),
-            ("VALUE", "One Value", "One weight for all weighted regions"),
+            ("NONE", "Uniform", "Every target counts the same"),
+            ("SCENE", "Weights of Regions", "Each region's own weight counts"),
+            ("VALUE", "One Weight", "One weight for all weighted regions"),
         ),
     )
     central_weight: FloatProperty(
         name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
     )
     min_distance: FloatProperty(
-        name="Least Distance", description="Between two sensors", unit="LENGTH", default=0.0, min=0.0
+        name="Minimum Distance", description="Between two sensors", unit="LENGTH", default=0.0, min=0.0
     )
     objective: EnumProperty(
-        name="Place for",
+        name="Optimise for",
         description="Whether the placement trusts the map, or is chosen for what may go wrong",
         items=(
-            ("PLANNED", "Poses as Planned", "The coverage of sensors that hang just where they should"),
-            ("EXPECTED", "The Average", "Coverage on average over poses that err"),
-            ("CVAR", "The Worst Quarter", "Coverage on average over the worst quarter of poses that err"),
-            ("WORST", "The Worst Case", "Coverage in the worst of the poses that were tried"),
+            ("PLANNED", "Nominal Poses", "The coverage of sensors that hang just where they should"),
+            ("EXPECTED", "Expected Coverage", "Coverage on average over poses that err"),
+            ("CVAR", "CVaR of the Worst Quarter", "Coverage on average over the worst quarter of poses that err"),
+            ("WORST", "Worst Case", "Coverage in the worst of the poses that were tried"),
         ),
     )
     position_error: FloatProperty(
@@ -95,16 +95,16 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     seen_by: IntProperty(name="Seen by", description="Sensors that must see a target", default=1, min=1, max=8)
     failure: EnumProperty(
-        name="A Sensor Fails",
+        name="Sensor Failure",
         description="Whether coverage is counted after one of the sensors has failed",
         items=(
             ("none", "None", "All of them work"),
-            ("worst", "The Most Important", "The one that is missed most has failed"),
-            ("mean", "Any", "On average over all of them"),
+            ("worst", "Worst Sensor", "The one that is missed most has failed"),
+            ("mean", "Any Sensor", "On average over all of them"),
         ),
     )
     pose_errors: BoolProperty(
-        name="Try Pose Errors",
+        name="Test Pose Errors",
         description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",
         default=False,
     )

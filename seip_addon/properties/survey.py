@@ -45,12 +45,12 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     )
     tilts: StringProperty(
         name="Tilts (°)",
-        description="How far sensors may be turned nose down towards the region, in degrees, like 0 5 10, or a range "
-        "FROM:TO:STEP; 0 is upright, negative is up",
+        description="Tilts of the sensors down towards the region, in degrees, like 0 5 10, or a range "
+        "FROM:TO:STEP; 0 is upright, a negative tilt points up",
         default=_TILTS,
     )
     grid: FloatProperty(
-        name="Target Grid",
+        name="Target Spacing",
         description="Distance between neighbouring targets on the road",
         unit="LENGTH",
         default=_SURVEY.grid_spacing,
@@ -69,7 +69,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         step=10,
     )
     min_intensity: FloatProperty(
-        name="Least Intensity",
+        name="Minimum Intensity",
         description="Least intensity of a return that sees; at 0 every return counts",
         subtype="FACTOR",
         default=_SIGHT.min_intensity,

@@ -53,7 +53,7 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         default=False,
         update=_follow,
     )
-    whole: BoolProperty(name="All of the Traffic", description="From its first moment to its last", default=True)
+    whole: BoolProperty(name="Whole Run", description="From its first moment to its last", default=True)
     start: FloatProperty(
         name="Start",
         description="Time of the first frame, in seconds",
