@@ -26,8 +26,9 @@ from seip_addon.core.results.placement_record import versions
 from seip_addon.core.site.candidates import CandidateSettings, heights_of, tilts_of
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
+from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.convergence import Convergence
 from seip_addon.core.workflows.survey import Circumstances, Layout, SurveySettings, lay_out, record_of, see
 from seip_addon.scene.read import read_scene

@@ -17,7 +17,7 @@ from .core.arrays import Boolean, Integer
 from .core.errors import SeipError
 from .core.placement.deployment import Deployment, Sensor
 from .core.scans.sensor import MountedSensor
-from .core.visibility.rotated_sensors import Onlooker
+from .core.visibility.visibility_model import VisibilityModel
 from .scene import contract
 from .scene.sensors import read_sensors
 from .scene.write import show_seen_by
@@ -28,13 +28,13 @@ DELAY = 0.02
 """Seconds from a movement to the look at it: a drag reports many."""
 
 
-def start(scene: bpy.types.Scene, survey: SceneSurvey, onlooker: Onlooker) -> None:
+def start(scene: bpy.types.Scene, survey: SceneSurvey, visibility: VisibilityModel) -> None:
     """Follow the sensors of a scene from now on, from what the placement's own see."""
     stop()
     if survey.plan is None or survey.grid is None:
         raise RuntimeError("there is no placement to follow")
     session.following = FollowedSensors(
-        scene.session_uid, survey, onlooker, _as_placed(survey.plan.deployment, survey.grid.visible)
+        scene.session_uid, survey, visibility, _as_placed(survey.plan.deployment, survey.grid.visible)
     )
     for event, handler in _handlers():
         getattr(bpy.app.handlers, event).append(handler)
@@ -75,7 +75,7 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
         del followed.sensors[label]
     for label, sensor in sensors.items():
         if label not in followed.sensors or not _same(followed.sensors[label][0], sensor):
-            followed.sensors[label] = (sensor, followed.onlooker.see(sensor.model, sensor.xyz, sensor.orientation))
+            followed.sensors[label] = (sensor, followed.visibility.see(sensor.model, sensor.xyz, sensor.orientation))
     seen_by: Integer = np.sum([seen for _, seen in followed.sensors.values()], axis=0, dtype=np.int64)
     followed.coverage = float(np.count_nonzero(seen_by)) / len(seen_by)
     followed.moved = _moved(followed, sensors)

@@ -28,7 +28,7 @@ from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
 from .core.visibility.estimate import Estimate
 from .core.visibility.grid import VisibilityGrid
-from .core.visibility.rotated_sensors import Onlooker
+from .core.visibility.visibility_model import VisibilityModel
 from .core.workflows.survey import Layout, SurveySettings
 from .scene.changes import Watch
 from .viewport.overlay import Overlay
@@ -161,7 +161,7 @@ class FollowedSensors:
     ----------
     scene : int
         The scene's session number.
-    onlooker : Onlooker
+    visibility : VisibilityModel
         Of its site.
     sensors : dict of str to (MountedSensor, (t,) bool)
         Where each was when it was looked from last, and what it saw.
@@ -177,7 +177,7 @@ class FollowedSensors:
 
     scene: int
     survey: SceneSurvey
-    onlooker: Onlooker
+    visibility: VisibilityModel
     sensors: dict[str, tuple[MountedSensor, Boolean]] = field(default_factory=dict)
     coverage: float = 0.0
     moved: tuple[str, ...] = ()

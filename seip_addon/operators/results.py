@@ -23,7 +23,7 @@ from ..core.results.ranking import Ranked, rank_added, rank_alone
 from ..core.scans.sensor import MountedSensor
 from ..core.storage.files import check_folder, digest
 from ..core.visibility.grid import VisibilityGrid
-from ..core.visibility.rotated_sensors import Onlooker, onlooker
+from ..core.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.workflows.by_hand import judge
 from ..core.workflows.survey import Circumstances, record_of, recorded_goal
 from ..scene.blend_file import save_blend
@@ -241,7 +241,7 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Onlooker]], bpy.types.Operator):
+class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, VisibilityModel]], bpy.types.Operator):
     """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
 
     bl_idname = "seip.follow_sensors"
@@ -259,11 +259,11 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Onlooker]
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, Onlooker]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityModel]]:
         """Find the placement again."""
         return _set_up(scene_survey.with_placement(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, Onlooker]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, VisibilityModel]) -> None:
         """Begin to follow."""
         known, looker = result
         session.keep_survey(scene, known)
@@ -272,11 +272,11 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Onlooker]
 
 def _set_up(
     finding: Generator[Progress, None, SceneSurvey],
-) -> Generator[Progress, None, tuple[SceneSurvey, Onlooker]]:
+) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityModel]]:
     known = yield from finding
     settings = known.layout.settings
     yield Progress(0, 0, "getting ready to cast")
-    return known, onlooker(known.layout.site, settings.visibility, settings.engine)
+    return known, visibility_model(known.layout.site, settings.visibility, settings.engine)
 
 
 class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.site.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
-from ..core.visibility.grid import VisibilitySettings
+from ..core.visibility.settings import VisibilitySettings
 from ..core.workflows.survey import SurveySettings
 from ..preferences import catalogue_files
 from .conversion import as_typed

@@ -12,7 +12,8 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.visibility.estimate import estimate_visibility
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 SITE = junction_site(positions=80, heights=[4.0, 6.0, 8.0], spacing=1.0)
 MODELS = load_catalogue()

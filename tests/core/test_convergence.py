@@ -27,9 +27,9 @@ from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement.goal import Goal
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.visibility.grid import VisibilitySettings
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import unresolved_from
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows import convergence
 from seip_addon.core.workflows.convergence import Answer, Judge, coarsest_settings
 from seip_addon.core.workflows.survey import SurveySettings

@@ -23,7 +23,8 @@ from seip_addon.core.robustness.pose_errors import KINDS, PoseDraws, PoseErrors,
 from seip_addon.core.robustness.pose_study import StudySettings, pose_study, pose_warnings
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import Mesh
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 FEET = np.array([[0.0, 0, 0], [5, -3, 0.12], [-5, 3, 0.12], [5, -3, 0.12]])
 MODELS = load_catalogue()

@@ -23,7 +23,8 @@ from seip_addon.core.robustness.pose_study import StudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_placement import RobustPlacement
 from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 MODELS = load_catalogue()
 SETTINGS = RobustSettings(scenarios=4, unseen=30, time_limit=20.0)

@@ -30,6 +30,7 @@ from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.visibility import grid
+from seip_addon.core.visibility.chunks import chunks_of, sharing_rays
 from seip_addon.core.visibility.estimate import estimate_visibility
 from seip_addon.core.visibility.grid import (
     FILE,
@@ -38,11 +39,10 @@ from seip_addon.core.visibility.grid import (
     full_scan_visibility,
     visibility_key,
 )
-from seip_addon.core.visibility.observer import pieces_of, places
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import resolution_warnings, unresolved_from
-from seip_addon.core.visibility.rotated_sensors import Onlooker
 from seip_addon.core.visibility.sight_lines import pose_at
+from seip_addon.core.visibility.visibility_model import VisibilityModel
 from seip_addon.core.workflows.convergence import Judge
 from seip_addon.core.workflows.survey import SurveySettings
 
@@ -103,7 +103,7 @@ def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, min_intensity):
 def test_a_tilted_candidate_sees_what_an_onlooker_sees_and_what_rays_in_float64_return_from(seed, yaw, tilt):
     site = tilted(patch(seed, poses=1), yaw, tilt)
     visible, poses = grid_of(site).visible, site.candidates
-    looks = Onlooker(site, SIGHT, make_ray_caster(site.triangles, ANY))
+    looks = VisibilityModel(site, SIGHT, make_ray_caster(site.triangles, ANY))
     for pose, key in enumerate(poses.sensor.tolist()):
         turn = level_orientation(yaw) @ nose_down(tilt)
         assert (looks.see(MODELS[key], poses.xyz[pose], poses.orientation(pose)) == visible[pose]).all()
@@ -241,9 +241,9 @@ def test_tilts_are_named_in_degrees_one_by_one_or_as_a_range():
 def test_places_part_tilts_and_pieces_keep_each_pose_once():
     xyz = np.zeros((6, 3))
     tilt = np.array([0.0, 0.1, 0.0, 0.1, 0.2, 0.0])
-    assert [group.tolist() for group in places(xyz, np.zeros(6), tilt)] == [[0, 2, 5], [1, 3], [4]]
+    assert [group.tolist() for group in sharing_rays(xyz, np.zeros(6), tilt)] == [[0, 2, 5], [1, 3], [4]]
     site = patch(3)
-    assert sorted(np.concatenate(pieces_of(site)).tolist()) == list(range(len(site.candidates)))
+    assert sorted(np.concatenate(chunks_of(site)).tolist()) == list(range(len(site.candidates)))
     assert finish(estimate_visibility(site, MODELS, SIGHT, ANY)).places == 3
 
 
@@ -277,7 +277,7 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
     for sensor in deployment.sensors:
         assert sensor.tilt == pytest.approx(math.radians(20))
         assert (sensor.orientation == candidates.orientation(sensor.pose)).all()
-        looks = Onlooker(site, SIGHT, make_ray_caster(site.triangles, ANY))
+        looks = VisibilityModel(site, SIGHT, make_ray_caster(site.triangles, ANY))
         assert (looks.see(sensor.model, sensor.xyz, sensor.orientation) == visible[sensor.pose]).all()
 
 
@@ -286,7 +286,7 @@ def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
     judge = Judge(street(), settings, Goal(count=1))
     plan = finish(judge.plan(street_site(lay_candidates(street(), settings.candidates)), settings))
     (sensor,) = plan.deployment.sensors
-    looks = Onlooker(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))
+    looks = VisibilityModel(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))
     as_it_hangs = looks.see(sensor.model, sensor.xyz, sensor.orientation).mean()
     assert judge.judge(plan) == pytest.approx(as_it_hangs, abs=1e-12)
     assert as_it_hangs != looks.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw)).mean()

@@ -28,7 +28,8 @@ from seip_addon.core.robustness.traffic_presence import road_user_seconds
 from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study, traffic_warnings
 from seip_addon.core.robustness.traffic_views import traffic_views
 from seip_addon.core.traffic import RoadUser
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 pytestmark = needs_any
 

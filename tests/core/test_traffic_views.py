@@ -21,9 +21,10 @@ from seip_addon.core.robustness.disturbed_views import Surroundings
 from seip_addon.core.robustness.traffic_instants import NOBODY, STRETCH, WARM_UP, check_runs, spread_instants, standing
 from seip_addon.core.robustness.traffic_views import HEIGHT, traffic_views
 from seip_addon.core.traffic import RoadUser
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster
-from seip_addon.core.visibility.scanning import Place, seen_by_all_rays
+from seip_addon.core.visibility.scanning import ScanPosition, seen_by_all_rays
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 pytestmark = needs_any
 
@@ -81,7 +82,7 @@ def views(instants, layer="road", around=AROUND):
 def place_of(pose, caster, settings=AROUND.sight):
     poses = SITE.candidates
     model = MODELS[str(poses.sensor[pose])]
-    return Place(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], settings.delta, settings.min_intensity)
+    return ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], settings)
 
 
 def by_full_scan(bodies, engine=ANY, settings=AROUND.sight):

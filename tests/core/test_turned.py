@@ -13,11 +13,11 @@ from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.scans.sensor import level_orientation
-from seip_addon.core.visibility.grid import VisibilitySettings
-from seip_addon.core.visibility.observer import Observer
+from seip_addon.core.visibility.chunks import compute_rows
 from seip_addon.core.visibility.ray_casting import make_ray_caster
-from seip_addon.core.visibility.rotated_sensors import Onlooker
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.target_index import TargetIndex
+from seip_addon.core.visibility.visibility_model import VisibilityModel
 
 MODELS = load_catalogue()
 SITE = junction_site()
@@ -53,7 +53,7 @@ def caster():
 def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
     tried = make_ray_caster(SITE.triangles, engine)
     xyz, orientation = np.array([6.0, -7.0, 6.0]), turned(*angles)
-    seen = Onlooker(SITE, SIGHT, tried).see(MODEL, xyz, orientation)
+    seen = VisibilityModel(SITE, SIGHT, tried).see(MODEL, xyz, orientation)
     assert (seen == by_full_scan(tried, MODEL, xyz, orientation)).all()
     assert seen.any()
 
@@ -67,16 +67,16 @@ def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
 def test_wherever_it_hangs(angles, place, delta):
     caster = make_ray_caster(SITE.triangles, ANY)
     xyz, orientation = np.array(place), turned(*angles)
-    seen = Onlooker(SITE, replace(SIGHT, delta=delta), caster).see(MODEL, xyz, orientation)
+    seen = VisibilityModel(SITE, replace(SIGHT, delta=delta), caster).see(MODEL, xyz, orientation)
     assert (seen == by_full_scan(caster, MODEL, xyz, orientation, delta)).all()
 
 
 def test_a_level_sensor_sees_what_its_candidate_sees(caster):
     poses = SITE.candidates
     some = np.arange(0, len(poses), max(1, len(poses) // 6))
-    rows = Observer(SITE, MODELS, SIGHT.delta, 0.0, caster).see(some)
+    rows = compute_rows(VisibilityModel(SITE, SIGHT, caster), poses, MODELS, some)
     grid = np.unpackbits(rows.packed, axis=1, count=len(SITE.targets)).astype(bool)
-    looks = Onlooker(SITE, SIGHT, caster)
+    looks = VisibilityModel(SITE, SIGHT, caster)
     for pose, row in zip(some, grid, strict=True):
         model = MODELS[str(poses.sensor[pose])]
         seen = looks.see(model, poses.xyz[pose], level_orientation(float(poses.yaw[pose])))
@@ -86,5 +86,5 @@ def test_a_level_sensor_sees_what_its_candidate_sees(caster):
 def test_a_sensor_that_looks_up_sees_no_road(caster):
     upside = turned(0.0, 0.0, math.pi)
     narrow = replace(MODEL, elevations=np.radians(np.linspace(-60, -30, 16)))
-    assert Onlooker(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), np.eye(3)).any()
-    assert not Onlooker(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), upside).any()
+    assert VisibilityModel(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), np.eye(3)).any()
+    assert not VisibilityModel(SITE, SIGHT, caster).see(narrow, np.array([0.0, 0.0, 6.0]), upside).any()

@@ -21,6 +21,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel, load_catalogue
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Site, Targets
+from seip_addon.core.visibility.chunks import Rows
 from seip_addon.core.visibility.grid import (
     VisibilityGrid,
     VisibilitySettings,
@@ -28,10 +29,9 @@ from seip_addon.core.visibility.grid import (
     full_scan_visibility,
     visibility_key,
 )
-from seip_addon.core.visibility.observer import Rows
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.visibility.ring_resolution import resolution_warnings
-from seip_addon.core.visibility.store import PieceFolder, stored_visibility
+from seip_addon.core.visibility.store import CheckpointFolder, stored_visibility
 
 Float = NDArray[np.float64]
 
@@ -198,8 +198,8 @@ def test_an_interrupted_run_goes_on_from_its_finished_pieces(tmp_path: Path) -> 
 @needs_any
 def test_pieces_of_another_grid_and_damaged_ones_are_not_used(tmp_path: Path) -> None:
     rows = Rows(np.ones((2, 3), dtype=np.uint8), 7)
-    PieceFolder(tmp_path / "grid.npz", "a" * 64).save(0, rows)
-    same = PieceFolder(tmp_path / "grid.npz", "a" * 64)
+    CheckpointFolder(tmp_path / "grid.npz", "a" * 64).save(0, rows)
+    same = CheckpointFolder(tmp_path / "grid.npz", "a" * 64)
     found = same.load(0)
     assert found is not None
     assert (found.packed == rows.packed).all()
@@ -207,7 +207,7 @@ def test_pieces_of_another_grid_and_damaged_ones_are_not_used(tmp_path: Path) ->
     (path,) = (tmp_path / "grid.pieces").iterdir()
     path.write_bytes(path.read_bytes()[:50])
     assert same.load(0) is None
-    assert PieceFolder(tmp_path / "grid.npz", "b" * 64).load(0) is None
+    assert CheckpointFolder(tmp_path / "grid.npz", "b" * 64).load(0) is None
     assert not path.exists()
 
 

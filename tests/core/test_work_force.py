@@ -17,7 +17,8 @@ from synthetic_junction import junction_site
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.progress import finish
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.store import stored_visibility
 
 HAS_DASK = importlib.util.find_spec("distributed") is not None

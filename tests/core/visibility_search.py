@@ -23,8 +23,9 @@ from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility, full_scan_visibility
+from seip_addon.core.visibility.grid import compute_visibility, full_scan_visibility
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 Float = NDArray[np.float64]
 Boolean = NDArray[np.bool_]

@@ -14,7 +14,7 @@ import pytest
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.scene.read import read_scene
 
 pytest.importorskip("embreex", reason="embreex is not installed")

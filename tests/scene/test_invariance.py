@@ -14,7 +14,8 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.site import make_site
 from seip_addon.core.streetscape.description import SiteDescription
 from seip_addon.core.streetscape.model import site_model
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
 from seip_addon.scene.build import build_scene

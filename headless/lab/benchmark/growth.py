@@ -19,10 +19,11 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
 from seip_addon.core.visibility.needed_triangles import needed_triangles
-from seip_addon.core.visibility.observer import Observer, places
 from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.visibility_model import VisibilityModel
 
 STREET_SENSORS = 4
 
@@ -104,20 +105,20 @@ def look(scaled: Scaled, models: dict[str, LidarModel], settings: VisibilitySett
     What is done once for a site counts once, the places count for those they stand for.
     """
     site, poses = scaled.site, scaled.site.candidates
-    every = places(poses.xyz, poses.yaw, poses.tilt)
+    every = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
     sample = [every[n] for n in np.unique(np.linspace(0, len(every) - 1, scaled.looked_from).astype(int))]
     longest = max(model.max_range for model in models.values())
     once, each = Expense(), Expense()
 
-    def make() -> Observer:
+    def make() -> VisibilityModel:
         needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
         caster = make_ray_caster(site.triangles, keep=needed.keep)
-        return Observer(site, models, settings.delta, settings.min_intensity, caster)
+        return VisibilityModel(site, settings, caster)
 
     def work() -> None:
-        observer = once.time(make)
+        model = once.time(make)
         for members in sample:
-            each.time(partial(observer.see, members))
+            each.time(partial(compute_rows, model, poses, models, members))
 
     _, memory = peak_memory(work)
     return once.cpu + each.cpu * scaled.stand_for, memory

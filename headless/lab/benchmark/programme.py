@@ -27,8 +27,9 @@ from seip_addon.core.scans import static_scene
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
+from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 
 @dataclass(frozen=True)

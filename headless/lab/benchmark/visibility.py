@@ -18,11 +18,12 @@ from seip_addon.core.placement import Placement, solve
 from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
-from seip_addon.core.visibility.observer import Observer, places
+from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
+from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import Engine, RayCaster, make_ray_caster
-from seip_addon.core.visibility.scanning import Place
-from seip_addon.core.visibility.sight import seen_by_tilted_full_scan
+from seip_addon.core.visibility.scanning import ScanPosition
+from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.visibility_model import VisibilityModel, seen_by_tilted_full_scan
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
@@ -78,8 +79,8 @@ class Harm:
     proven: bool
 
 
-class Observers:
-    """A site as each way sees it, made once for all places.
+class FullAndLazy:
+    """Full and lazy visibility of a site, prepared once for all poses.
 
     Parameters
     ----------
@@ -91,25 +92,25 @@ class Observers:
     ) -> None:
         self._site, self._models, self._settings = site, models, settings
         self._caster = make_ray_caster(site.triangles, engine)
-        self._lazy = Observer(site, models, settings.delta, settings.min_intensity, self._caster)
+        self._lazy = VisibilityModel(site, settings, self._caster)
 
     def full(self, poses: Integer) -> tuple[Boolean, int]:
         """Cast every ray of poses at one place; return what they see, (k, t) bool, and how many rays that took."""
         candidates = self._site.candidates
         used = [self._models[key] for key in candidates.sensor[poses].tolist()]
         origin, yaw = candidates.xyz[poses[0]], float(candidates.yaw[poses[0]])
-        place = Place(self._caster, origin, yaw, used, self._settings.delta, self._settings.min_intensity)
-        return seen_by_tilted_full_scan(place, float(candidates.tilt[poses[0]]), self._site.targets.xyz)
+        position = ScanPosition(self._caster, origin, yaw, used, self._settings)
+        return seen_by_tilted_full_scan(position, float(candidates.tilt[poses[0]]), self._site.targets.xyz)
 
     def lazy(self, poses: Integer) -> tuple[Boolean, int]:
         """Cast only rays that can matter; see `full`."""
-        rows = self._lazy.see(poses)
+        rows = compute_rows(self._lazy, self._site.candidates, self._models, poses)
         return np.unpackbits(rows.packed, axis=1, count=self._lazy.targets).astype(bool), rows.rays
 
 
 def sampled_places(site: Site, samples: int) -> list[Integer]:
     """Return places evenly spread over a site, each as its poses."""
-    every = places(site.candidates.xyz, site.candidates.yaw, site.candidates.tilt)
+    every = sharing_rays(site.candidates.xyz, site.candidates.yaw, site.candidates.tilt)
     return [every[number] for number in np.unique(np.linspace(0, len(every) - 1, samples).astype(int))]
 
 
@@ -139,8 +140,8 @@ def visibility_costs(
     SeipError
         A lazy result is not that of its full scan.
     """
-    ways = {str(engine): Observers(site, models, settings, engine) for engine in ENGINES}
-    ways |= {one.name: Observers(one.site, one.models, settings, "embree") for one in simpler}
+    ways = {str(engine): FullAndLazy(site, models, settings, engine) for engine in ENGINES}
+    ways |= {one.name: FullAndLazy(one.site, one.models, settings, "embree") for one in simpler}
     costs = {f"{scan} {name}": Cost() for name in ways for scan in ("full", "lazy")}
     for poses in sampled_places(site, samples):
         for name, observers in ways.items():

@@ -23,10 +23,10 @@ from seip_addon.core.robustness.estimates import Estimate
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site, Targets, make_site
-from seip_addon.core.visibility.grid import VisibilitySettings
 from seip_addon.core.visibility.ray_casting import RayCaster, make_ray_caster
 from seip_addon.core.visibility.ring_resolution import unresolved_from
-from seip_addon.core.visibility.rotated_sensors import onlooker
+from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.visibility_model import visibility_model
 from seip_addon.core.workflows.convergence import (
     CANDIDATE_SPACINGS,
     GRID_SPACINGS,
@@ -297,7 +297,7 @@ def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle:
 
 def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) -> SeenByRatio:
     """Count targets in view, and those seen, from upright sensors, by distance in multiples of the border."""
-    caster, look, targets = make_ray_caster(site.triangles), onlooker(site, settings), site.targets.xyz
+    caster, look, targets = make_ray_caster(site.triangles), visibility_model(site, settings), site.targets.xyz
     poses = site.candidates
     total, seen = np.zeros(len(RATIOS) - 1, dtype=int), np.zeros(len(RATIOS) - 1, dtype=int)
     upright = (poses.sensor == model.key) & (poses.tilt == 0)
@@ -370,7 +370,7 @@ def _by_grid_laid(
 
 
 def _coverage(site: Site, settings: SurveySettings, deployment: Deployment, turn: Sequence[float] = ()) -> float:
-    look = onlooker(site, settings.visibility, settings.engine)
+    look = visibility_model(site, settings.visibility, settings.engine)
     turns = turn or [0.0] * len(deployment.sensors)
     seen = [
         look.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))

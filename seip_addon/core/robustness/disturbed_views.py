@@ -13,10 +13,10 @@ from ..lidar import LidarModel
 from ..progress import Progress
 from ..site.scene_geometry import Mesh
 from ..site.site import Site
-from ..visibility.grid import VisibilitySettings
-from ..visibility.observer import places
+from ..visibility.chunks import sharing_rays
 from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
-from ..visibility.rotated_sensors import Onlooker
+from ..visibility.settings import VisibilitySettings
+from ..visibility.visibility_model import VisibilityModel
 from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
 from .views import Views
 
@@ -74,8 +74,8 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
     keys, xyz = candidates.sensor[poses].tolist(), candidates.xyz[poses]
     yaw, tilt = candidates.yaw[poses], candidates.tilt[poses]
     caster = make_ray_caster(site.triangles, engine_name(around.engine))
-    onlooker = Onlooker(site, around.sight, caster)
-    together = places(xyz, yaw, tilt)
+    model = VisibilityModel(site, around.sight, caster)
+    together = sharing_rays(xyz, yaw, tilt)
     packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
     orientations = draws.orientations(yaw, tilt)
 
@@ -83,7 +83,7 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
         draw, members = work
         first = members[0]
         where, turned = xyz[first] + draws.shift[draw, first], orientations[draw, first]
-        seen = onlooker.see_all([models[keys[member]] for member in members], where, turned)
+        seen, _ = model.see_all([models[keys[member]] for member in members], where, turned)
         packed[draw, members] = np.packbits(seen, axis=1)
 
     works = [(draw, members) for draw in range(len(draws)) for members in together]

@@ -29,7 +29,7 @@ from ..progress import Progress
 from ..scans.beam_windows import BeamWindows
 from ..scans.sensor import level_orientation
 from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
-from ..visibility.scanning import Place
+from ..visibility.scanning import ScanPosition
 from ..visibility.target_index import TargetIndex
 from .disturbed_views import Surroundings
 from .traffic_instants import Standing
@@ -74,15 +74,14 @@ def traffic_views(
     engine = engine_name(around.engine)
     caster = make_ray_caster(site.triangles, engine)
     crowds = [_crowd(around, one, caster) for one in instants]
-    delta, least = around.sight.delta, around.sight.min_intensity
     wanted = site.targets.xyz + np.array([0.0, 0.0, HEIGHT if layer == "height" else 0.0])
-    index = TargetIndex(wanted, delta)
+    index = TargetIndex(wanted, around.sight.delta)
     packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
 
     def look(number: int) -> None:
         pose = int(poses[number])
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
-        place = Place(caster, xyz, float(yaw), [model], delta, least)
+        place = ScanPosition(caster, xyz, float(yaw), [model], around.sight)
         static = _StaticScan(place, wanted)
         looker: _Looker = _Above(static, wanted) if layer == "height" else _Road(static, index, len(wanted))
         for instant, crowd in enumerate(crowds):
@@ -135,17 +134,17 @@ class _StaticScan:
 
     Parameters
     ----------
-    place : Place
+    place : ScanPosition
         Of one sensor.
     wanted : (t, 3) float64, metres
     """
 
-    def __init__(self, place: Place, wanted: Float) -> None:
+    def __init__(self, place: ScanPosition, wanted: Float) -> None:
         self.place, (self.model,) = place, place.models
         self._windows = BeamWindows(self.model)
         self._pattern = BeamPattern(self.model, place.yaw)
         self._orientation = level_orientation(place.yaw)
-        low, high = wanted.min(axis=0) - place.delta, wanted.max(axis=0) + place.delta
+        low, high = wanted.min(axis=0) - place.settings.delta, wanted.max(axis=0) + place.settings.delta
         self._matters = np.zeros(self.rays, dtype=bool)
         self._matters[self.through(np.where(_CORNERS > 0, high, low)[None])[1]] = True
         self.distance = np.full(self.rays, np.inf)
@@ -260,7 +259,7 @@ class _Above:
 
     def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
         """Try all rays past points, and return some points at a time with the rays that pass them."""
-        reach = self._static.place.delta * (1 + _OUTSIDE)
+        reach = self._static.place.settings.delta * (1 + _OUTSIDE)
         for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
             hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
             passing = self._pass(ray, part[hull])
@@ -273,5 +272,5 @@ class _Above:
         ahead = (towards * static.directions(ray)).sum(axis=1)
         along = np.clip(ahead, static.model.min_range, end)
         squared = (towards**2).sum(axis=1) - 2 * along * ahead + along**2
-        passes: Boolean = (squared < static.place.delta**2) & (end >= static.model.min_range)
+        passes: Boolean = (squared < static.place.settings.delta**2) & (end >= static.model.min_range)
         return passes

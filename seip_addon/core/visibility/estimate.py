@@ -20,11 +20,11 @@ from ..arrays import Integer
 from ..lidar import LidarModel, find_models
 from ..progress import PAUSE, Progress
 from ..site.site import Site
-from .executors import ObserverTask, threads_of
-from .grid import VisibilitySettings
+from .chunks import Rows, sharing_rays
+from .executors import VisibilityTask, threads_of
 from .needed_triangles import needed_triangles
-from .observer import Rows, places
 from .ray_casting import Engine, engine_name
+from .settings import VisibilitySettings
 
 SAMPLING = 0.8
 """Seconds that sample places may take, beyond the first of each thread."""
@@ -95,8 +95,8 @@ def estimate_visibility(
     used = find_models(models, np.unique(poses.sensor).tolist())
     longest = max(model.max_range for model in used.values())
     needed = needed_triangles(site.triangles, poses.xyz, site.targets.xyz, settings.delta, longest)
-    task = ObserverTask(site, used, settings.delta, settings.min_intensity, engine_name(engine), needed.keep)
-    everywhere = places(poses.xyz, poses.yaw, poses.tilt)
+    task = VisibilityTask(site, used, settings, engine_name(engine), needed.keep)
+    everywhere = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
     drawn = [everywhere[place] for place in _spread_lot(len(everywhere), seed)]
     with threads_of(task, threads) as submit:
         setting_up = time.perf_counter() - began
@@ -163,7 +163,7 @@ def _timed(some: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]) -
     return _Sample(len(some), time.perf_counter() - began, sum(future.result().rays for future in futures))
 
 
-def _memory(task: ObserverTask, rays_per_place: float, poses: int) -> int:
+def _memory(task: VisibilityTask, rays_per_place: float, poses: int) -> int:
     triangles = len(task.keep) * _BYTES_PER_TRIANGLE[task.engine]
     under_way = rays_per_place * _BYTES_PER_RAY_AND_PLACE * _FIRST
     grid = poses * len(task.site.targets) * (1 + 1 / 8)  # as bits, and unpacked for the placement

@@ -15,23 +15,24 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..site.site import Site
-from .observer import Observer, Rows
+from .chunks import Rows, compute_rows
 from .ray_casting import Engine, RayCaster, make_ray_caster
+from .settings import VisibilitySettings
+from .visibility_model import VisibilityModel
 
 Submit = Callable[[Integer], Future[Rows]]
 
 _RAYS_BETWEEN_LOOKS = 1 << 15  # a tenth of a second's work or less
 _SECONDS_FOR_AN_ANSWER = 20
-_LOST_WORKERS = 3  # so many die over one piece before the piece is held to be the cause
+_LOST_WORKERS = 3  # so many die over one chunk before the chunk is held to be the cause
 
 
 @dataclass(frozen=True, eq=False)
-class ObserverTask:
-    """What an `Observer` is made from, to be sent to where it is needed.
+class VisibilityTask:
+    """What rows of a visibility grid follow from, to be sent to where they are computed.
 
     Parameters
     ----------
-    delta : float, metres
     engine : {"bvh", "embree"}
     keep : (n,) bool
         Which triangles of the site rays are cast against.
@@ -39,15 +40,23 @@ class ObserverTask:
 
     site: Site
     models: Mapping[str, LidarModel]
-    delta: float
-    min_intensity: float
+    settings: VisibilitySettings
     engine: Engine
     keep: Boolean
 
+    def ray_caster(self) -> RayCaster:
+        """Return a new ray caster of the site's triangles."""
+        return make_ray_caster(self.site.triangles, self.engine, self.keep)
+
+    def rows_by(self, caster: RayCaster) -> Callable[[Integer], Rows]:
+        """Return the function that computes the rows of poses."""
+        model = VisibilityModel(self.site, self.settings, caster)
+        return lambda poses: compute_rows(model, self.site.candidates, self.models, poses)
+
 
 @contextmanager
-def threads_of(task: ObserverTask, threads: int | None = None) -> Iterator[Submit]:
-    """Yield what starts the work on a piece in a thread of this process; unfinished work ends with the block, soon.
+def threads_of(task: VisibilityTask, threads: int | None = None) -> Iterator[Submit]:
+    """Yield what starts the work on a chunk in a thread of this process; unfinished work ends with the block, soon.
 
     Parameters
     ----------
@@ -55,11 +64,11 @@ def threads_of(task: ObserverTask, threads: int | None = None) -> Iterator[Submi
         How many work at once at most.
     """
     stop = threading.Event()
-    caster = StoppableCaster(make_ray_caster(task.site.triangles, task.engine, task.keep), stop)
-    observer = Observer(task.site, task.models, task.delta, task.min_intensity, caster)
+    caster = StoppableCaster(task.ray_caster(), stop)
+    rows = task.rows_by(caster)
     pool = ThreadPoolExecutor(min(caster.threads, threads or caster.threads))
     try:
-        yield lambda poses: pool.submit(observer.see, poses)
+        yield lambda poses: pool.submit(rows, poses)
     finally:
         stop.set()
         pool.shutdown(cancel_futures=True)
@@ -93,8 +102,8 @@ class StoppableCaster:
 
 
 @contextmanager
-def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
-    """Yield what starts the work on a piece at a worker of a Dask scheduler.
+def cluster(address: str, task: VisibilityTask) -> Iterator[Submit]:
+    """Yield what starts the work on a chunk at a worker of a Dask scheduler.
 
     Parameters
     ----------
@@ -105,7 +114,7 @@ def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
     Raises
     ------
     SeipError
-        Dask is not installed, no scheduler answers, it has no workers, or a piece ended one worker after the other.
+        Dask is not installed, no scheduler answers, it has no workers, or a chunk ended one worker after the other.
     """
     try:
         import dask  # noqa: PLC0415 - an extra that need not be installed
@@ -133,18 +142,17 @@ def cluster(address: str, task: ObserverTask) -> Iterator[Submit]:
             with client.get_executor(pure=False) as executor:
                 yield lambda poses: executor.submit(_see, everywhere, poses)
         except KilledWorker as error:
-            raise SeipError(f"workers of {address} died over one piece of the work: {error}") from error
+            raise SeipError(f"workers of {address} died over one chunk of the work: {error}") from error
 
 
-def _same(task: ObserverTask) -> ObserverTask:
+def _same(task: VisibilityTask) -> VisibilityTask:
     return task
 
 
-def _see(task: ObserverTask, poses: Integer) -> Rows:
-    return _observer(task).see(poses)
+def _see(task: VisibilityTask, poses: Integer) -> Rows:
+    return _rows_by_worker(task)(poses)
 
 
-@functools.lru_cache(maxsize=1)  # a worker holds one object for all pieces
-def _observer(task: ObserverTask) -> Observer:
-    caster = make_ray_caster(task.site.triangles, task.engine, task.keep)
-    return Observer(task.site, task.models, task.delta, task.min_intensity, caster)
+@functools.lru_cache(maxsize=1)  # a worker holds one visibility model for all chunks
+def _rows_by_worker(task: VisibilityTask) -> Callable[[Integer], Rows]:
+    return task.rows_by(task.ray_caster())

@@ -25,12 +25,13 @@ from ..site.site import Site
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..storage.files import digest
 from ..storage.source_digest import source_digest
-from .executors import ObserverTask, cluster, threads_of
+from .chunks import Checkpoint, chunks_of, compute_chunks
+from .executors import VisibilityTask, cluster, threads_of
 from .needed_triangles import needed_triangles
-from .observer import KeptPieces, pieces_of, see_pieces
 from .ray_casting import Engine, RayCaster, engine_name
-from .scanning import Place
-from .sight import seen_by_tilted_full_scan
+from .scanning import ScanPosition
+from .settings import VisibilitySettings
+from .visibility_model import seen_by_tilted_full_scan
 
 FILE = ArrayFile(
     "seip.visibility",
@@ -40,31 +41,6 @@ FILE = ArrayFile(
     {"packed": ArrayRule("u1", ("poses", "bytes"))},
     undigested=True,
 )
-
-WIDEST_DELTA = 100.0
-"""Metres: a wider one is a slip of the keyboard."""
-
-
-@dataclass(frozen=True)
-class VisibilitySettings:
-    """When a target counts as seen.
-
-    Parameters
-    ----------
-    delta : float, metres
-        A return nearer than this to a target sees it.
-    min_intensity : float, 0 to 1
-        Least intensity of such a return, for surfaces of reflectivity 1. At 0 every return counts.
-    """
-
-    delta: float = 1.0
-    min_intensity: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 < self.delta <= WIDEST_DELTA:
-            raise SeipError(f"delta must be a positive number of metres up to {WIDEST_DELTA:g}, not {self.delta}")
-        if not 0 <= self.min_intensity <= 1:
-            raise SeipError(f"the least intensity must lie between 0 and 1, not {self.min_intensity}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +142,7 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
     engine: Engine = "auto",
-    kept: KeptPieces | None = None,
+    checkpoint: Checkpoint | None = None,
     scheduler: str | None = None,
     threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
@@ -178,8 +154,8 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
         At least those that the candidates name.
     engine : {"auto", "bvh", "embree"}
         What casts the rays.
-    kept : KeptPieces, optional
-        Pieces of an earlier run with the same key, to which those of this run are added.
+    checkpoint : Checkpoint, optional
+        Chunks of an earlier run with the same key, to which those of this run are added.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work, instead of this process.
     threads : int, optional
@@ -188,7 +164,7 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
     Yields
     ------
     Progress
-        Ten times a second, and after each piece of the work.
+        Ten times a second, and after each chunk of the work.
 
     Returns
     -------
@@ -205,12 +181,12 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
     _require_finite(site)
     longest = max(model.max_range for model in used.values())
     needed = needed_triangles(site.triangles, site.candidates.xyz, site.targets.xyz, settings.delta, longest)
-    task = ObserverTask(site, used, settings.delta, settings.min_intensity, engine_name(engine), needed.keep)
-    pieces = pieces_of(site)
+    task = VisibilityTask(site, used, settings, engine_name(engine), needed.keep)
+    chunks = chunks_of(site)
     with threads_of(task, threads) if scheduler is None else cluster(scheduler, task) as submit:
-        rows = yield from see_pieces(pieces, submit, kept)
+        rows = yield from compute_chunks(chunks, submit, checkpoint)
     packed = np.zeros((len(site.candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
-    packed[np.concatenate(pieces)] = np.concatenate([row.packed for row in rows])
+    packed[np.concatenate(chunks)] = np.concatenate([row.packed for row in rows])
     parameters = {"triangles": needed.counts, "rays_cast": sum(row.rays for row in rows)}
     return _grid(site, used, settings, task.engine, packed, parameters)
 
@@ -225,10 +201,8 @@ def full_scan_visibility(
     packed = np.zeros((len(poses), (len(targets) + 7) // 8), dtype=np.uint8)
     for pose, key in enumerate(poses.sensor.tolist()):
         yield Progress(pose, len(poses), "full scan")
-        place = Place(
-            caster, poses.xyz[pose], float(poses.yaw[pose]), [used[key]], settings.delta, settings.min_intensity
-        )
-        packed[pose] = np.packbits(seen_by_tilted_full_scan(place, float(poses.tilt[pose]), targets)[0])
+        position = ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [used[key]], settings)
+        packed[pose] = np.packbits(seen_by_tilted_full_scan(position, float(poses.tilt[pose]), targets)[0])
     yield Progress(len(poses), len(poses), "full scan")
     return _grid(site, used, settings, caster.name, packed, {"rays_cast": _rays_of_full_scan(site, used)})
 

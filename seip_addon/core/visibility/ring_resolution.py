@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Boolean, Float
 from ..lidar import LidarModel, find_models
 from ..site.site import Site
-from .grid import VisibilitySettings
+from .settings import VisibilitySettings
 
 
 def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from ..lidar import BeamPattern, LidarModel, return_intensity
 from .beam_culling import Beams, NearRays, disc_patches, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
+from .settings import VisibilitySettings
 from .target_index import TargetIndex
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
@@ -37,7 +38,7 @@ class Corners(Protocol):
 
 
 class Caster(Protocol):
-    """What a place needs of a `RayCaster`."""
+    """What a scan needs of a `RayCaster`."""
 
     @property
     def triangles(self) -> Corners:
@@ -48,8 +49,8 @@ class Caster(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """Where sensors hang, and with which returns they see.
+class ScanPosition:
+    """Position of the sensors whose scans are wanted, and which of their returns count.
 
     Parameters
     ----------
@@ -57,34 +58,32 @@ class Place:
     yaw : float, radians
     models : sequence of LidarModel
         Whose scans from here are wanted.
-    delta : float, metres
     """
 
     caster: Caster
     origin: Float
     yaw: float
     models: Sequence[LidarModel]
-    delta: float
-    min_intensity: float
+    settings: VisibilitySettings
 
     def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
         """Tell which of a sensor's hits count as returns: within its range and strong enough, (n,) bool."""
         counts = (distance >= model.min_range) & (distance <= model.max_range)
-        if self.min_intensity > 0:
+        if self.settings.min_intensity > 0:
             corners = self.caster.triangles[triangle[counts]]
             normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             cos_incidence = (normal * directions[counts]).sum(axis=1) / np.linalg.norm(normal, axis=1)
-            counts[counts] = return_intensity(model, distance[counts], cos_incidence) >= self.min_intensity
+            counts[counts] = return_intensity(model, distance[counts], cos_incidence) >= self.settings.min_intensity
         return counts
 
 
-def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
     """Find which targets are seen, casting only rays that can matter.
 
     Parameters
     ----------
     surfaces : NearSurfaces
-        About the targets, for the place's δ.
+        About the targets, for the settings' δ.
 
     Returns
     -------
@@ -93,11 +92,11 @@ def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, in
     cast : int
         Number of rays.
     """
-    beams = Beams.of(place.models, place.yaw)
-    returns = _Returns(place, beams)
-    seen = np.zeros((len(place.models), len(surfaces.xyz)), dtype=bool)
+    beams = Beams.of(position.models, position.yaw)
+    returns = _Returns(position, beams)
+    seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
 
-    first = near_rays(beams, target_patches(place.origin, surfaces)).likeliest(beams.sensor)
+    first = near_rays(beams, target_patches(position.origin, surfaces)).likeliest(beams.sensor)
     sees, triangle = returns.see(first, surfaces.xyz)
     seen[beams.sensor[first.channel], first.target] = sees
     unseen = np.zeros(len(surfaces.xyz), dtype=bool)
@@ -106,14 +105,14 @@ def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, in
     blocker[beams.sensor[first.channel], first.target] = triangle
 
     # every round keeps, beside each bundle, the triangle that stopped the last ray cast for it
-    patches, planes = disc_patches(place.origin, surfaces, unseen)
+    patches, planes = disc_patches(position.origin, surfaces, unseen)
     bundles = near_rays(beams, patches, planes)
     bundles = bundles.pick(np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target]))
     triangle = blocker[beams.sensor[bundles.channel], bundles.target]
     while len(bundles):
         stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
-        corners = place.caster.triangles[triangle[stopped]]
-        stopped[stopped] = stopped_by(place.origin, corners, beams, bundles.pick(stopped), planes)
+        corners = position.caster.triangles[triangle[stopped]]
+        stopped[stopped] = stopped_by(position.origin, corners, beams, bundles.pick(stopped), planes)
         bundles = bundles.pick(~stopped)
         sees, triangle = returns.see(bundles, surfaces.xyz)
         seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
@@ -123,38 +122,38 @@ def seen_by_near_rays(place: Place, surfaces: NearSurfaces) -> tuple[Boolean, in
     return seen, returns.cast
 
 
-def seen_by_all_rays(place: Place, targets: Float) -> tuple[Boolean, int]:
+def seen_by_all_rays(position: ScanPosition, targets: Float) -> tuple[Boolean, int]:
     """Find which targets are seen by casting every ray of every sensor: the reference."""
-    index = TargetIndex(targets, place.delta)
-    seen = np.zeros((len(place.models), len(targets)), dtype=bool)
+    index = TargetIndex(targets, position.settings.delta)
+    seen = np.zeros((len(position.models), len(targets)), dtype=bool)
     cast = 0
-    for number, model in enumerate(place.models):
-        pattern = BeamPattern(model, place.yaw)
+    for number, model in enumerate(position.models):
+        pattern = BeamPattern(model, position.yaw)
         total = model.channels * model.azimuth_count
         for begin in range(0, total, _RAYS_AT_ONCE):
             directions = pattern.directions(np.arange(begin, min(begin + _RAYS_AT_ONCE, total)))
-            distance, triangle = place.caster.cast(place.origin, directions, model.max_range)
-            counts = place.counting(model, directions, distance, triangle)
-            points = _points(place.origin, directions[counts], distance[counts])
+            distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
+            counts = position.counting(model, directions, distance, triangle)
+            points = _points(position.origin, directions[counts], distance[counts])
             seen[number, index.within_delta(points)] = True
         cast += total
     return seen, cast
 
 
 class _Returns:
-    """The returns of all sensors at one place, each ray cast when it is first asked for.
+    """The returns of all sensors at one position, each ray cast when it is first asked for.
 
     Parameters
     ----------
     beams : Beams
-        Of the place.
+        Of the position.
     """
 
-    def __init__(self, place: Place, beams: Beams) -> None:
-        self._place, self._beams = place, beams
-        self._patterns = [BeamPattern(model, place.yaw) for model in place.models]
-        self._first_channel = np.searchsorted(beams.sensor, np.arange(len(place.models)))
-        self._reach = max(model.max_range for model in place.models)
+    def __init__(self, position: ScanPosition, beams: Beams) -> None:
+        self._position, self._beams = position, beams
+        self._patterns = [BeamPattern(model, position.yaw) for model in position.models]
+        self._first_channel = np.searchsorted(beams.sensor, np.arange(len(position.models)))
+        self._reach = max(model.max_range for model in position.models)
         self._row = np.zeros(beams.rays, dtype=np.int32)  # of each ray in the arrays below; row 0: not cast
         self._direction = np.zeros((1, 3))
         self._distance = np.full(1, np.inf)
@@ -181,12 +180,12 @@ class _Returns:
         """
         row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
         gap = self._point[row] - targets[bundles.target]
-        sees = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2 < self._place.delta**2
+        sees = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2 < self._position.settings.delta**2
         triangle = self._triangle[row]
         near = np.flatnonzero(sees)
-        for number, model in enumerate(self._place.models):
+        for number, model in enumerate(self._position.models):
             own = near[self._beams.sensor[bundles.channel[near]] == number]
-            counts = self._place.counting(model, self._direction[row[own]], self._distance[row[own]], triangle[own])
+            counts = self._position.counting(model, self._direction[row[own]], self._distance[row[own]], triangle[own])
             sees[own] = counts
         return sees, triangle
 
@@ -198,11 +197,11 @@ class _Returns:
             self._row[ray[fresh]] = np.arange(len(fresh))  # of bundles with the same ray the last one stands for all
             fresh = fresh[self._row[ray[fresh]] == np.arange(len(fresh))]
             directions = self._directions(channel[fresh], step[fresh])
-            distance, triangle = self._place.caster.cast(self._place.origin, directions, self._reach)
+            distance, triangle = self._position.caster.cast(self._position.origin, directions, self._reach)
             self._row[ray[fresh]] = np.arange(len(fresh)) + len(self._distance)
             self._direction = np.concatenate([self._direction, directions])
             self._distance = np.concatenate([self._distance, distance])
-            self._point = np.concatenate([self._point, _points(self._place.origin, directions, distance)])
+            self._point = np.concatenate([self._point, _points(self._position.origin, directions, distance)])
             self._triangle = np.concatenate([self._triangle, triangle])
         rows: Integer = self._row[ray]
         return rows
@@ -212,7 +211,7 @@ class _Returns:
         for number, pattern in enumerate(self._patterns):
             own = np.flatnonzero(self._beams.sensor[channel] == number)
             local = channel[own] - self._first_channel[number]
-            directions[own] = pattern.directions(local * self._place.models[number].azimuth_count + step[own])
+            directions[own] = pattern.directions(local * self._position.models[number].azimuth_count + step[own])
         return directions
 
 

@@ -15,29 +15,30 @@ from ..lidar import LidarModel
 from ..progress import Progress
 from ..site.site import Site
 from ..storage.array_file import ArrayFile, ArrayRule
-from .grid import VisibilityGrid, VisibilitySettings, compute_visibility, visibility_key
-from .observer import Rows
+from .chunks import Rows
+from .grid import VisibilityGrid, compute_visibility, visibility_key
 from .ray_casting import Engine, engine_name
+from .settings import VisibilitySettings
 
-_PIECE = ArrayFile(
+_CHUNK = ArrayFile(
     "seip.visibility-piece",
     1,
-    "piece of a visibility grid",
+    "chunk of a visibility grid",
     "delete it and compute it again",
     {"packed": ArrayRule("u1", ("poses", "bytes")), "rays": ArrayRule("i8", (), 0)},
     compressed=False,
 )
 
 
-class PieceFolder:
-    """Finished pieces of a grid in the making, in a folder beside its file.
+class CheckpointFolder:
+    """Finished chunks of a grid in the making, in a folder beside its file.
 
     Parameters
     ----------
     path : path
         The grid's file.
     key : str
-        The grid's key. Pieces of another are removed.
+        The grid's key. Chunks of another are removed.
     """
 
     def __init__(self, path: Path, key: str) -> None:
@@ -48,16 +49,16 @@ class PieceFolder:
                 other.unlink(missing_ok=True)  # another process may be at it too
 
     def load(self, number: int) -> Rows | None:
-        """Return a piece, or None where there is none that can be used."""
+        """Return a chunk, or None where there is none that can be used."""
         try:
-            with _PIECE.reading(self._file(number)) as (_, arrays):
+            with _CHUNK.reading(self._file(number)) as (_, arrays):
                 return Rows(arrays["packed"], int(arrays["rays"]))
         except SeipError:
             return None
 
     def save(self, number: int, rows: Rows) -> None:
-        """Write a piece."""
-        _PIECE.save(self._file(number), {}, {"packed": rows.packed, "rays": np.array(rows.rays)})
+        """Write a chunk."""
+        _CHUNK.save(self._file(number), {}, {"packed": rows.packed, "rays": np.array(rows.rays)})
 
     def remove(self) -> None:
         """Remove the folder, once the grid is whole."""
@@ -100,10 +101,10 @@ def stored_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who 
     if stored is not None and stored.key == key and stored.shape == (len(site.candidates), len(site.targets)):
         yield Progress(len(site.candidates), len(site.candidates), "visibility, from an earlier run")
         return stored
-    pieces = PieceFolder(path, key)
-    grid = yield from compute_visibility(site, models, settings, engine, pieces, scheduler, threads)
+    checkpoint = CheckpointFolder(path, key)
+    grid = yield from compute_visibility(site, models, settings, engine, checkpoint, scheduler, threads)
     grid.save(path)
-    pieces.remove()
+    checkpoint.remove()
     return grid
 
 

@@ -22,8 +22,8 @@ from ..results.placement_record import Record
 from ..scans.sensor import MountedSensor
 from ..site.scene_geometry import joined
 from ..visibility.grid import VisibilityGrid
-from ..visibility.rotated_sensors import Onlooker, onlooker
 from ..visibility.sight_lines import pose_at
+from ..visibility.visibility_model import VisibilityModel, visibility_model
 from .survey import Layout, recorded_goal
 
 BY_HAND = "by hand"
@@ -61,7 +61,7 @@ def judge(
         A sensor hangs below the ground.
     """
     site, models = layout.site, layout.models
-    eyes: Onlooker | None = None
+    eyes: VisibilityModel | None = None
     sensors: list[Sensor] = []
     rows: list[Boolean] = []
     for done, one in enumerate(hung):
@@ -72,7 +72,7 @@ def judge(
             rows.append(grid.visible[pose])
             continue
         if eyes is None:
-            eyes = onlooker(site, layout.settings.visibility, layout.settings.engine)
+            eyes = visibility_model(site, layout.settings.visibility, layout.settings.engine)
         sensor = _elsewhere(layout, one, places.get(one.label, BY_HAND))
         sensors.append(sensor)
         rows.append(eyes.see(sensor.model, sensor.xyz, sensor.orientation))

@@ -22,7 +22,7 @@ from ..progress import Progress, within
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
 from ..visibility.grid import compute_visibility
-from ..visibility.rotated_sensors import Onlooker, onlooker
+from ..visibility.visibility_model import VisibilityModel, visibility_model
 from .survey import SurveySettings
 
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
@@ -190,7 +190,7 @@ class Judge:
         self.weights = target_weights(self.site, goal)
         self.geometry, self._goal = geometry, goal
         self._models = settings.models()
-        self._onlooker: Onlooker = onlooker(self.site, settings.visibility, settings.engine)
+        self._visibility: VisibilityModel = visibility_model(self.site, settings.visibility, settings.engine)
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
         """Find the best placement under some settings, and judge it."""
@@ -225,7 +225,7 @@ class Judge:
         """Return the share of the fine grid's weight that a placement sees."""
         seen = np.zeros(len(self.site.targets), dtype=bool)
         for sensor in plan.deployment.sensors:
-            seen |= self._onlooker.see(sensor.model, sensor.xyz, sensor.orientation)
+            seen |= self._visibility.see(sensor.model, sensor.xyz, sensor.orientation)
         return weighted_share(seen, self.weights)
 
 

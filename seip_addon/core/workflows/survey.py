@@ -31,10 +31,11 @@ from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
 from ..storage.files import digest
 from ..visibility.estimate import Estimate, estimate_visibility
-from ..visibility.grid import VisibilityGrid, VisibilitySettings, visibility_key
+from ..visibility.grid import VisibilityGrid, visibility_key
 from ..visibility.ray_casting import Engine, engine_name
 from ..visibility.ring_resolution import resolution_warnings
 from ..visibility.rounding import rounding_warnings
+from ..visibility.settings import VisibilitySettings
 from ..visibility.store import stored_visibility
 
 POSES_TRIED = StudySettings(draws=100, draws_of_kind=0)

@@ -1,0 +1,32 @@
+"""Settings of visibility: when a target counts as seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import SeipError
+
+WIDEST_DELTA = 100.0
+"""Metres: a wider one is a slip of the keyboard."""
+
+
+@dataclass(frozen=True)
+class VisibilitySettings:
+    """When a target counts as seen.
+
+    Parameters
+    ----------
+    delta : float, metres
+        A return nearer than this to a target sees it.
+    min_intensity : float, 0 to 1
+        Least intensity of such a return, for surfaces of reflectivity 1. At 0 every return counts.
+    """
+
+    delta: float = 1.0
+    min_intensity: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.delta <= WIDEST_DELTA:
+            raise SeipError(f"delta must be a positive number of metres up to {WIDEST_DELTA:g}, not {self.delta}")
+        if not 0 <= self.min_intensity <= 1:
+            raise SeipError(f"the least intensity must lie between 0 and 1, not {self.min_intensity}")
