@@ -1,0 +1,137 @@
+"""Python interface: from a scene to a placement and to scans, in arrays.
+
+    import seip_addon.api as seip
+
+Needs Blender's module ``bpy``, or Blender itself. The steps are those of the
+panel and of the commands, without files and without Blender's window.
+
+Examples
+--------
+>>> import seip_addon.api as seip
+>>> geometry = seip.read_scene("scenes/junction.blend")
+>>> candidates = seip.CandidateSettings(sensors=("type3",), heights=(8.0,), spacing=15.0)
+>>> layout = seip.lay_out(geometry, seip.SurveySettings(candidates, grid_spacing=4.0))
+>>> len(layout.site.targets), len(layout.site.candidates)
+(306, 36)
+>>> grid = seip.compute_visibility(layout)
+>>> grid.visible.shape
+(36, 306)
+>>> plan = seip.place(layout, grid, seip.Goal(count=2))
+>>> plan.placement.status, round(plan.deployment.coverage, 4)
+('optimal', 0.8922)
+>>> traffic = seip.load_traffic("scenes/junction_traffic/run-1.npz", geometry)
+>>> frame = seip.scan(geometry, plan, traffic, time=30.0)
+>>> frame.points.dtype, frame.points.shape[1], len(frame.labels.category)
+(dtype('float32'), 3, 50)
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .core.placement.goal import Goal, Plan
+from .core.progress import finish
+from .core.scans import Frame, MountedSensor, ScanSettings
+from .core.site.candidates import CandidateSettings
+from .core.site.scene_geometry import SceneGeometry
+from .core.traffic import Trajectories
+from .core.traffic.source import TrafficFiles
+from .core.traffic.source import load_traffic as _load_traffic
+from .core.visibility.grid import VisibilityGrid
+from .core.visibility.grid import compute_visibility as _compute
+from .core.visibility.settings import VisibilitySettings
+from .core.workflows.recording import RecordingSettings, frame_number, make_run, simulation_of
+from .core.workflows.survey import Layout, SurveySettings, lay_out
+from .core.workflows.survey import place as _place
+
+__all__ = [
+    "CandidateSettings",
+    "Goal",
+    "ScanSettings",
+    "SurveySettings",
+    "VisibilitySettings",
+    "compute_visibility",
+    "lay_out",
+    "load_traffic",
+    "place",
+    "read_scene",
+    "scan",
+]
+
+
+def read_scene(path: str | os.PathLike[str] | None = None) -> SceneGeometry:
+    """Read the scene of a .blend, or the scene that is open.
+
+    Parameters
+    ----------
+    path : path, optional
+        Opened in place of the open file.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be opened, or the scene lacks the region or the road.
+    """
+    import bpy  # noqa: PLC0415  # the rest of this module needs no Blender
+
+    from .scene.blend_file import open_blend  # noqa: PLC0415  # as above
+    from .scene.read import read_scene as read  # noqa: PLC0415  # as above
+
+    if path is not None:
+        open_blend(Path(path))
+    return read(bpy.context.scene).geometry
+
+
+def compute_visibility(layout: Layout, threads: int | None = None) -> VisibilityGrid:
+    """Compute which candidate sees which target.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Threads at most; as many as pay if not given.
+
+    Returns
+    -------
+    VisibilityGrid
+        Its ``visible`` is a (candidates, targets) bool array.
+    """
+    settings = layout.settings
+    return finish(_compute(layout.site, layout.models, settings.visibility, settings.engine, threads=threads))
+
+
+def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Plan:
+    """Solve the placement problem.
+
+    Returns
+    -------
+    Plan
+        ``placement`` holds the chosen candidates with objective, bound and gap; ``deployment`` the sensors with coverage
+        and price.
+
+    Raises
+    ------
+    SeipError
+        The goal contradicts itself or the site.
+    """
+    return finish(_place(layout, grid, goal))
+
+
+def load_traffic(path: str | os.PathLike[str], geometry: SceneGeometry) -> Trajectories:
+    """Read trajectories (.npz) or floating car data of SUMO, in the axes of a scene."""
+    return finish(_load_traffic(TrafficFiles(Path(path)), geometry)).trajectories
+
+
+def scan(
+    geometry: SceneGeometry, plan: Plan, traffic: Trajectories, time: float, settings: ScanSettings | None = None
+) -> Frame:
+    """Scan traffic at a time in seconds with the sensors of a placement.
+
+    Returns
+    -------
+    Frame
+        Merged point cloud with the boxes of all road users.
+    """
+    sensors = [MountedSensor(s.label, s.model, s.xyz, s.orientation) for s in plan.deployment.sensors]
+    run = make_run(geometry, sensors, traffic, RecordingSettings(settings or ScanSettings()), {})
+    return finish(simulation_of(run)).frame(*frame_number(run, time))
