@@ -106,8 +106,8 @@ def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Plan:
     Returns
     -------
     Plan
-        ``placement`` holds the chosen candidates with objective, bound and gap; ``deployment`` the sensors with coverage
-        and price.
+        Its ``placement`` holds the chosen candidates with objective, bound and gap, its ``deployment`` the sensors with
+        coverage and price.
 
     Raises
     ------
