@@ -17,10 +17,10 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.claims import save_claims
 from headless.coverage_study import NUMBERS
-from headless.coverage_study.tables import save_claims
 from headless.detection import case_study, study_results
-from headless.detection.claims import judge
+from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
 from headless.detection.recordings import Configuration, Studio
@@ -59,7 +59,7 @@ def main(argv: list[str]) -> None:
         for sentence in sentences:
             session.say(f"warning: {name}: {sentence}")
     judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, stage.traffic))
-    claims = judge([judgement.trial for judgement in judgements])
+    claims = detection_claims([judgement.trial for judgement in judgements])
 
     site = stage.surveyed.layout.site
     with session.writing(folder):
@@ -77,7 +77,7 @@ def main(argv: list[str]) -> None:
     for line in study_results.in_words(results):
         session.say(line)
     for claim in claims:
-        session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")
+        session.say(claim.describe())
     session.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
     session.say(f"written to {folder}/")
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval, percentiles
 
 from .frame_results import FrameResult
-from .intervals import Interval, percentiles
 from .matching import Match, Rule, match
 
 BLOCK = 10.0

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
+from seip_addon.core.estimates import Interval
 
 from .average_precision import Evaluation, part
-from .intervals import Interval
 
 ALONG_DISTANCE = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
 ALONG_POINTS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)

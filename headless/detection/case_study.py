@@ -21,6 +21,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
@@ -38,7 +39,6 @@ from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
-from .intervals import Interval
 from .kitti import kitti
 from .matching import Rule
 from .pillars import PillarGrid

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
+from seip_addon.core.estimates import mean_interval
 
 from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin
 from .claims import Trial
 from .frame_results import FrameResult
-from .intervals import mean_interval
 from .matching import NOBODY, Rule, match
 
 IN_PLAN = [0, 1, 3, 4, 6]

@@ -1,8 +1,6 @@
-"""Verdicts on the paper's claims about detection, for one site.
+"""Verdicts on the paper's claims about detection, 5 to 9, for one site.
 
-Claims 5 to 9 of Qu, Huang and Suo, "SEIP: Simulation-based Design and
-Evaluation of Infrastructure-based Collective Perception", section V. Gains are
-in points of average precision. All figures are means over the seeds of the
+Gains are in points of average precision. All figures are means over the seeds of the
 training with Student's 95 % interval; seeds are compared pair by pair. A claim
 holds where the interval lies within what is claimed, does not hold where it
 lies outside, and is undecided between the two. Where the study says "about",
@@ -14,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from headless.coverage_study import NUMBERS, Claim
-from headless.coverage_study.claims import UNDECIDED
+from headless.claims import UNDECIDED, Claim, judge_above, judge_all, judge_within
+from headless.coverage_study import NUMBERS
 
 import numpy as np
 
-from .intervals import Interval, judge_above, judge_all, judge_within, mean_interval
+from seip_addon.core.estimates import Interval, mean_interval
 
 ABOUT = 2.0
 """Factor up to which a figure is about another."""
@@ -70,7 +68,7 @@ class Trial:
     padded: bool = False
 
 
-def judge(trials: Sequence[Trial]) -> tuple[Claim, ...]:
+def detection_claims(trials: Sequence[Trial]) -> tuple[Claim, ...]:
     """Hold claims 5 to 9 of the study against what was measured.
 
     Claims for which a type or the ablation is missing are left out.

@@ -18,10 +18,11 @@ from headless.charts.detection import (
     save_training_chart,
 )
 from headless.charts.error_view import save_error_view
-from headless.coverage_study import Claim
+from headless.claims import Claim
 
 import numpy as np
 
+from seip_addon.core.estimates import Interval, rank_correlation, rank_correlation_interval
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .breakdown import (
@@ -36,7 +37,6 @@ from .breakdown import (
 )
 from .case_study import MAIN, Judgement, Pupil, Traffic
 from .chart_data import cells, curve, error_view, parts
-from .intervals import Interval, rank_correlation, rank_correlation_interval
 from .recordings import Studio
 from .training import Trained
 

@@ -20,8 +20,8 @@ import pytest
 from matplotlib.image import imread
 from square_by_hand import road, sensors
 
+from seip_addon.core.estimates import Estimate
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.estimates import Estimate
 from seip_addon.core.scans import ScanSettings
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))

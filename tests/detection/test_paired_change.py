@@ -3,12 +3,13 @@
 import math
 
 from headless.detection.average_precision import evaluate
-from headless.detection.intervals import percentiles, student_quantile
 from headless.detection.matching import Rule
 from headless.lab.detector.paired_change import DRAWS, Sampled, change, level
 
 import pytest
 from told_frames import box, detected, frame, traffic, truth
+
+from seip_addon.core.estimates import percentiles, student_quantile
 
 RULE = Rule()
 CARS = [box(20.0 * number) for number in range(10)]

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 from headless.detection.average_precision import FEWEST_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
-from headless.detection.intervals import percentiles, student_quantile
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.estimates import Estimate, percentiles, student_reach
 
 DRAWS = 2 * RESAMPLES
 """Resamples of the blocks of traffic; what the first half of them says must be what all say."""
@@ -72,6 +71,5 @@ def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> E
     if blocks < FEWEST_BLOCKS:
         return Estimate(value, -math.inf, math.inf)
     low, high = percentiles(np.mean(draws, axis=0))
-    count = len(values)
-    reach = student_quantile(count - 1) * float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
+    reach = student_reach(values) if len(values) > 1 else 0.0
     return Estimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))

@@ -10,7 +10,7 @@ from headless.lab.stability.rows import Row
 
 import numpy as np
 
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.estimates import Estimate
 
 from .disturbances import (
     Capped,

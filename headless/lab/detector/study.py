@@ -22,8 +22,8 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 
 import numpy as np
 
+from seip_addon.core.estimates import Estimate
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.robustness.estimates import Estimate
 
 from .disturbances import (
     Capped,

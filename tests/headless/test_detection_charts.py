@@ -3,7 +3,7 @@
 import math
 
 from headless.charts import detection as detection_charts
-from headless.charts import error_view
+from headless.charts import error_view, style
 from headless.charts.detection import (
     Cell,
     Curve,
@@ -45,7 +45,7 @@ def figures(monkeypatch):
         saved.append(figure)
         save(path, figure)
 
-    for module in (detection_charts, error_view):
+    for module in (detection_charts, style):
         monkeypatch.setattr(module, "save_png", keep)
     return saved
 
