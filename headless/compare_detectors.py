@@ -13,7 +13,7 @@ import time
 from collections.abc import Generator
 from dataclasses import replace
 
-from headless import evaluate, session, survey
+from headless import evaluate, session
 from headless.charts.detection import Setting, save_setting_chart
 from headless.detection import case_study
 from headless.detection.detector import Detector
@@ -22,6 +22,7 @@ from headless.detection.pillars import grid_of
 from headless.detection.recordings import Studio
 from headless.detection.settings import PUBLISHED, NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
+from headless.options import new_parser
 
 import numpy as np
 
@@ -121,9 +122,7 @@ def _inference(stage: evaluate.Stage, detector: Detector) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="compare_detectors", description=__doc__.splitlines()[0], formatter_class=survey.HelpWithDefaults
-    )
+    parser = new_parser("compare_detectors", __doc__.splitlines()[0])
     evaluate.add_options(parser)
     parser.set_defaults(steps=600, every=5.0)
     return parser

@@ -25,7 +25,7 @@ from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
 from headless.detection.recordings import Configuration, Studio
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.traffic_runs import runs_beside
+from headless.options import new_parser
 
 import bpy
 
@@ -56,8 +56,7 @@ def main(argv: list[str]) -> None:
     trained = watch.run("training", case_study.train_all(pupils, lessons, folder, device=options.device))
     detectors = [one.detector for one in trained]
     for name, sentences in case_study.foreseen(studio, pupils, detectors, stage.traffic).items():
-        for sentence in sentences:
-            session.say(f"warning: {name}: {sentence}")
+        session.warn(f"{name}: {sentence}" for sentence in sentences)
     judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, stage.traffic))
     claims = detection_claims([judgement.trial for judgement in judgements])
 
@@ -104,16 +103,14 @@ def set_stage(options: argparse.Namespace) -> Stage:
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
-    paths = options.traffic or runs_beside(options.scene)
+    paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
     session.say(traffic.overlap())
     steps = case_study.place_all(
         surveyed.layout.site,
         surveyed.layout.models,
         surveyed.grid,
-        solver=surveyed.layout.settings.solver,
-        time_limit=surveyed.layout.settings.time_limit,
-        effort=surveyed.layout.settings.effort,
+        **surveyed.layout.settings.limits,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
@@ -148,11 +145,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="evaluate",
-        description="Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
+    parser = new_parser("evaluate", what)
     add_options(parser)
     parser.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")

@@ -22,7 +22,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import files as storage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
 
     from seip_addon.core.progress import Progress
@@ -109,6 +109,12 @@ def say(text: str) -> None:
     """Print a line for the person who runs the command, at once."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Print what a user should know before trusting the results."""
+    for sentence in sentences:
+        say(f"warning: {sentence}")
 
 
 def run(main: Callable[[list[str]], None]) -> NoReturn:

@@ -27,7 +27,7 @@ from headless.lab.stability.criterion import criterion_rows, criterion_study
 from headless.lab.stability.page import Chapter, Chart, load_chapter, save_chapter, save_page
 from headless.lab.stability.robustness_rows import pose_rows, robust_rows, traffic_rows
 from headless.lab.stability.solver_limits import solver_rows, solver_study
-from headless.traffic_runs import load_runs, parted, runs_beside
+from headless.options import new_parser
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, solve
@@ -44,6 +44,7 @@ from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.workflows.survey import grid_key, surroundings
+from seip_addon.core.workflows.traffic import load_runs, split_runs
 
 FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
@@ -142,7 +143,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         argparse.Namespace(**vars(options) | {"output": options.work}),
         lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
     )
-    runs = load_runs(runs_beside(options.scene), surveyed.layout.geometry.origin)
+    runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
     stage = Stage(surveyed, runs, options.scene, options.other, options.work, charts, scope or Scope())
     made_from = digest(
         grid_key(surveyed.layout),
@@ -169,7 +170,7 @@ def _check_other(scene: Path) -> None:
     """Raise SeipError, before hours of work, where detectors cannot be tried on a scene."""
     if not scene.is_file():
         raise SeipError(f"there is no file {scene}: --other names scenes with traffic beside them")
-    if not runs_beside(scene):
+    if not survey.runs_beside(scene):
         raise SeipError(
             f"there is no traffic beside {scene}: put runs made by headless/traffic.py into the folder "
             f"{scene.stem}_traffic beside it"
@@ -280,7 +281,7 @@ def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Let vehicles stand in the way of a placement."""
     layout = stage.surveyed.layout
     around, problem, settings = surroundings(layout), stage.problem(stage.sensor), layout.settings
-    to_choose_on, to_judge_in = parted(stage.runs)
+    to_choose_on, to_judge_in = split_runs(stage.runs)
     choose, judge = stage.scope.instants
     scenarios = yield from look_at_traffic(around, problem, spread_instants(to_choose_on, choose, seed=0))
     judged = spread_instants(to_judge_in, judge, seed=1)
@@ -289,9 +290,7 @@ def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
         problem,
         scenarios,
         judged,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
+        **settings.limits,
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
@@ -327,8 +326,7 @@ def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
 
 
 def _settings(stage: Stage) -> RobustSettings:
-    settings = stage.surveyed.layout.settings
-    return replace(stage.scope.robust, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
+    return replace(stage.scope.robust, **stage.surveyed.layout.settings.limits)
 
 
 def _lead(stage: Stage) -> str:
@@ -343,11 +341,7 @@ def _lead(stage: Stage) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="stability",
-        description="Drive every method to where it fails, and write a page with charts.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    parser = new_parser("stability", "Drive every method to where it fails, and write a page with charts.")
     survey.add_options(parser)
     parser.add_argument(
         "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="scenes to try detectors on that learnt here"

@@ -18,6 +18,7 @@ from headless.claims import save_claims
 from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_claims, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
 from headless.coverage_study.tables import save_study_table
+from headless.options import new_parser
 
 from seip_addon.core.pictures.plan_view import save_plan_view
 from seip_addon.core.placement.goal import Goal, check_goal
@@ -28,14 +29,7 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=1)))
     site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
-    steps = coverage_study(
-        site,
-        surveyed.layout.models,
-        visible,
-        solver=surveyed.layout.settings.solver,
-        time_limit=surveyed.layout.settings.time_limit,
-        effort=surveyed.layout.settings.effort,
-    )
+    steps = coverage_study(site, surveyed.layout.models, visible, **surveyed.layout.settings.limits)
     study = surveyed.stopwatch.run("study", steps)
     claims = coverage_claims(study)
 
@@ -58,11 +52,8 @@ def main(argv: list[str]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="study",
-        description="Redo the study's coverage figures on a scene; name sensor types from the simplest to the best.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    what = "Redo the study's coverage figures on a scene; name sensor types from the simplest to the best."
+    parser = new_parser("study", what)
     survey.add_options(parser)
     return parser
 

@@ -17,7 +17,6 @@ from headless.detection.training import Trained
 from headless.lab.detector.disturbances import Disturbance
 from headless.lab.detector.study import Course, Elsewhere, LimitsStudy, course, limits_study
 from headless.lab.detector.trials import Entrant, Ground, trials
-from headless.traffic_runs import runs_beside
 
 import bpy
 
@@ -67,7 +66,7 @@ def detector_limits(
     """
     layout, network = surveyed.layout, NetworkSettings()
     origin = layout.geometry.origin
-    traffic = case_study.read_traffic(runs_beside(scene), origin, EVERY)
+    traffic = case_study.read_traffic(survey.runs_beside(scene), origin, EVERY)
     configurations = yield from _placed(surveyed)
     studio = _studio(layout)
     asked = course(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
@@ -79,7 +78,7 @@ def detector_limits(
     practice = Ground(studio.site, studio, _thinned(traffic.validation))
     (tried,) = yield from trials(practice, main, Disturbance(), candidates.entrants[:1], folder)
     elsewhere = []
-    dense = case_study.read_runs(runs_beside(scene, "_dense"), origin, EVERY)
+    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, EVERY)
     if dense:
         elsewhere.append(Elsewhere(Ground("denser traffic", studio, _thinned(dense)), (main,), candidates.entrants))
     for other in others:
@@ -115,7 +114,7 @@ def _on_other_scene(
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     grid = yield from see(layout, folder / f"visibility_{scene.stem}.npz")
     there = yield from _placed(survey.Survey(layout, grid, surveyed.stopwatch))
-    runs = case_study.read_runs(runs_beside(scene), layout.geometry.origin, EVERY)
+    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, EVERY)
     pillars = grid_of(layout.geometry, entrants[0].detector.grid.pillar)
     moved = tuple(Entrant(one.name, on_grid(one.detector, pillars)) for one in entrants)
     return Elsewhere(Ground(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
@@ -128,9 +127,7 @@ def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[Configur
         layout.site,
         layout.models,
         surveyed.grid,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
+        **settings.limits,
     )
 
 

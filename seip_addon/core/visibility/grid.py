@@ -21,6 +21,7 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..lidar import LidarModel, find_models
 from ..progress import Progress
+from ..settings import setting
 from ..site.site import Site
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..storage.files import digest
@@ -57,8 +58,8 @@ class VisibilitySettings:
         Least intensity of such a return, for surfaces of reflectivity 1. At 0 every return counts.
     """
 
-    delta: float = 1.0
-    min_intensity: float = 0.0
+    delta: float = setting(1.0, "a return closer than this sees a target", unit="m", maximum=WIDEST_DELTA)
+    min_intensity: float = setting(0.0, "least intensity of a return that sees", minimum=0.0, maximum=1.0)
 
     def __post_init__(self) -> None:
         if not 0 < self.delta <= WIDEST_DELTA:

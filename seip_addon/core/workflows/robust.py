@@ -13,6 +13,7 @@ from ..robustness.pose_errors import PoseErrors, require_draws
 from ..robustness.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
 from ..robustness.risk import Risk
 from ..robustness.robust_study import RobustSettings, RobustStudy, robust_study
+from ..settings import setting
 from ..visibility.grid import VisibilityGrid
 from .survey import Layout, surroundings
 
@@ -45,9 +46,9 @@ class Precaution:
 
     risk: Risk
     errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = 20
-    draws: int = 500
-    seed: int = 0
+    scenarios: int = setting(20, "draws to choose on", minimum=1)
+    draws: int = setting(500, "unseen draws to judge by", minimum=1)
+    seed: int = setting(0, "of the scenarios; unseen draws have the next")
 
     def __post_init__(self) -> None:
         require_draws(self.scenarios)
@@ -106,9 +107,7 @@ def place_robustly(
         scenarios=precaution.scenarios,
         unseen=precaution.draws,
         seed=precaution.seed,
-        solver=layout.settings.solver,
-        time_limit=layout.settings.time_limit,
-        effort=layout.settings.effort,
+        **layout.settings.limits,
     )
     problem = placement_problem(site, grid.visible, models, goal)
     study = yield from robust_study(around, problem, settings, [precaution.risk])
