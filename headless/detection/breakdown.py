@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.estimates import Interval
 
 from .average_precision import Evaluation, part
 
@@ -31,15 +30,12 @@ class Bin:
         Road users that had to be found.
     value : float
         NaN where there are none to take it of.
-    interval : (float, float) or None
-        95 % interval of ``value``, where it has one.
     """
 
     low: float
     high: float
     wanted: int
     value: float
-    interval: Interval | None = None
 
 
 def average_precision_by(evaluation: Evaluation, quantity: str, edges: Sequence[float]) -> tuple[Bin, ...]:

@@ -10,7 +10,7 @@ import sys
 import threading
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -171,7 +171,8 @@ def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
     """Write plain values and tensors, with a digest of them."""
     full = {"schema": SCHEMA, "version": VERSION, **state}
     content = io.BytesIO()  # to no file: its name would go into the bytes, and a full disk leave it unclosed
-    torch.save(_shared_text({**full, "digest": _digest(full)}), content)
+    # Equal texts as one object, which pickle writes once: equal values give equal bytes.
+    torch.save(_replaced({**full, "digest": _digest(full)}, str, sys.intern), content)
     with whole_file(path) as temporary:
         temporary.write_bytes(content.getvalue())
 
@@ -282,38 +283,24 @@ def _experience(known: Mapping[str, Any]) -> Experience:
 def _tensors(value: Any) -> Iterator[Tensor]:  # noqa: ANN401  # plain values of any kind
     if isinstance(value, Tensor):
         yield value
-    elif isinstance(value, Mapping):
-        for part in value.values():
-            yield from _tensors(part)
-    elif isinstance(value, list | tuple):
-        for part in value:
+    elif isinstance(value, Mapping | list | tuple):
+        for part in value.values() if isinstance(value, Mapping) else value:
             yield from _tensors(part)
 
 
 def _digest(state: Mapping[str, Any]) -> str:
     """Return the digest of plain values and tensors, in their order."""
-    return digest(repr(_digested(state)))
+    return digest(repr(_replaced(state, Tensor, lambda tensor: digest(tensor.detach().cpu().numpy()))))
 
 
-def _digested(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
-    """Return a value with digests in place of its tensors."""
-    if isinstance(value, Tensor):
-        return digest(value.detach().cpu().numpy())
+def _replaced(value: Any, kind: type, change: Callable[[Any], Any]) -> Any:  # noqa: ANN401  # plain values of any kind
+    """Return nested values with each part of some kind changed, tuples as lists."""
+    if isinstance(value, kind):
+        return change(value)
     if isinstance(value, Mapping):
-        return {key: _digested(part) for key, part in value.items()}
+        return {_replaced(key, kind, change): _replaced(part, kind, change) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_digested(part) for part in value]
-    return value
-
-
-def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
-    """Return a value in which equal texts are one object, which pickle writes once: equal values give equal bytes."""
-    if isinstance(value, str):
-        return sys.intern(value)
-    if isinstance(value, dict):
-        return {_shared_text(key): _shared_text(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_shared_text(part) for part in value]
+        return [_replaced(part, kind, change) for part in value]
     return value
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
@@ -58,30 +58,36 @@ def recording_of(folder: Path, site: str = "") -> Recording:
     record = load_manifest(folder)
     if not record["complete"]:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
-    frames = FrameFiles([frame_path(folder, number) for number in range(len(record["frames"]))])
+    frames = LazyFrames(len(record["frames"]), lambda number: Frame.load(frame_path(folder, number)))
     sensors = tuple(str(sensor["sensor"]) for sensor in record["sensors"])
     return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors, site)
 
 
-class FrameFiles(Sequence[Frame]):
-    """Frames in files, read when they are asked for."""
+class LazyFrames(Sequence[Frame]):
+    """Frames that are read, or simulated, each time that they are asked for.
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self._paths = tuple(paths)
+    Parameters
+    ----------
+    load : callable
+        From a frame's number to the frame.
+    """
+
+    def __init__(self, count: int, load: Callable[[int], Frame]) -> None:
+        self._numbers, self._load = range(count), load
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self._paths)
+        return len(self._numbers)
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
     @overload
-    def __getitem__(self, index: slice) -> FrameFiles: ...
-    def __getitem__(self, index: int | slice) -> Frame | FrameFiles:
-        """Read one frame, or return some that are not read yet."""
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Load one frame or several."""
         if isinstance(index, slice):
-            return FrameFiles(self._paths[index])
-        return Frame.load(self._paths[index])
+            return [self._load(number) for number in self._numbers[index]]
+        return self._load(self._numbers[index])
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +213,7 @@ def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str
 
 
 def _positions(recording: Recording) -> VehiclePositions:
-    frames = [recording.frames[number] for number in range(len(recording.frames))]
+    frames = recording.frames[:]
     return VehiclePositions(
         name=recording.name,
         time=np.array([frame.time for frame in frames]),

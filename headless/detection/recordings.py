@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
 
 from headless.coverage_study import Case
 
@@ -25,7 +23,7 @@ from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
 
-from .frames import Recording
+from .frames import LazyFrames, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +90,7 @@ class Studio:
 
     def record(self, configuration: Configuration, run: TrafficRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
-        frames = _Frames(self, configuration, run)
+        frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
         return Recording(name, run.key, frames, (configuration.case.sensor,), self.site)
 
@@ -103,20 +101,3 @@ class Studio:
     def _prepared(self, configuration: Configuration, run: TrafficRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))
-
-
-class _Frames(Sequence[Frame]):
-    def __init__(self, studio: Studio, configuration: Configuration, run: TrafficRun) -> None:
-        self._studio, self._configuration, self._run = studio, configuration, run
-
-    def __len__(self) -> int:
-        return len(self._run.times)
-
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Frame]: ...
-    def __getitem__(self, index: int | slice) -> Frame | Sequence[Frame]:
-        if isinstance(index, slice):
-            return [self[number] for number in range(len(self))[index]]
-        return self._studio.frame(self._configuration, self._run, range(len(self))[index])

@@ -15,8 +15,8 @@ from headless.lab.benchmark.placement import Run, compare
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.rivals import RIVALS, can_run
 from headless.lab.benchmark.scans import scan_costs
+from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
-from headless.street_visibility import street_problem
 
 import numpy as np
 

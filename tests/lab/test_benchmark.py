@@ -16,8 +16,8 @@ from headless.lab.benchmark.programme import Scope
 from headless.lab.benchmark.report import bars
 from headless.lab.benchmark.rivals import RIVALS, can_run
 from headless.lab.benchmark.scans import ScanCost
+from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import Cost
-from headless.street_visibility import street_problem
 
 import bpy
 import numpy as np
@@ -30,7 +30,6 @@ from seip_addon.core.site.scene_geometry import Mesh
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_junction import box_triangles, make_example
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 SMALL = Scope(
     layout=CandidateSettings(sensors=("type1",), heights=(3.5,), spacing=24.0),
     street=(20, 200, 2),
@@ -46,10 +45,10 @@ SMALL = Scope(
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(small_scene, tmp_path_factory):
     pytest.importorskip("embreex", reason="embreex is not installed")
     folder = tmp_path_factory.mktemp("benchmark")
-    benchmark.main([str(SCENE), "-o", str(folder), "--places", "1", "--time-limit", "5"], SMALL)
+    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--time-limit", "5"], SMALL)
     return folder
 
 

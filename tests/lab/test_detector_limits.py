@@ -10,6 +10,7 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 from headless import stability
 from headless.lab.detector import chapter as detector_limits
 from headless.lab.detector import study as limits_study
+from headless.lab.stability import chapters
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25"]
@@ -18,9 +19,9 @@ TRIED = (limits_study.DropOff(0.5),), (limits_study.Misturned(1.0, 0),)
 
 def test_the_chapter_holds_rows_and_charts_of_home_and_away(tmp_path):
     (tmp_path / "work").mkdir()
-    little = stability.Scope(detector={"seeds": 2, "steps": 2})
+    little = chapters.Scope(detector={"seeds": 2, "steps": 2})
     argv = [str(SCENES / "junction.blend"), "-o", str(tmp_path), "--work", str(tmp_path / "work"), *COARSE]
-    only = patch.object(stability, "_chapters", lambda _stage: [("detector", stability.detector)])
+    only = patch.object(stability, "chapters", lambda _stage: [("detector", chapters.detector)])
     few = patch.multiple(detector_limits, EVERY=60.0, TRIED=1)
     with only, few, patch.object(limits_study, "full_series", lambda _sensor: TRIED):
         stability.main([*argv, "--other", str(SCENES / "corridor.blend")], little)
