@@ -38,7 +38,7 @@ def main(argv: list[str]) -> None:
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
     layout = surveyed.layout
     runs = _read_runs(options, layout)
-    session.say(runs.overlap)
+    session.LOG.info(runs.overlap)
     steps = place_in_traffic(layout, surveyed.grid, goal, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)
     plan, study = placed.plan, placed.study

@@ -21,7 +21,7 @@ from headless.options import add_goal, add_settings, new_parser, read_goal, read
 from seip_addon.core.placement.goal import check_goal
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.workflows.robust import Precaution, RobustPlan, place_robustly
+from seip_addon.core.workflows.robust import RobustnessSettings, RobustPlan, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
@@ -29,9 +29,9 @@ CHARTS = ("spread.png", "blame.png", "frontier.png")
 def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, precaution = read_goal(options), _precaution(options)
+    goal, robustness = read_goal(options), _precaution(options)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
-    steps = place_robustly(surveyed.layout, surveyed.grid, goal, precaution)
+    steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
     plan, study = robust.plan, robust.study
     session.say(_in_words(robust))
@@ -62,12 +62,12 @@ def _in_words(robust: RobustPlan) -> str:
     )
 
 
-def _precaution(options: argparse.Namespace) -> Precaution:
+def _precaution(options: argparse.Namespace) -> RobustnessSettings:
     height = options.position_error if options.height_error is None else options.height_error
     yaw = options.tilt_error if options.yaw_error is None else options.yaw_error
     errors = PoseErrors(options.position_error, height, math.radians(yaw), math.radians(options.tilt_error))
     tail = {"expected": 1.0, "cvar": options.tail, "worst": 0.0}[options.objective]
-    return read_settings(Precaution, options, risk=read_settings(Risk, options, tail=tail), errors=errors)
+    return read_settings(RobustnessSettings, options, risk=read_settings(Risk, options, tail=tail), errors=errors)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -86,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     errors = parser.add_argument_group("pose errors, standard deviations")
     add_settings(errors, PoseErrors, "position", "height", "yaw", "tilt")
     errors.set_defaults(height_error=None, yaw_error=None, tilt_error=2.0)
-    add_settings(errors, Precaution, "scenarios", "draws", "seed")
+    add_settings(errors, RobustnessSettings, "scenarios", "draws", "seed")
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

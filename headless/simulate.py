@@ -44,7 +44,7 @@ def main(argv: list[str]) -> None:
     settings = _settings(options)
     run = _run(options, settings)
     check_run_folder(options.output, run)
-    session.say(_in_words(run))
+    session.LOG.info(_in_words(run))
     with session.progress_bar() as report:
         simulation = finish(simulation_of(run), report)
     session.warn(simulation.warnings)

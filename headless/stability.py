@@ -16,7 +16,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
-from headless.lab.stability.chapters import Scope, Stage, chapters, introduction
+from headless.lab.stability.chapters import StabilityScope, StudiedScene, chapters, introduction
 from headless.lab.stability.page import load_chapter, save_chapter, save_page
 from headless.options import new_parser
 
@@ -30,7 +30,7 @@ from seip_addon.core.workflows.traffic import load_runs
 PAGE, CHARTS = "stability.md", "stability"
 
 
-def main(argv: list[str], scope: Scope | None = None) -> None:
+def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
@@ -42,7 +42,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
     )
     runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
-    stage = Stage(surveyed, runs, options.scene, options.other, options.work, charts, scope or Scope())
+    stage = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
     made_from = digest(
         grid_key(surveyed.layout),
         repr(surveyed.layout.settings),
@@ -57,7 +57,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
         if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
             kept = surveyed.stopwatch.run(name, work(stage))
             save_chapter(options.work / f"{name}.json", kept, made_from)
-            session.say(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
+            session.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
         done.append(kept)
     with session.writing(options.output):
         save_page(options.output / PAGE, introduction(stage), done, CHARTS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import math
 import time
 from collections.abc import Callable, Generator
@@ -29,11 +30,13 @@ from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid, VisibilitySettings
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
 from seip_addon.core.workflows.convergence import Convergence
-from seip_addon.core.workflows.survey import Circumstances, Layout, SurveySettings, lay_out, record_of, see
+from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
 Result = TypeVar("Result")
+
+LOG = logging.getLogger(__name__)
 
 
 @dataclass
@@ -135,20 +138,20 @@ def survey(
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
     if refine is not None:
         settings = watch.run("spacings", refine(reading.geometry, settings)).settings
-        session.say(settings.spacings_because)
+        LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
-    session.say(_in_words(layout.site))
+    LOG.info(_in_words(layout.site))
     session.warn(layout.warnings)
     check(layout.site, layout.models)
     grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
-    session.say(triangles_sentence(grid.parameters["triangles"]))
+    LOG.info(triangles_sentence(grid.parameters["triangles"]))
     return Survey(layout, grid, watch)
 
 
 def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool, pose_errors: bool = False) -> None:
     """Write a plan of a survey, with its record, to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
-    now = Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
+    now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
         folder,
         bpy.context.scene,

@@ -93,7 +93,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     simulated = fit.trajectories
     apart, collided = _run(without_overlaps(simulated))
     if collided:
-        session.say(
+        session.LOG.info(
             f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}"
         )
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))

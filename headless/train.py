@@ -55,13 +55,13 @@ def main(argv: list[str]) -> None:
         name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
     }
     require_separate(splits)
-    session.say(require_independent_splits(splits))
+    session.LOG.info(require_independent_splits(splits))
     check_device(options.device)
     session.check_folder(options.output)
     session.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
     grid = grid_of(geometry, network.pillar)
-    session.say(
+    session.LOG.info(
         f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m, from {grid.bottom:.1f} to {grid.top:.1f} m"
     )
 

@@ -29,7 +29,7 @@ from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from .core.traffic.source import TrafficFiles
 from .core.visibility.grid import VisibilitySettings
 from .core.workflows.recording import RecordingSettings
-from .core.workflows.robust import Precaution
+from .core.workflows.robust import RobustnessSettings
 from .core.workflows.survey import SurveySettings
 from .preferences import catalogue_files
 from .scene import contract, roles
@@ -413,7 +413,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
         )
 
-    def precaution(self) -> Precaution | None:
+    def robustness(self) -> RobustnessSettings | None:
         """Return what the placement is to stand, None where it trusts the map.
 
         Raises
@@ -425,7 +425,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             return None
         position, tilt = _written(self.position_error), _written(self.tilt_error)
         risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
-        return Precaution(risk, PoseErrors(position, position, tilt, tilt))
+        return RobustnessSettings(risk, PoseErrors(position, position, tilt, tilt))
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

@@ -48,7 +48,7 @@ Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Cell:
+class PrecisionCell:
     """What was reached with one type and number of sensors.
 
     Parameters
@@ -84,13 +84,13 @@ class Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PrecisionRecallLine:
     """Precision and recall of one type and number of sensors.
 
     Parameters
     ----------
     sensor, count
-        As in `Cell`.
+        As in `PrecisionCell`.
     recall, precision : (s,) float64, 0 to 1
         At each score, the highest first.
     """
@@ -103,7 +103,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Parts:
+class BinnedFigure:
     """A figure in parts of the road users, one line for each series.
 
     Parameters
@@ -126,7 +126,7 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class Setting:
+class DetectorSetting:
     """One setting of the detector and what it costs.
 
     Parameters
@@ -151,7 +151,7 @@ class Setting:
     default: bool = False
 
 
-def save_count_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title: str) -> None:
+def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
     """Draw average precision against the number of sensors, a line for each type, as PNG.
 
     Small dots are single seeds, marks their means, bars the intervals of the means.
@@ -173,7 +173,7 @@ def save_count_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title:
     save_chart(path, figure, title, [panel])
 
 
-def save_price_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title: str) -> None:
+def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
     """Draw average precision against price, with the front named, as PNG."""
     _check(cells, "average precision against price")
     figure, (panel,) = new_figure(PANEL[0] * 1.25, PANEL[1])
@@ -203,7 +203,11 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title:
 
 
 def save_coverage_chart(
-    path: str | os.PathLike[str], cells: Sequence[Cell], correlation: float, interval: Interval | None, title: str
+    path: str | os.PathLike[str],
+    cells: Sequence[PrecisionCell],
+    correlation: float,
+    interval: Interval | None,
+    title: str,
 ) -> None:
     """Draw average precision against coverage, with their rank correlation, as PNG.
 
@@ -228,7 +232,9 @@ def save_coverage_chart(
     save_png(path, figure)
 
 
-def save_precision_recall_chart(path: str | os.PathLike[str], curves: Sequence[Curve], title: str) -> None:
+def save_precision_recall_chart(
+    path: str | os.PathLike[str], curves: Sequence[PrecisionRecallLine], title: str
+) -> None:
     """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
     _check(curves, "precision against recall")
     figure, (panel,) = new_figure(*PANEL)
@@ -244,7 +250,7 @@ def save_precision_recall_chart(path: str | os.PathLike[str], curves: Sequence[C
     save_chart(path, figure, title, [panel])
 
 
-def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[Parts], title: str) -> None:
+def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
     """Draw figures in parts of the road users, a panel for each way to part them, as PNG."""
     _check(panels, "detection by parts of the road users")
     figure, axes = new_figure(PANEL[0] * 0.85 * len(panels), PANEL[1], len(panels))
@@ -303,7 +309,7 @@ def save_training_chart(
     save_chart(path, figure, title, panels)
 
 
-def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Setting], title: str) -> None:
+def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[DetectorSetting], title: str) -> None:
     """Draw average precision against training seconds and inference milliseconds, the default marked, as PNG."""
     _check(settings, "settings of the detector")
     figure, axes = new_figure(PANEL[0] * 2.2, PANEL[1], 2)
@@ -340,11 +346,11 @@ def _named(count: int, sensor: str) -> str:
     return f"{count} × {sensor}"
 
 
-def _sensors(cells: Sequence[Cell]) -> list[str]:
+def _sensors(cells: Sequence[PrecisionCell]) -> list[str]:
     return list(dict.fromkeys(cell.sensor for cell in cells))
 
 
-def _scatter(panel: Axes, cells: Sequence[Cell], x: Sequence[float]) -> None:
+def _scatter(panel: Axes, cells: Sequence[PrecisionCell], x: Sequence[float]) -> None:
     """Mark each cell's mean with its interval, a colour and a mark for each type."""
     for row, sensor in enumerate(_sensors(cells)):
         own = [(place, cell) for place, cell in zip(x, cells, strict=True) if cell.sensor == sensor]
@@ -363,16 +369,16 @@ def _mark(row: int) -> dict[str, Any]:
     return {"color": colour(row), "marker": mark(row), "markersize": 6, "mec": PAPER, "mew": 0.7, "zorder": 4}
 
 
-def _front(cells: Sequence[Cell]) -> list[Cell]:
+def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
     """Return the cells than which none costs no more and detects better (Pareto front), the cheapest first."""
-    best: list[Cell] = []
+    best: list[PrecisionCell] = []
     for cell in sorted(cells, key=lambda cell: (cell.price, -cell.mean)):
         if not best or cell.mean > best[-1].mean:
             best.append(cell)
     return best
 
 
-def _reached(cells: Sequence[Cell]) -> list[float]:
+def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
     return [value for cell in cells for value in (*cell.values, *(cell.interval or ()))]
 
 

@@ -27,7 +27,7 @@ from .frames import LazyFrames, Recording
 
 
 @dataclass(frozen=True, eq=False)
-class TrafficRun:
+class SampledRun:
     """One run of traffic and the instants at which it is looked at.
 
     Parameters
@@ -48,7 +48,7 @@ class TrafficRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Configuration:
+class SensorConfiguration:
     """A number of sensors of one type, placed where they cover most."""
 
     case: Case
@@ -72,7 +72,7 @@ class Configuration:
         return np.array([sensor.xyz for sensor in self.sensors])
 
 
-class Studio:
+class Simulator:
     """A scene in which runs of traffic are recorded.
 
     What stands still is cast against once for a configuration and a run, and
@@ -88,16 +88,16 @@ class Studio:
         self.static, self.settings, self.site = static, settings, site
         self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
 
-    def record(self, configuration: Configuration, run: TrafficRun) -> Recording:
+    def record(self, configuration: SensorConfiguration, run: SampledRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
         return Recording(name, run.key, frames, (configuration.case.sensor,), self.site)
 
-    def frame(self, configuration: Configuration, run: TrafficRun, number: int) -> Frame:
+    def frame(self, configuration: SensorConfiguration, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
-    def _prepared(self, configuration: Configuration, run: TrafficRun) -> Simulation:
+    def _prepared(self, configuration: SensorConfiguration, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.detection.claims import Trial, detection_claims
+from headless.detection.claims import SeedResult, detection_claims
 
 import pytest
 
@@ -19,7 +19,7 @@ def trials(precision=None, *, false=FALSE, sparse=0.8, spread=SPREAD, padded=Non
         way = 1 if sensor == "type1" else -1  # seeds that suit one type do not suit another
         for count, value, wrong in zip((1, 2, 4), reached, false, strict=True):
             for seed, off in enumerate(spread):
-                one = Trial(
+                one = SeedResult(
                     sensor=sensor,
                     count=count,
                     seed=seed,

@@ -56,9 +56,9 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
 
 
 def test_detectors_know_what_they_have_learnt_from(folder):
-    experience = Detector.load(folder / "detector-1.pt").experience
-    assert experience.sensors == ("type1",)
-    assert experience.sites == ("Four-arm signalised junction",)
+    training_record = Detector.load(folder / "detector-1.pt").training_record
+    assert training_record.sensors == ("type1",)
+    assert training_record.sites == ("Four-arm signalised junction",)
 
 
 def test_the_record_says_what_was_for_what(folder):

@@ -230,6 +230,7 @@ def test_control_c_leaves_nothing_half_written(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} <= {"visibility.pieces"}  # to go on from
 
 
+@pytest.mark.slow
 def test_a_terminated_run_leaves_nothing_hidden(tmp_path):
     process = start("-o", str(tmp_path), "--sensor", "type3", "--grid", "1")
     while "targets" not in process.stdout.readline():

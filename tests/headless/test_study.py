@@ -53,6 +53,7 @@ def test_the_verdicts_stand_in_the_claims(folder):
     assert all(line.count("**") == 2 for line in lines[4:])
 
 
+@pytest.mark.slow
 def test_the_same_study_gives_the_same_bytes(folder, tmp_path, run):
     (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
     run(tmp_path)

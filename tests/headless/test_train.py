@@ -78,7 +78,7 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
 
 def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
     train.main(arguments(folder, "at-home"))
-    learnt = Detector.load(folder / "at-home" / "detector.pt").experience
+    learnt = Detector.load(folder / "at-home" / "detector.pt").training_record
     assert "warning" not in capsys.readouterr().out
     shutil.copytree(folder / "third", folder / "foreign")
     manifest = folder / "foreign" / "manifest.json"

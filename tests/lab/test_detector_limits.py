@@ -14,12 +14,12 @@ from headless.lab.stability import chapters
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25"]
-TRIED = (limits_study.DropOff(0.5),), (limits_study.Misturned(1.0, 0),)
+TRIED = (limits_study.DropOff(0.5),), (limits_study.YawError(1.0, 0),)
 
 
 def test_the_chapter_holds_rows_and_charts_of_home_and_away(tmp_path):
     (tmp_path / "work").mkdir()
-    little = chapters.Scope(detector={"seeds": 2, "steps": 2})
+    little = chapters.StabilityScope(detector={"seeds": 2, "steps": 2})
     argv = [str(SCENES / "junction.blend"), "-o", str(tmp_path), "--work", str(tmp_path / "work"), *COARSE]
     only = patch.object(stability, "chapters", lambda _stage: [("detector", chapters.detector)])
     few = patch.multiple(detector_limits, EVERY=60.0, TRIED=1)

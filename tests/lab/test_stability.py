@@ -28,7 +28,7 @@ COARSE = [
     "--time-limit",
     "2",
 ]
-LITTLE = stability_chapters.Scope(
+LITTLE = stability_chapters.StabilityScope(
     grids=8,
     rays=200,
     instances=2,

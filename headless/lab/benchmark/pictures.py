@@ -19,7 +19,7 @@ from seip_addon.core.pictures.callouts import place_callouts
 from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-from .pareto_front import Way, front, growth_exponent
+from .pareto_front import Method, front, growth_exponent
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
 """Told apart by colour-blind people (Okabe and Ito 2008), and by their marks on grey paper."""
@@ -29,13 +29,13 @@ MARKS = ("D", "o", "s", "^", "v", "P", "*", "X")
 
 
 def save_trade_off_chart(
-    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Way]], title: str, subtitle: str, nought: float
+    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Method]], title: str, subtitle: str, nought: float
 ) -> None:
     """Draw processor time against error, with the front and the default, as PNG.
 
     Parameters
     ----------
-    panels : mapping of str to sequence of Way
+    panels : mapping of str to sequence of Method
         What the error is, over each panel; the same families in all.
     nought : float
         Errors up to this are drawn apart from those above, on a linear piece of the axis.
@@ -92,7 +92,7 @@ def save_growth_chart(
     save_chart(path, figure, title)
 
 
-def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
+def _draw_front(panel: Axes, ways: Sequence[Method]) -> None:
     best = front(ways)
     panel.step(
         [way.error for way in best],
@@ -105,7 +105,7 @@ def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
     )
 
 
-def _along_front(panel: Axes, ways: Sequence[Way]) -> Float:
+def _along_front(panel: Axes, ways: Sequence[Method]) -> Float:
     """Return points along the drawn front in pixels, (n, 2) float64."""
     corners = panel.transData.transform([(way.error, way.seconds) for way in front(ways)])
     bends = np.column_stack([corners[:-1, 0], corners[1:, 1]])
@@ -114,7 +114,7 @@ def _along_front(panel: Axes, ways: Sequence[Way]) -> Float:
     return along
 
 
-def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
+def _mark_default(panel: Axes, ways: Sequence[Method]) -> None:
     own = [way for way in ways if way.default]
     panel.plot(
         [way.error for way in own],
@@ -129,7 +129,7 @@ def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
     )
 
 
-def _name(panel: Axes, ways: Sequence[Way]) -> None:
+def _name(panel: Axes, ways: Sequence[Method]) -> None:
     """Write each way's name beside it, no name on another or on a mark, and off the front where there is room."""
     style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
     box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}

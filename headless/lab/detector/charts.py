@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from seip_addon.core.errors import SeipError
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-from .disturbances import Capped, Lost
-from .study import Curve, Foreign, LimitsStudy
+from .disturbances import CappedPillars, SensorFailure
+from .study import DisturbanceCurve, LimitsStudy, TransferResult
 
 ACROSS = 4
 """Panels in a row."""
@@ -59,13 +59,13 @@ def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None
     save_chart(path, figure, f"{study.name}: beyond what was learnt")
 
 
-def _in_words(one: Foreign) -> str:
+def _in_words(one: TransferResult) -> str:
     return f"{one.learnt}, on {one.tried}, against {one.against}"
 
 
-def _draw(panel: Axes, curves: Sequence[Curve], rows: Sequence[int]) -> None:
+def _draw(panel: Axes, curves: Sequence[DisturbanceCurve], rows: Sequence[int]) -> None:
     """Draw the lines of one disturbance; sizes stand as far from each other whatever they are."""
-    falling = isinstance(curves[0].points[0].disturbance, Capped)  # the fewer points, the worse
+    falling = isinstance(curves[0].points[0].disturbance, CappedPillars)  # the fewer points, the worse
     sizes = sorted({point.disturbance.size for curve in curves for point in curve.points}, reverse=falling)
     for curve, row in zip(curves, rows, strict=True):
         at = [0, *(1 + sizes.index(point.disturbance.size) for point in curve.points)]
@@ -73,7 +73,9 @@ def _draw(panel: Axes, curves: Sequence[Curve], rows: Sequence[int]) -> None:
         value = np.array([one.value for one in estimates])
         ends = np.array([(one.low, one.high) for one in estimates]).T
         reach = np.nan_to_num(np.abs(ends - value), posinf=0.0)
-        each = isinstance(curve.points[0].disturbance, Lost)  # sensors in turn, none of which is more than another
+        each = isinstance(
+            curve.points[0].disturbance, SensorFailure
+        )  # sensors in turn, none of which is more than another
         style = {"color": colour(row), "marker": mark(row), "markersize": 5}
         style["linestyle"] = "none" if each else "-"
         panel.errorbar(at, value, reach, label=curve.configuration, capsize=2.5, linewidth=1.2, **style)  # type: ignore[arg-type]  # colours and marks are text, sizes are not

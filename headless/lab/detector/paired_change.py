@@ -16,7 +16,7 @@ DRAWS = 2 * RESAMPLES
 """Resamples of the blocks of traffic; what the first half of them says must be what all say."""
 
 
-class Sampled:
+class ResampledPrecision:
     """One detector's average precision on some frames, with resamples of their traffic.
 
     Parameters
@@ -31,12 +31,12 @@ class Sampled:
         self.draws = resampled_average_precisions(evaluation, seed, DRAWS)
 
 
-def level(those: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+def level(those: Sequence[ResampledPrecision], draws: int = DRAWS) -> Estimate:
     """Return the mean average precision of detectors that differ in their seeds alone."""
     return _estimate([one.value for one in those], [one.draws[:draws] for one in those], those[0].blocks)
 
 
-def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+def change(to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], draws: int = DRAWS) -> Estimate:
     """Return by how much the mean average precision changes from one trial to another of the same detectors.
 
     Differences are taken detector by detector and, where both had the same
@@ -46,7 +46,7 @@ def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> 
 
     Parameters
     ----------
-    to, of : sequence of Sampled
+    to, of : sequence of ResampledPrecision
         In the same order of detectors.
     draws : int
         Resamples that count.

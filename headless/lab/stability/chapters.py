@@ -40,7 +40,7 @@ DETECTOR_RUNS = 3
 
 
 @dataclass(frozen=True)
-class Scope:
+class StabilityScope:
     """How much is tried.
 
     Parameters
@@ -67,7 +67,7 @@ class Scope:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class StudiedScene:
     """A scene, laid out and seen.
 
     Parameters
@@ -88,7 +88,7 @@ class Stage:
     others: Sequence[Path]
     work: Path
     charts: Path
-    scope: Scope
+    scope: StabilityScope
 
     @property
     def name(self) -> str:
@@ -113,10 +113,10 @@ class Stage:
         return replace(problem, forbidden=problem.forbidden | (layout.site.candidates.sensor != sensor))
 
 
-Work = Callable[[Stage], Generator[Progress, None, Chapter]]
+Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 
-def chapters(stage: Stage) -> Iterator[tuple[str, Work]]:
+def chapters(stage: StudiedScene) -> Iterator[tuple[str, Work]]:
     """Yield the chapters that a scene allows, by the names that they are kept under."""
     yield "criterion", criterion
     yield "arithmetic", arithmetic
@@ -129,7 +129,7 @@ def chapters(stage: Stage) -> Iterator[tuple[str, Work]]:
         yield "detector", detector
 
 
-def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
+def criterion(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Vary what defines visibility."""
     layout = stage.surveyed.layout
     delta = layout.settings.visibility.delta
@@ -150,7 +150,7 @@ def criterion(stage: Stage) -> Generator[Progress, None, Chapter]:
     )
 
 
-def arithmetic(stage: Stage) -> Generator[Progress, None, Chapter]:
+def arithmetic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Hold the ray casters to float64."""
     study = yield from arithmetic_study(stage.scope.rays)
     limits_charts.save_rounding_chart(stage.charts / "rounding.png", study, "Hits against float64")
@@ -161,7 +161,7 @@ def arithmetic(stage: Stage) -> Generator[Progress, None, Chapter]:
     )
 
 
-def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
+def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Drive the solvers to where they fail, and see how flat the top is."""
     study = yield from solver_study(stage.scope.instances)
     tops: list[tuple[str, FlatTop]] = []
@@ -183,7 +183,7 @@ def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
     )
 
 
-def poses(stage: Stage) -> Generator[Progress, None, Chapter]:
+def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Let the poses of a placement err."""
     layout, around = stage.surveyed.layout, surroundings(stage.surveyed.layout)
     study = yield from robust_study(around, stage.problem(stage.sensor), _settings(stage))
@@ -208,7 +208,7 @@ def poses(stage: Stage) -> Generator[Progress, None, Chapter]:
     )
 
 
-def failures(stage: Stage) -> Generator[Progress, None, Chapter]:
+def failures(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Let a sensor fail, and ask for more than one look."""
     around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
     study = yield from robust_study(around, problem, _settings(stage), FAILURES)
@@ -217,7 +217,7 @@ def failures(stage: Stage) -> Generator[Progress, None, Chapter]:
     return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
-def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
+def traffic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Let vehicles stand in the way of a placement."""
     layout = stage.surveyed.layout
     around, problem, settings = surroundings(layout), stage.problem(stage.sensor), layout.settings
@@ -250,7 +250,7 @@ def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
     )
 
 
-def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
+def detector(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Train detectors, and try them until they fail."""
     from headless.lab.detector import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
     from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
@@ -265,11 +265,11 @@ def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
 
 
-def _settings(stage: Stage) -> RobustSettings:
+def _settings(stage: StudiedScene) -> RobustSettings:
     return replace(stage.scope.robust, **stage.surveyed.layout.settings.limits)
 
 
-def introduction(stage: Stage) -> str:
+def introduction(stage: StudiedScene) -> str:
     """Return what the page begins with."""
     site = stage.surveyed.layout.site
     return (

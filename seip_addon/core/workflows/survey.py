@@ -239,7 +239,7 @@ def surroundings(layout: Layout) -> Surroundings:
 
 
 @dataclass(frozen=True)
-class Circumstances:
+class Provenance:
     """What is no part of an answer, and stands in its record all the same.
 
     Parameters
@@ -261,7 +261,7 @@ def record_of(  # what was asked for stands in the record
     layout: Layout,
     grid: VisibilityGrid,
     plan: Plan,
-    circumstances: Circumstances,
+    circumstances: Provenance,
     *,
     render: bool,
     pose_errors: bool = False,
