@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -17,18 +18,21 @@ from seip_addon.scene import contract
 from seip_addon.scene.blend_file import save_blend
 
 REACH = 36.0
+SECONDS = 30.0
 LANES = (-5.0, -2.0, 2.0, 5.0)
 
 
-def save_small_scene(folder: Path, *, runs: int = 4, seconds: float = 30.0) -> Path:
-    """Write ``small.blend`` and the runs ``small_traffic/run-N.npz``, each of other road users; return the scene."""
+def save_small_scene(folder: Path, *, title: str = "Small junction", kinds: Sequence[str] = ("",)) -> Path:
+    """Write ``small.blend`` and four runs of each kind, ``small_trafficKIND/run-N.npz``; return the scene."""
     path = folder / "small.blend"
-    geometry = make_geometry(REACH)
+    geometry = replace(make_geometry(REACH), name=title)
     _add_areas(make_scene(geometry), geometry)
     save_blend(path)
-    (folder / "small_traffic").mkdir()
-    for number in range(1, runs + 1):
-        make_run(number, seconds).save(folder / "small_traffic" / f"run-{number}.npz")
+    for first, kind in enumerate(kinds):
+        runs = folder / f"small_traffic{kind}"
+        runs.mkdir()
+        for number in (1, 2, 3, 4):
+            make_run(10 * first + number, SECONDS).save(runs / f"run-{number}.npz")
     return path
 
 

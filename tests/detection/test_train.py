@@ -52,7 +52,7 @@ def folder(tmp_path_factory):
     save_blend(folder / "placed.blend")
     for name, start in (("first", -20.0), ("second", -5.0), ("third", 8.0)):
         make_traffic(f"simulated, {name}", start).save(folder / f"{name}.npz")
-        arguments = [str(folder / "placed.blend"), "--traffic", str(folder / f"{name}.npz"), "--engine", "bvh"]
+        arguments = [str(folder / "placed.blend"), "--traffic", str(folder / f"{name}.npz")]
         simulate.main([*arguments, "--duration", "0.2", "-o", str(folder / name)])
     return folder
 
