@@ -15,12 +15,12 @@ from headless.lab.detector.rows import limit_rows, points_in_words
 from headless.lab.detector.study import (
     DisturbanceCurve,
     DisturbanceEffect,
+    EvaluatedDetectors,
     OtherSite,
-    TestedDetectors,
     limits_study,
     training_plan,
 )
-from headless.lab.detector.trials import TestBed, TestedDetector, trials
+from headless.lab.detector.trials import EvaluatedDetector, TrialSite, trials
 
 import numpy as np
 import pytest
@@ -46,11 +46,11 @@ class Hung:
 def ground(name="home", seed=3):
     static, trajectories = road()
     run = SampledRun("run", trajectories, np.array([1.0, 1.5]))
-    return TestBed(name, Simulator(static, ScanSettings(seed=seed), "Square"), (run,))
+    return TrialSite(name, Simulator(static, ScanSettings(seed=seed), "Square"), (run,))
 
 
 def one_tested(seed, network=NETWORK):
-    return TestedDetector(f"detector-{seed}", Detector(network, GRID, seed))
+    return EvaluatedDetector(f"detector-{seed}", Detector(network, GRID, seed))
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def store(tmp_path_factory):
 def asked(store):
     two = (one_tested(1), one_tested(2))
     padded = (one_tested(3, replace(NETWORK, padded=True)),)
-    candidates = TestedDetectors(two, {"type1": one_tested(5), "type2": one_tested(6)}, padded, two[:1])
+    candidates = EvaluatedDetectors(two, {"type1": one_tested(5), "type2": one_tested(6)}, padded, two[:1])
     away = OtherSite(ground("away", seed=4), (Hung(),), two, two)
     denser = OtherSite(ground("denser", seed=5), (Hung(),), two)
     return ground(), [Hung()], candidates, [away, denser], store, 0.1

@@ -16,7 +16,7 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector
 from headless.lab.detector.disturbances import Disturbance
 from headless.lab.detector.study import LimitsStudy, OtherSite, TrainingPlan, limits_study, training_plan
-from headless.lab.detector.trials import TestBed, TestedDetector, trials
+from headless.lab.detector.trials import EvaluatedDetector, TrialSite, trials
 
 import bpy
 
@@ -74,13 +74,13 @@ def detector_limits(
     candidates = asked.candidates([one.detector for one in trained])
 
     main = _most(configurations)
-    home = TestBed(simulator.site, simulator, _thinned(traffic.test))
-    practice = TestBed(simulator.site, simulator, _thinned(traffic.validation))
+    home = TrialSite(simulator.site, simulator, _thinned(traffic.test))
+    practice = TrialSite(simulator.site, simulator, _thinned(traffic.validation))
     (tried,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
     elsewhere = []
     dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, EVERY)
     if dense:
-        elsewhere.append(OtherSite(TestBed("denser traffic", simulator, _thinned(dense)), (main,), candidates.tested))
+        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, _thinned(dense)), (main,), candidates.tested))
     for other in others:
         there = yield from _on_other_scene(other, surveyed, main, candidates.tested, folder)
         elsewhere.append(there)
@@ -106,7 +106,7 @@ def _trained(
 
 
 def _on_other_scene(
-    scene: Path, surveyed: survey.Survey, main: SensorConfiguration, tested: Sequence[TestedDetector], folder: Path
+    scene: Path, surveyed: survey.Survey, main: SensorConfiguration, tested: Sequence[EvaluatedDetector], folder: Path
 ) -> Generator[Progress, None, OtherSite]:
     """Place as many sensors of the same type there, and bring the detectors."""
     settings = surveyed.layout.settings
@@ -118,8 +118,8 @@ def _on_other_scene(
     there = yield from _placed(survey.Survey(layout, grid, surveyed.stopwatch))
     runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, EVERY)
     pillars = grid_of(layout.geometry, tested[0].detector.grid.pillar)
-    moved = tuple(TestedDetector(one.name, on_grid(one.detector, pillars)) for one in tested)
-    return OtherSite(TestBed(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
+    moved = tuple(EvaluatedDetector(one.name, on_grid(one.detector, pillars)) for one in tested)
+    return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
 
 
 def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:

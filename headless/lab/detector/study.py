@@ -39,7 +39,7 @@ from .disturbances import (
     YawError,
 )
 from .paired_change import DRAWS, ResampledPrecision, change, level
-from .trials import DisturbedTrial, TestBed, TestedDetector, trials
+from .trials import DisturbedTrial, EvaluatedDetector, TrialSite, trials
 
 Series = tuple[Disturbance, ...]
 """Disturbances of one kind, the mildest first."""
@@ -207,36 +207,36 @@ class OtherSite:
 
     Parameters
     ----------
-    tested : tuple of TestedDetector
+    tested : tuple of EvaluatedDetector
         The detectors from home, on this ground's grid.
-    trained_there : tuple of TestedDetector
+    trained_there : tuple of EvaluatedDetector
         Detectors that have learnt there, as many or none.
     """
 
-    ground: TestBed
+    ground: TrialSite
     configurations: tuple[SensorConfiguration, ...]
-    tested: tuple[TestedDetector, ...]
-    trained_there: tuple[TestedDetector, ...] = ()
+    tested: tuple[EvaluatedDetector, ...]
+    trained_there: tuple[EvaluatedDetector, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class TestedDetectors:
+class EvaluatedDetectors:
     """Detectors to be tried at home.
 
     Parameters
     ----------
-    tested : tuple of TestedDetector
+    tested : tuple of EvaluatedDetector
         Alike but for their seeds.
-    by_type : mapping of str to TestedDetector
+    by_type : mapping of str to EvaluatedDetector
         Those that have learnt from one sensor type alone.
-    padded : tuple of TestedDetector
+    padded : tuple of EvaluatedDetector
         With pillars padded with zeros, and ``unpadded``, trained as long, to compare them with.
     """
 
-    tested: tuple[TestedDetector, ...]
-    by_type: Mapping[str, TestedDetector]
-    padded: tuple[TestedDetector, ...] = ()
-    unpadded: tuple[TestedDetector, ...] = ()
+    tested: tuple[EvaluatedDetector, ...]
+    by_type: Mapping[str, EvaluatedDetector]
+    padded: tuple[EvaluatedDetector, ...] = ()
+    unpadded: tuple[EvaluatedDetector, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,13 +262,13 @@ class TrainingPlan:
         """All, as `case_study.train_all` takes them."""
         return (*self.alike, *self.by_type.values(), *self.padded)
 
-    def candidates(self, detectors: Sequence[Detector]) -> TestedDetectors:
+    def candidates(self, detectors: Sequence[Detector]) -> EvaluatedDetectors:
         """Return what the study tries, from the detectors of all models in their order."""
         trained = {
-            model.name: TestedDetector(model.name, detector)
+            model.name: EvaluatedDetector(model.name, detector)
             for model, detector in zip(self.models, detectors, strict=True)
         }
-        return TestedDetectors(
+        return EvaluatedDetectors(
             tested=tuple(trained[model.name] for model in self.alike),
             by_type={sensor: trained[model.name] for sensor, model in self.by_type.items()},
             padded=tuple(trained[model.name] for model in self.padded),
@@ -335,9 +335,9 @@ class LimitsStudy:
 
 
 def limits_study(
-    home: TestBed,
+    home: TrialSite,
     configurations: Sequence[SensorConfiguration],
-    candidates: TestedDetectors,
+    candidates: EvaluatedDetectors,
     elsewhere: Sequence[OtherSite],
     store: Path,
     score: float,
@@ -346,7 +346,7 @@ def limits_study(
 
     Parameters
     ----------
-    home : TestBed
+    home : TrialSite
         Where they have learnt, with traffic that they have not seen.
     configurations : sequence of SensorConfiguration
         The first is driven through everything, the others through the brief series.
@@ -395,7 +395,7 @@ def limits_study(
 class _Desk:
     """Hands out trials and counts them."""
 
-    def __init__(self, home: TestBed, store: Path, total: int) -> None:
+    def __init__(self, home: TrialSite, store: Path, total: int) -> None:
         self._home, self._store, self._total, self._done = home, store, total, 0
 
     def progress(self, what: str) -> Progress:
@@ -405,8 +405,8 @@ class _Desk:
         self,
         configuration: SensorConfiguration,
         disturbance: Disturbance,
-        tested: Sequence[TestedDetector],
-        ground: TestBed | None = None,
+        tested: Sequence[EvaluatedDetector],
+        ground: TrialSite | None = None,
     ) -> Generator[Progress, None, list[DisturbedTrial]]:
         there = self._home if ground is None else ground
         steps = trials(there, configuration, disturbance, tested, self._store)
@@ -418,7 +418,7 @@ class _Desk:
         self,
         configuration: SensorConfiguration,
         series: Series,
-        tested: Sequence[TestedDetector],
+        tested: Sequence[EvaluatedDetector],
         undisturbed: Sequence[ResampledPrecision],
     ) -> Generator[Progress, None, DisturbanceCurve]:
         points = []
@@ -430,7 +430,10 @@ class _Desk:
         return DisturbanceCurve(configuration.name, level(undisturbed), tuple(points))
 
     def foreign(
-        self, configurations: Sequence[SensorConfiguration], candidates: TestedDetectors, elsewhere: Sequence[OtherSite]
+        self,
+        configurations: Sequence[SensorConfiguration],
+        candidates: EvaluatedDetectors,
+        elsewhere: Sequence[OtherSite],
     ) -> Generator[Progress, None, list[TransferResult]]:
         """Try detectors of one type with the others, and all detectors on other grounds."""
         found = []
@@ -455,7 +458,7 @@ class _Desk:
         self,
         other: OtherSite,
         configuration: SensorConfiguration,
-        candidates: TestedDetectors,
+        candidates: EvaluatedDetectors,
         configurations: Sequence[SensorConfiguration],
     ) -> Generator[Progress, None, TransferResult]:
         """Compare with detectors trained there on the same frames, or else with these at home, on other frames."""
@@ -474,7 +477,7 @@ class _Desk:
         return TransferResult(self._home.simulator.site, tried, level(there), change(there, before), against)
 
     def padding(
-        self, configurations: Sequence[SensorConfiguration], candidates: TestedDetectors
+        self, configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors
     ) -> Generator[Progress, None, list[TransferResult]]:
         found = []
         for configuration in configurations if candidates.padded else ():
@@ -494,7 +497,7 @@ class _Desk:
 
 
 def _length(
-    configurations: Sequence[SensorConfiguration], candidates: TestedDetectors, elsewhere: Sequence[OtherSite]
+    configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors, elsewhere: Sequence[OtherSite]
 ) -> int:
     """Return how many trials there are."""
     full, brief = (sum(map(len, series(0))) for series in (full_series, brief_series))
@@ -524,7 +527,7 @@ def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
     )
 
 
-def _pillars(ground: TestBed, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
+def _pillars(ground: TrialSite, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
     """Count how full pillars are in some frames, with the detector's own cap and smaller ones."""
     caps = (detector.settings.most_points, 8, 4, 2, 1)
     frames = [

@@ -64,7 +64,7 @@ TABLES = {"detections": EvaluatedDetections, "wanted": CountedTruth}
 
 
 @dataclass(frozen=True, eq=False)
-class TestBed:
+class TrialSite:
     """Where detectors are tried.
 
     Parameters
@@ -97,7 +97,7 @@ class TestBed:
 
 
 @dataclass(frozen=True, eq=False)
-class TestedDetector:
+class EvaluatedDetector:
     """A detector that is tried."""
 
     name: str
@@ -127,17 +127,17 @@ class DisturbedTrial:
 
 
 def trials(
-    ground: TestBed,
+    ground: TrialSite,
     configuration: SensorConfiguration,
     disturbance: Disturbance,
-    tested: Sequence[TestedDetector],
+    tested: Sequence[EvaluatedDetector],
     store: Path,
 ) -> Generator[Progress, None, list[DisturbedTrial]]:
     """Try detectors with a placement under a disturbance; a frame is simulated once for all of them.
 
     Parameters
     ----------
-    tested : sequence of TestedDetector
+    tested : sequence of EvaluatedDetector
         With pillars on the ground's own grid.
     store : path
         Folder of what was tried before.
@@ -178,7 +178,7 @@ def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTr
 
 
 def disturbed_frames(
-    ground: TestBed, configuration: SensorConfiguration, disturbance: Disturbance
+    ground: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance
 ) -> Generator[tuple[SampledRun, Frame], None, None]:
     """Simulate the test frames as they are under a disturbance."""
     simulator = ground.simulator
@@ -193,7 +193,7 @@ def disturbed_frames(
 
 
 def _results(
-    ground: TestBed, configuration: SensorConfiguration, disturbance: Disturbance, detectors: Sequence[Detector]
+    ground: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance, detectors: Sequence[Detector]
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
     results: list[list[FrameResult]] = [[] for _ in detectors]
     total = sum(len(run.times) for run in ground.runs)
