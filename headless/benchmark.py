@@ -10,7 +10,7 @@ from pathlib import Path
 
 from headless import session
 from headless.lab.benchmark.charts import save_charts
-from headless.lab.benchmark.programme import Scope, measure
+from headless.lab.benchmark.programme import BenchmarkScope, measure
 from headless.lab.benchmark.report import bars, save_json, save_page
 
 import bpy
@@ -18,7 +18,7 @@ import bpy
 from seip_addon.scene.read import read_scene
 
 
-def main(argv: list[str], scope: Scope | None = None) -> None:
+def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     """Measure, and write the results into a folder; tests give a small ``scope``."""
     parser = argparse.ArgumentParser(
         prog="benchmark", description=__doc__.splitlines()[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
@@ -31,7 +31,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
     session.check_folder(options.output / "benchmark")
     session.open_scene(options.scene)
     findings, names = measure(
-        read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope or Scope()
+        read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope or BenchmarkScope()
     )
     held = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in held:

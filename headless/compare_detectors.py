@@ -13,15 +13,16 @@ import time
 from collections.abc import Generator
 from dataclasses import replace
 
-from headless import evaluate, session, survey
-from headless.charts.detection import Setting, save_setting_chart
+from headless import evaluate, session
+from headless.charts.detection import DetectorSetting, save_setting_chart
 from headless.detection import case_study
 from headless.detection.detector import Detector
 from headless.detection.inference import detect
 from headless.detection.pillars import grid_of
-from headless.detection.recordings import Studio
+from headless.detection.recordings import Simulator
 from headless.detection.settings import PUBLISHED, NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
+from headless.options import new_parser
 
 import numpy as np
 
@@ -49,37 +50,37 @@ LOOKS = 5
 def main(argv: list[str]) -> None:
     """Train and judge every setting, and write the chart and its figures."""
     options = _parser().parse_args(argv)
-    stage = evaluate.set_stage(options)
-    pupils = [
-        case_study.Pupil(
+    study = evaluate.prepare_study(options)
+    models = [
+        case_study.ModelConfiguration(
             f"{family} {name}",
-            stage.configurations,
+            study.configurations,
             network,
             TrainingSettings(steps=options.steps, validate_every=options.steps),
         )
         for (family, name), network in SETTINGS.items()
     ]
-    works = [_lesson(stage, pupil, options.device) for pupil in pupils]
+    works = [_lesson(study, model, options.device) for model in models]
     with deterministic(1):
-        trained = stage.surveyed.stopwatch.run("training", side_by_side(works, case_study.SIDE_BY_SIDE))
+        trained = study.surveyed.stopwatch.run("training", side_by_side(works, case_study.SIDE_BY_SIDE))
     detectors = [detector for detector, _ in trained]
-    judging = case_study.judge_all(stage.studio, pupils, detectors, stage.traffic)
-    judgements = stage.surveyed.stopwatch.run("judgement", judging)
+    judging = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
+    outcomes = study.surveyed.stopwatch.run("outcome", judging)
     settings = [
-        Setting(
+        DetectorSetting(
             name=name,
             family=family,
             training=seconds,
-            inference=1000 * _inference(stage, detector),
+            inference=1000 * _inference(study, detector),
             average_precision=float(
-                np.mean([one.evaluation.average_precision for one in judgements if one.pupil is pupil])
+                np.mean([one.evaluation.average_precision for one in outcomes if one.model is model])
             ),
-            default=pupil.network == DEFAULT,
+            default=model.network == DEFAULT,
         )
-        for (family, name), pupil, (detector, seconds) in zip(SETTINGS, pupils, trained, strict=True)
+        for (family, name), model, (detector, seconds) in zip(SETTINGS, models, trained, strict=True)
     ]
     title = (
-        f"{stage.surveyed.layout.site.name}: mean over {len(stage.configurations)} placements, {options.steps} steps"
+        f"{study.surveyed.layout.site.name}: mean over {len(study.configurations)} placements, {options.steps} steps"
     )
     with session.writing(options.output):
         save_setting_chart(options.output / "settings.png", settings, title)
@@ -92,24 +93,24 @@ def main(argv: list[str]) -> None:
 
 
 def _lesson(
-    stage: evaluate.Stage, pupil: case_study.Pupil, device: str
+    study: evaluate.DetectionStudy, model: case_study.ModelConfiguration, device: str
 ) -> Generator[Progress, None, tuple[Detector, float]]:
     """Simulate what a detector learns from, and train it; return it with the processor's seconds of the training."""
-    studio = Studio(stage.studio.static, stage.studio.settings, stage.studio.site)
-    grid = grid_of(stage.surveyed.layout.geometry, pupil.network.pillar)
-    lessons = yield from case_study.simulate_lessons(
-        studio, pupil.configurations, stage.traffic, grid, pupil.network.most_points
+    simulator = Simulator(study.simulator.static, study.simulator.settings, study.simulator.site)
+    grid = grid_of(study.surveyed.layout.geometry, model.network.pillar)
+    training_set = yield from case_study.simulate_training_set(
+        simulator, model.configurations, study.traffic, grid, model.network.most_points
     )
     begin = time.thread_time()
-    trained = yield from case_study.training(pupil, lessons, device=device)
+    trained = yield from case_study.training(model, training_set, device=device)
     return trained.detector, time.thread_time() - begin
 
 
-def _inference(stage: evaluate.Stage, detector: Detector) -> float:
+def _inference(study: evaluate.DetectionStudy, detector: Detector) -> float:
     """Return the processor's seconds for detection in a merged frame: the mean over configurations of medians."""
     medians = []
-    for configuration in stage.configurations:
-        frame = stage.studio.frame(configuration, stage.traffic.test[0], 0)
+    for configuration in study.configurations:
+        frame = study.simulator.frame(configuration, study.traffic.test[0], 0)
         looks = []
         for _ in range(LOOKS):
             begin = time.thread_time()
@@ -121,9 +122,7 @@ def _inference(stage: evaluate.Stage, detector: Detector) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="compare_detectors", description=__doc__.splitlines()[0], formatter_class=survey.HelpWithDefaults
-    )
+    parser = new_parser("compare_detectors", __doc__.splitlines()[0])
     evaluate.add_options(parser)
     parser.set_defaults(steps=600, every=5.0)
     return parser

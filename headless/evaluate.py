@@ -17,15 +17,15 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.claims import save_claims
 from headless.coverage_study import NUMBERS
-from headless.coverage_study.tables import save_claims
 from headless.detection import case_study, study_results
-from headless.detection.claims import judge
+from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
-from headless.detection.recordings import Configuration, Studio
+from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.traffic_runs import runs_beside
+from headless.options import new_parser
 
 import bpy
 
@@ -40,33 +40,32 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     if options.seeds < 1:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
-    stage = set_stage(options)
-    watch, studio, folder = stage.surveyed.stopwatch, stage.studio, options.output
+    study = prepare_study(options)
+    watch, simulator, folder = study.surveyed.stopwatch, study.simulator, options.output
     network = NetworkSettings()
-    lessons = learn_from(stage, network)
-    pupils = case_study.pupils(
-        stage.configurations,
+    training_set = learn_from(study, network)
+    models = case_study.model_configurations(
+        study.configurations,
         network,
         TrainingSettings(steps=options.steps),
         seeds=options.seeds,
         separate=options.separate,
     )
     if options.ablation:
-        pupils += case_study.padded(pupils)
-    trained = watch.run("training", case_study.train_all(pupils, lessons, folder, device=options.device))
+        models += case_study.padded(models)
+    trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
     detectors = [one.detector for one in trained]
-    for name, sentences in case_study.foreseen(studio, pupils, detectors, stage.traffic).items():
-        for sentence in sentences:
-            session.say(f"warning: {name}: {sentence}")
-    judgements = watch.run("judgement", case_study.judge_all(studio, pupils, detectors, stage.traffic))
-    claims = judge([judgement.trial for judgement in judgements])
+    for name, sentences in case_study.suitability_by_configuration(simulator, models, detectors, study.traffic).items():
+        session.warn(f"{name}: {sentence}" for sentence in sentences)
+    outcomes = watch.run("outcome", case_study.evaluate_all(simulator, models, detectors, study.traffic))
+    claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
-    site = stage.surveyed.layout.site
+    site = study.surveyed.layout.site
     with session.writing(folder):
-        results = study_results.StudyResults(site.name, studio, stage.traffic, tuple(pupils), tuple(judgements))
+        results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = stage.surveyed.layout.settings.as_record() | {
+        settings = study.surveyed.layout.settings.as_record() | {
             "seeds": options.seeds,
             "frames_every_s": options.every,
         }
@@ -77,55 +76,55 @@ def main(argv: list[str]) -> None:
     for line in study_results.in_words(results):
         session.say(line)
     for claim in claims:
-        session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")
+        session.say(claim.describe())
     session.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
     session.say(f"written to {folder}/")
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class DetectionStudy:
     """A scene with its placements and its traffic, ready for detectors.
 
     Parameters
     ----------
-    configurations : tuple of Configuration
+    configurations : tuple of SensorConfiguration
         1, 2 and 4 sensors of each type.
     """
 
     surveyed: survey.Survey
     traffic: case_study.Traffic
-    configurations: tuple[Configuration, ...]
-    studio: Studio
+    configurations: tuple[SensorConfiguration, ...]
+    simulator: Simulator
 
 
-def set_stage(options: argparse.Namespace) -> Stage:
+def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     """Survey the scene, read its traffic and place the sensors; the options are those of `add_options`."""
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
-    paths = options.traffic or runs_beside(options.scene)
+    paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
-    session.say(traffic.overlap())
+    session.LOG.info(traffic.overlap())
     steps = case_study.place_all(
         surveyed.layout.site,
         surveyed.layout.models,
         surveyed.grid,
-        solver=surveyed.layout.settings.solver,
-        time_limit=surveyed.layout.settings.time_limit,
-        effort=surveyed.layout.settings.effort,
+        **surveyed.layout.settings.limits,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
-    studio = Studio(static_scene(surveyed.layout.geometry), scans, surveyed.layout.site.name)
-    return Stage(surveyed, traffic, configurations, studio)
+    simulator = Simulator(static_scene(surveyed.layout.geometry), scans, surveyed.layout.site.name)
+    return DetectionStudy(surveyed, traffic, configurations, simulator)
 
 
-def learn_from(stage: Stage, network: NetworkSettings) -> case_study.Lessons:
+def learn_from(study: DetectionStudy, network: NetworkSettings) -> case_study.TrainingSet:
     """Simulate what a network learns from, on its own pillars."""
-    grid = grid_of(stage.surveyed.layout.geometry, network.pillar)
-    steps = case_study.simulate_lessons(stage.studio, stage.configurations, stage.traffic, grid, network.most_points)
-    return stage.surveyed.stopwatch.run("simulation", steps)
+    grid = grid_of(study.surveyed.layout.geometry, network.pillar)
+    steps = case_study.simulate_training_set(
+        study.simulator, study.configurations, study.traffic, grid, network.most_points
+    )
+    return study.surveyed.stopwatch.run("simulation", steps)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -148,11 +147,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="evaluate",
-        description="Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    what = "Find out what 1, 2 and 4 sensors of each type detect; name types from the simplest to the best."
+    parser = new_parser("evaluate", what)
     add_options(parser)
     parser.add_argument("--seeds", type=int, default=3, metavar="N", help="trainings, each with a seed of its own")
     parser.add_argument("--separate", action="store_true", help="a detector for each placement, not one for all")

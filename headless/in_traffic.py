@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -17,25 +15,18 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.charts.traffic import save_promise_chart, save_time_map
-from headless.goal_options import add_goal_options, goal_of
-from headless.traffic_runs import load_runs, parted, runs_beside
+from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
-from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal, Plan, check_goal, placement_problem, with_count
-from seip_addon.core.robustness.traffic_instants import check_runs, spread_instants
-from seip_addon.core.robustness.traffic_presence import road_user_seconds
-from seip_addon.core.robustness.traffic_study import (
-    WHAT,
-    InTraffic,
-    TrafficStudy,
-    look_at_traffic,
-    traffic_study,
-    traffic_warnings,
+from seip_addon.core.placement.goal import Plan, check_goal
+from seip_addon.core.robustness.traffic_study import WHAT, InTraffic, TrafficStudy
+from seip_addon.core.workflows.survey import Layout
+from seip_addon.core.workflows.traffic import (
+    TrafficRuns,
+    TrafficSettings,
+    independent_runs,
+    load_runs,
+    place_in_traffic,
 )
-from seip_addon.core.traffic import Trajectories
-from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
-from seip_addon.core.workflows.survey import surroundings
 
 CHARTS = ("time_seen.png", "traffic.png")
 
@@ -43,14 +34,14 @@ CHARTS = ("time_seen.png", "traffic.png")
 def main(argv: list[str]) -> None:
     """Place sensors for the road in traffic and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal = goal_of(options)
-    for number in (options.instants, options.judged_at):
-        if number < 1:
-            raise SeipError(f"ask for one instant of traffic or more, not {number}")
+    goal, settings = read_goal(options), read_settings(TrafficSettings, options)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
-    study = _studied(surveyed, goal, options)
     layout = surveyed.layout
-    plan = _plan(surveyed, goal, study, options)
+    runs = _read_runs(options, layout)
+    session.LOG.info(runs.overlap)
+    steps = place_in_traffic(layout, surveyed.grid, goal, runs, settings)
+    placed = surveyed.stopwatch.run("placement in traffic", steps)
+    plan, study = placed.plan, placed.study
     session.say(_in_words(study, plan))
     with session.writing(options.output):
         name = layout.site.name
@@ -62,60 +53,10 @@ def main(argv: list[str]) -> None:
     session.say(f"written to {options.output}/")
 
 
-def _studied(surveyed: survey.Survey, goal: Goal, options: argparse.Namespace) -> TrafficStudy:
-    layout, watch = surveyed.layout, surveyed.stopwatch
-    settings = layout.settings
-    to_choose_on, to_judge_in = _runs(surveyed, options)
-    problem = placement_problem(layout.site, surveyed.grid.visible, layout.models, goal)
-    if options.weights_from_traffic:
-        seconds = watch.run("road users", road_user_seconds(layout.site.targets, to_choose_on))
-        problem = replace(problem, weights=problem.weights * seconds)
-    around = surroundings(layout)
-    instants = spread_instants(to_choose_on, options.instants, options.seed)
-    scenarios = watch.run("looks at traffic", look_at_traffic(around, problem, instants, options.see))
-    judged = spread_instants(to_judge_in, options.judged_at, options.seed + 1)
-    steps = traffic_study(
-        around,
-        problem,
-        scenarios,
-        judged,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
-    )
-    return watch.run("placement in traffic", steps)
-
-
-def _runs(surveyed: survey.Survey, options: argparse.Namespace) -> tuple[list[Trajectories], list[Trajectories]]:
-    """Read the runs: those to choose on, and those to judge in."""
-    paths = options.traffic or runs_beside(options.scene)
-    if len(paths) < 2:
-        raise SeipError(
-            f"{len(paths)} runs of traffic are too few: name two or more with --traffic, made by headless/traffic.py "
-            "with a seed each; the last third of them judges what is chosen on the others"
-        )
-    runs = load_runs(paths, surveyed.layout.geometry.origin)
-    check_runs(runs, surveyed.layout.site.region)
-    positions = [vehicle_positions(str(path), run) for path, run in zip(paths, runs, strict=True)]
-    session.say(require_independent(product(*parted(positions))))
-    return parted(runs)
-
-
-def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: argparse.Namespace) -> Plan:
-    """Return the placement as a plan, noted what it was chosen for."""
-    layout, placement = surveyed.layout, study.traffic.placement
-    note = (
-        f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "
-        "bound and gap are of that"
-    )
-    weighed = ("targets weigh as many seconds as road users are there",) if options.weights_from_traffic else ()
-    noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
-    return Plan(
-        with_count(goal, layout.site),
-        noted,
-        None,
-        deploy(layout.site, layout.models, surveyed.grid.visible, placement.chosen),
-    )
+def _read_runs(options: argparse.Namespace, layout: Layout) -> TrafficRuns:
+    paths = options.traffic or survey.runs_beside(options.scene)
+    loaded = load_runs(paths, layout.geometry.origin)
+    return independent_runs({str(path): run for path, run in zip(paths, loaded, strict=True)}, layout.site)
 
 
 def _in_words(study: TrafficStudy, plan: Plan) -> str:
@@ -134,13 +75,9 @@ def _share(placed: InTraffic) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="in_traffic",
-        description="Place roadside LiDARs for the road in traffic.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    parser = new_parser("in_traffic", "Place roadside LiDARs for the road in traffic.")
     survey.add_options(parser)
-    add_goal_options(parser)
+    add_goal(parser)
     traffic = parser.add_argument_group("traffic")
     traffic.add_argument(
         "--traffic",
@@ -151,15 +88,8 @@ def _parser() -> argparse.ArgumentParser:
         help="runs of traffic: the last third judges what is chosen on the others (those in the folder SCENE_traffic "
         "beside the scene)",
     )
-    traffic.add_argument(
-        "--see", choices=tuple(WHAT), default="road", help="what is to be seen: the road, or points at vehicles' height"
-    )
-    traffic.add_argument(
-        "--weights-from-traffic", action="store_true", help="weigh targets by the time that road users are there"
-    )
-    traffic.add_argument("--instants", type=int, default=24, help="of traffic to choose on")
-    traffic.add_argument("--judged-at", type=int, default=120, metavar="INSTANTS", help="of traffic to judge by")
-    traffic.add_argument("--seed", type=int, default=0, help="of the instants; those to judge by have the next")
+    names = ("layer", "weights_from_traffic", "instants", "judged_at", "seed")
+    add_settings(traffic, TrafficSettings, *names)
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

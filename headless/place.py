@@ -20,9 +20,9 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
-from headless.goal_options import add_goal_options, goal_of
+from headless.options import add_goal, add_settings, new_parser, read_goal
 
-from seip_addon.core.placement.goal import Plan, check_goal
+from seip_addon.core.placement.goal import Goal, Plan, check_goal
 from seip_addon.core.workflows.convergence import coarsest_settings
 from seip_addon.core.workflows.survey import place
 
@@ -30,7 +30,7 @@ from seip_addon.core.workflows.survey import place
 def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal = goal_of(options, options.coverage)
+    goal = read_goal(options)
     refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal), refine)
     steps = place(surveyed.layout, surveyed.grid, goal, pose_errors=options.pose_errors)
@@ -58,14 +58,9 @@ def _in_words(plan: Plan) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="place",
-        description="Place roadside LiDARs in a scene.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
-    goal = add_goal_options(parser)
-    goal.add_argument("--coverage", type=float, metavar="SHARE", help="reach this share (0 to 1) at the least price")
+    add_settings(add_goal(parser), Goal, "coverage")
     parser.add_argument(
         "--tolerance",
         type=float,

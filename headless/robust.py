@@ -16,12 +16,12 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
-from headless.goal_options import add_goal_options, goal_of
+from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
 from seip_addon.core.placement.goal import check_goal
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.workflows.robust import Precaution, RobustPlan, place_robustly
+from seip_addon.core.workflows.robust import RobustnessSettings, RobustPlan, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
@@ -29,9 +29,9 @@ CHARTS = ("spread.png", "blame.png", "frontier.png")
 def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, precaution = goal_of(options), _precaution(options)
+    goal, robustness = read_goal(options), _precaution(options)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
-    steps = place_robustly(surveyed.layout, surveyed.grid, goal, precaution)
+    steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
     plan, study = robust.plan, robust.study
     session.say(_in_words(robust))
@@ -62,23 +62,18 @@ def _in_words(robust: RobustPlan) -> str:
     )
 
 
-def _precaution(options: argparse.Namespace) -> Precaution:
+def _precaution(options: argparse.Namespace) -> RobustnessSettings:
     height = options.position_error if options.height_error is None else options.height_error
     yaw = options.tilt_error if options.yaw_error is None else options.yaw_error
     errors = PoseErrors(options.position_error, height, math.radians(yaw), math.radians(options.tilt_error))
     tail = {"expected": 1.0, "cvar": options.tail, "worst": 0.0}[options.objective]
-    risk = Risk(tail, options.seen_by, options.failure)
-    return Precaution(risk, errors, options.scenarios, options.draws, options.seed)
+    return read_settings(RobustnessSettings, options, risk=read_settings(Risk, options, tail=tail), errors=errors)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="robust",
-        description="Place roadside LiDARs for what may go wrong.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    parser = new_parser("robust", "Place roadside LiDARs for what may go wrong.")
     survey.add_options(parser)
-    add_goal_options(parser)
+    add_goal(parser)
     risk = parser.add_argument_group("what may go wrong")
     risk.add_argument(
         "--objective",
@@ -87,18 +82,11 @@ def _parser() -> argparse.ArgumentParser:
         help="coverage of all scenarios on average, of the worst of them, or of the very worst",
     )
     risk.add_argument("--tail", type=float, default=0.25, metavar="SHARE", help="worst scenarios that cvar counts")
-    risk.add_argument("--seen-by", type=int, default=1, metavar="K", help="sensors that must see a target")
-    risk.add_argument(
-        "--failure", choices=("none", "worst", "mean"), default="none", help="of one sensor: the worst, or any"
-    )
+    add_settings(risk, Risk, "seen_by", "failure")
     errors = parser.add_argument_group("pose errors, standard deviations")
-    errors.add_argument("--position-error", type=float, default=0.3, metavar="M", help="of x and y")
-    errors.add_argument("--height-error", type=float, metavar="M", help="as of the position if not given")
-    errors.add_argument("--yaw-error", type=float, metavar="DEG", help="as of the tilt if not given")
-    errors.add_argument("--tilt-error", type=float, default=2.0, metavar="DEG", help="of pitch and roll")
-    errors.add_argument("--scenarios", type=int, default=20, help="draws to choose on")
-    errors.add_argument("--draws", type=int, default=500, help="unseen draws to judge by")
-    errors.add_argument("--seed", type=int, default=0, help="of the scenarios; unseen draws have the next")
+    add_settings(errors, PoseErrors, "position", "height", "yaw", "tilt")
+    errors.set_defaults(height_error=None, yaw_error=None, tilt_error=2.0)
+    add_settings(errors, RobustnessSettings, "scenarios", "draws", "seed")
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser
 

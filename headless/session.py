@@ -6,9 +6,11 @@ real program and as ``python -m headless.x arguments`` on the bpy module.
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
+import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
@@ -22,7 +24,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import files as storage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
 
     from seip_addon.core.progress import Progress
@@ -50,6 +52,11 @@ except ImportError:
 
 STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
+ELAPSED = "{desc} [{elapsed}]"
+"""How progress of unknown length is shown."""
+
+LOG = logging.getLogger("headless")
+"""What commands and their modules report on the way; `say` is for results."""
 
 _LOCKS: dict[Path, int] = {}
 """Folders that this process has locked, and what holds each lock."""
@@ -111,6 +118,26 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
+def warn(messages: Iterable[str]) -> None:
+    """Log what a user should know before trusting the results."""
+    for message in messages:
+        LOG.warning(message)
+
+
+class _Console(logging.Handler):
+    """Log records on standard output, above a bar that may be shown: warnings begin with the word."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        prefix = "warning: " if record.levelno >= logging.WARNING else ""
+        tqdm.write(f"{prefix}{record.getMessage()}", file=sys.stdout)
+        sys.stdout.flush()
+
+
+if not LOG.handlers:
+    LOG.addHandler(_Console())
+    LOG.setLevel(logging.INFO)
+
+
 def run(main: Callable[[list[str]], None]) -> NoReturn:
     """Run a command and end the process: 0, 1 after a user's mistake, 130 after Ctrl-C, 143 when terminated.
 
@@ -136,34 +163,43 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
 def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
-    A terminal sees a moving bar, a log file a line every ten seconds. Work
-    that starts anew (a smaller count, another total) gets a bar of its own;
-    work of unknown length shows what it does and for how long.
+    A terminal sees one bar, which stays on its line and begins anew where the
+    work does (a smaller count, another total); work of unknown length shows
+    what it does and for how long. A log gets a line every ten seconds at most.
     """
-    bar: tqdm | None = None
-    pause = 0.1 if sys.stderr.isatty() else SECONDS_BETWEEN_LINES
+    if not sys.stderr.isatty():
+        yield _line_reporter()
+        return
+    with tqdm(file=sys.stderr, leave=False, mininterval=0.1, maxinterval=0.1, bar_format=ELAPSED) as bar:
+
+        def report(progress: Progress) -> None:
+            known = progress.total > 0
+            bar.set_description(progress.what, refresh=False)
+            if (progress.total or None) != bar.total or (known and progress.done < bar.n):
+                bar.total, bar.bar_format = progress.total or None, None if known else ELAPSED
+                bar.reset()
+            bar.update(progress.done - bar.n if known else 1)
+
+        yield report
+
+
+def _line_reporter() -> Callable[[Progress], None]:
+    """Return what writes a line on progress where ten seconds have passed since the last one."""
+    start = shown = time.monotonic()
 
     def report(progress: Progress) -> None:
-        nonlocal bar
-        known = progress.total > 0
-        if bar is None or (progress.total or None) != bar.total or (known and progress.done < bar.n):
-            if bar is not None:
-                bar.close()
-            bar = tqdm(
-                total=progress.total or None,
-                bar_format=None if known else "{desc} [{elapsed}]",
-                file=sys.stderr,
-                mininterval=pause,
-                maxinterval=pause,
-            )
-        bar.set_description(progress.what, refresh=False)
-        bar.update(progress.done - bar.n if known else 1)
+        nonlocal shown
+        now = time.monotonic()
+        if now - shown < SECONDS_BETWEEN_LINES:
+            return
+        shown = now
+        style = None if progress.total else ELAPSED
+        total = progress.total or None
+        meter = tqdm.format_meter(progress.done, total, now - start, prefix=progress.what, bar_format=style)
+        sys.stderr.write(f"{meter}\n")
+        sys.stderr.flush()
 
-    try:
-        yield report
-    finally:
-        if bar is not None:
-            bar.close()
+    return report
 
 
 def _end(status: int, message: str = "") -> NoReturn:

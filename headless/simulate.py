@@ -17,7 +17,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session
-from headless.survey import HelpWithDefaults
+from headless.options import add_settings, new_parser, read_settings
 
 import bpy
 
@@ -44,11 +44,10 @@ def main(argv: list[str]) -> None:
     settings = _settings(options)
     run = _run(options, settings)
     check_run_folder(options.output, run)
-    session.say(_in_words(run))
+    session.LOG.info(_in_words(run))
     with session.progress_bar() as report:
         simulation = finish(simulation_of(run), report)
-    for sentence in simulation.warnings:
-        session.say(f"warning: {sentence}")
+    session.warn(simulation.warnings)
     with session.progress_bar() as report:
         manifest = finish(record(options.output, run, simulation, settings), report)
     session.say(_summary(manifest))
@@ -58,27 +57,14 @@ def main(argv: list[str]) -> None:
 
 
 def _settings(options: argparse.Namespace) -> RecordingSettings:
-    return RecordingSettings(
-        scan=ScanSettings(
-            seed=options.seed,
-            noise=not options.no_noise,
-            rolling_shutter=options.rolling_shutter,
-            engine=options.engine,
-        ),
-        start=options.start,
-        duration=options.duration,
-        rate=options.rate,
-        formats=tuple(options.format),
-        dataset=options.dataset,
-        split=options.split,
-    )
+    scan = read_settings(ScanSettings, options, noise=not options.no_noise)
+    return read_settings(RecordingSettings, options, scan=scan, formats=tuple(options.format), split=options.split)
 
 
 def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
     """Read what the frames follow from: the scene, its sensors, and its traffic."""
     reading = read_scene(bpy.context.scene)
-    for sentence in reading.warnings:
-        session.say(f"warning: {sentence}")
+    session.warn(reading.warnings)
     sensors = read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
     if options.traffic is None:
         with session.progress_bar() as report:
@@ -109,27 +95,20 @@ def _summary(manifest: Record) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="simulate",
-        description="Simulate what the sensors of a scene measure of its traffic.",
-        formatter_class=HelpWithDefaults,
-    )
+    parser = new_parser("simulate", "Simulate what the sensors of a scene measure of its traffic.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the run")
     parser.add_argument("--traffic", type=Path, metavar="NPZ", help="trajectories (those animated in the scene)")
     parser.add_argument("--catalogue", nargs="+", type=Path, default=[], metavar="TOML", help="catalogues of your own")
     when = parser.add_argument_group("frames")
-    when.add_argument("--start", type=float, metavar="S", help="time of the first frame (the traffic's first)")
-    when.add_argument("--duration", type=float, metavar="S", help="to the last frame (to the traffic's last)")
-    when.add_argument("--rate", type=float, metavar="HZ", help="frames a second (the slowest sensor's turns)")
+    add_settings(when, RecordingSettings, "start", "duration", "rate")
     how = parser.add_argument_group("measurement")
-    how.add_argument("--seed", type=int, default=0, help="of noise and lost returns")
-    how.add_argument("--rolling-shutter", action="store_true", help="traffic moves while a sensor turns")
+    add_settings(how, ScanSettings, "seed", "rolling_shutter")
     how.add_argument("--no-noise", action="store_true", help="exact ranges, and no return is lost")
-    how.add_argument("--engine", choices=("auto", "bvh", "embree"), default="auto", help="ray caster")
+    add_settings(how, ScanSettings, "engine")
     export = parser.add_argument_group("datasets")
     export.add_argument("--format", nargs="+", choices=tuple(FORMATS), default=[], help="also write the run in these")
-    export.add_argument("--dataset", type=Path, metavar="DIR", help="folder of datasets (that of the run)")
+    add_settings(export, RecordingSettings, "dataset")
     export.add_argument("--split", choices=SPLITS, default=SPLITS[0], help="of the dataset that the run belongs to")
     return parser
 

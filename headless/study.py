@@ -14,9 +14,11 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
-from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_study, judge
+from headless.claims import save_claims
+from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_claims, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
-from headless.coverage_study.tables import save_claims, save_study_table
+from headless.coverage_study.tables import save_study_table
+from headless.options import new_parser
 
 from seip_addon.core.pictures.plan_view import save_plan_view
 from seip_addon.core.placement.goal import Goal, check_goal
@@ -27,16 +29,9 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=1)))
     site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
-    steps = coverage_study(
-        site,
-        surveyed.layout.models,
-        visible,
-        solver=surveyed.layout.settings.solver,
-        time_limit=surveyed.layout.settings.time_limit,
-        effort=surveyed.layout.settings.effort,
-    )
+    steps = coverage_study(site, surveyed.layout.models, visible, **surveyed.layout.settings.limits)
     study = surveyed.stopwatch.run("study", steps)
-    claims = judge(study)
+    claims = coverage_claims(study)
 
     with session.writing(folder):
         save_study_table(folder / "coverage.csv", study)
@@ -52,16 +47,13 @@ def main(argv: list[str]) -> None:
                     save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
-        session.say(f"claim {claim.number} ({claim.text}): {claim.verdict.upper()}; {claim.evidence}")
+        session.say(claim.describe())
     session.say(f"written to {folder}/")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="study",
-        description="Redo the study's coverage figures on a scene; name sensor types from the simplest to the best.",
-        formatter_class=survey.HelpWithDefaults,
-    )
+    what = "Redo the study's coverage figures on a scene; name sensor types from the simplest to the best."
+    parser = new_parser("study", what)
     survey.add_options(parser)
     return parser
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import math
 import time
 from collections.abc import Callable, Generator
@@ -12,29 +13,31 @@ from pathlib import Path
 from typing import TypeVar
 
 from headless import session
+from headless.options import add_settings, read_settings
 
 import bpy
 import numpy as np
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import tilt_in_words
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Sensor
 from seip_addon.core.placement.goal import Plan
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.site.candidates import CandidateSettings, heights_of, tilts_of
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.convergence import Convergence
-from seip_addon.core.workflows.survey import Circumstances, Layout, SurveySettings, lay_out, record_of, see
+from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
 Result = TypeVar("Result")
+
+LOG = logging.getLogger(__name__)
 
 
 @dataclass
@@ -67,63 +70,43 @@ class Survey:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the scene, the folder of results and the options of a survey to a command."""
-    layout, sight = CandidateSettings(), VisibilitySettings()
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     sensors = parser.add_argument_group("sensors")
-    sensors.add_argument("--sensor", nargs="+", default=layout.sensors, metavar="KEY", help="types to choose from")
-    sensors.add_argument("--catalogue", nargs="+", type=Path, default=[], metavar="TOML", help="catalogues of your own")
-    sensors.add_argument(
-        "--heights",
-        nargs="+",
-        default=layout.heights,
-        action=_several(heights_of),
-        metavar="M",
-        help="metres, or FROM:TO:STEP",
-    )
-    sensors.add_argument(
-        "--tilts",
-        nargs="+",
-        default=layout.tilts,
-        action=_several(tilts_of),
-        metavar="DEG",
-        help="degrees nose down towards the region, or FROM:TO:STEP; up where negative; upright if not given",
-    )
+    add_settings(sensors, CandidateSettings, "sensors")
+    add_settings(sensors, SurveySettings, "catalogue")
+    add_settings(sensors, CandidateSettings, "heights", "tilts", "assumed_poles")
     metres = parser.add_argument_group("grid and candidates, in metres")
-    metres.add_argument("--grid", type=float, default=1.0, help="spacing of the targets")
-    metres.add_argument("--delta", type=float, default=sight.delta, help="a return closer than this sees a target")
-    metres.add_argument("--spacing", type=float, default=layout.spacing, help="between posts on the pavement")
-    metres.add_argument("--setback", type=float, default=layout.setback, help="of posts from the kerb")
-    metres.add_argument("--clearance", type=float, default=layout.clearance, help="of posts from walls")
-    sensors.add_argument(
-        "--assumed-poles",
-        action="store_true",
-        help="let poles carry sensors that are assumed, since the map has none for its traffic lights",
-    )
-    metres.add_argument("--bracket", type=float, default=layout.bracket, help="of sensors from the axis of a pole")
+    add_settings(metres, SurveySettings, "grid_spacing")
+    add_settings(metres, VisibilitySettings, "delta")
+    add_settings(metres, CandidateSettings, "spacing", "setback", "clearance", "bracket")
     work = parser.add_argument_group("work")
-    work.add_argument(
-        "--min-intensity", type=float, default=sight.min_intensity, help="least intensity of a return that sees"
-    )
-    work.add_argument("--engine", choices=("auto", "bvh", "embree"), default="auto", help="ray caster")
+    add_settings(work, VisibilitySettings, "min_intensity")
+    add_settings(work, SurveySettings, "engine")
     work.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="Dask scheduler whose workers cast: tcp://host:8786, tls://host:8786",
     )
-    work.add_argument(
-        "--solver", default="auto", help="auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi"
-    )
+    add_settings(work, SurveySettings, "solver")
     work.add_argument(
         "--time-limit", type=float, metavar="S", help="for each answer, in seconds (default: 60, or none with --effort)"
     )
-    work.add_argument(
-        "--effort",
-        type=float,
-        metavar="UNITS",
-        default=math.inf,
-        help="for each answer, in units of counted work, each about a second of one core: the same answer every time",
-    )
+    add_settings(work, SurveySettings, "effort")
+
+
+def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
+    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``.
+
+    Parameters
+    ----------
+    scene : path or None
+        None for the scene that is open.
+    kind : str
+        What else the folder's name ends with: ``_dense`` for ``junction_traffic_dense``.
+    """
+    path = Path(bpy.data.filepath) if scene is None else scene
+    return sorted((path.parent / f"{path.stem}_traffic{kind}").glob("*.npz"))
 
 
 Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
@@ -156,21 +139,20 @@ def survey(
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
     if refine is not None:
         settings = watch.run("spacings", refine(reading.geometry, settings)).settings
-        session.say(settings.spacings_because)
+        LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
-    session.say(_in_words(layout.site))
-    for sentence in layout.warnings:
-        session.say(f"warning: {sentence}")
+    LOG.info(_in_words(layout.site))
+    session.warn(layout.warnings)
     check(layout.site, layout.models)
     grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
-    session.say(triangles_sentence(grid.parameters["triangles"]))
+    LOG.info(triangles_sentence(grid.parameters["triangles"]))
     return Survey(layout, grid, watch)
 
 
 def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool, pose_errors: bool = False) -> None:
     """Write a plan of a survey, with its record, to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
-    now = Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
+    now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
         folder,
         bpy.context.scene,
@@ -190,33 +172,14 @@ def sensor_in_words(sensor: Sensor) -> str:
     return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
 
 
-def time_limit_of(options: argparse.Namespace) -> float:
-    """Return the limit of time for each answer; where work is limited there is none unless it is asked for."""
-    if options.time_limit is None:
-        return math.inf if math.isfinite(options.effort) else SurveySettings().time_limit
-    return float(options.time_limit)
-
-
 def _settings(options: argparse.Namespace) -> SurveySettings:
-    return SurveySettings(
-        candidates=CandidateSettings(
-            sensors=tuple(options.sensor),
-            heights=tuple(options.heights),
-            tilts=tuple(options.tilts),
-            spacing=options.spacing,
-            setback=options.setback,
-            clearance=options.clearance,
-            bracket=options.bracket,
-            assumed_poles=options.assumed_poles,
-        ),
-        visibility=VisibilitySettings(options.delta, options.min_intensity),
-        grid_spacing=options.grid,
-        catalogue=tuple(options.catalogue),
-        engine=options.engine,
-        solver=options.solver,
-        time_limit=time_limit_of(options),
-        effort=options.effort,
-    )
+    """Return the settings that options name; where work is limited there is no limit of time unless it is asked for."""
+    limit = options.time_limit
+    if limit is None:
+        limit = math.inf if math.isfinite(options.effort) else SurveySettings().time_limit
+    candidates = read_settings(CandidateSettings, options)
+    visibility = read_settings(VisibilitySettings, options)
+    return read_settings(SurveySettings, options, candidates=candidates, visibility=visibility, time_limit=limit)
 
 
 def _in_words(site: Site) -> str:
@@ -227,26 +190,3 @@ def _in_words(site: Site) -> str:
         f"{site.name}: {len(site.targets):,} targets, {len(candidates.position)} positions ({poles} on poles), "
         f"{len(candidates):,} poses, {len(site.triangles):,} triangles" + (f"; dropped: {dropped}" if dropped else "")
     )
-
-
-class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
-    """Help that names the default of each option that has one."""
-
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        return action.help if action.default in (None, [], math.inf) else super()._get_help_string(action)
-
-
-def _several(numbers_of: Callable[[list[str]], tuple[float, ...]]) -> type[argparse.Action]:
-    """Return what stores the numbers that several texts name, each a number or a range."""
-
-    class Several(argparse.Action):
-        def __call__(
-            self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, *_: object
-        ) -> None:
-            texts = values if isinstance(values, list) else []
-            try:
-                setattr(namespace, self.dest, numbers_of(texts))
-            except SeipError as error:
-                parser.error(f"argument {'/'.join(self.option_strings)}: {error}")
-
-    return Several

@@ -15,7 +15,7 @@ import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Generator, Iterable
+from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -23,7 +23,8 @@ from typing import TypeVar
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import session
+from headless.options import new_parser
 
 import bpy
 import numpy as np
@@ -71,7 +72,7 @@ def main(argv: list[str]) -> None:
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
     files = TrafficFiles(options.fcd, tuple(options.routes), options.net, options.begin, options.end)
     loaded = _run(load_traffic(files, geometry))
-    _warn(loaded.warnings)
+    session.warn(loaded.warnings)
     return loaded.trajectories
 
 
@@ -88,19 +89,14 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         made = TrafficFiles(files.floating_car_data, (files.routes,), files.network)
         read = _run(read_sumo(made, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
-    _warn((*read.warnings, *fit.warnings))
+    session.warn((*read.warnings, *fit.warnings))
     simulated = fit.trajectories
     apart, collided = _run(without_overlaps(simulated))
     if collided:
-        session.say(
+        session.LOG.info(
             f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}"
         )
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))
-
-
-def _warn(sentences: Iterable[str]) -> None:
-    for sentence in sentences:
-        session.say(f"warning: {sentence}")
 
 
 def _run(steps: Generator[Progress, None, Result]) -> Result:
@@ -118,9 +114,7 @@ def _in_words(trajectories: Trajectories) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="traffic", description="Put traffic on the road of a scene.", formatter_class=survey.HelpWithDefaults
-    )
+    parser = new_parser("traffic", "Put traffic on the road of a scene.")
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="NPZ", help="file for the trajectories")
     parser.add_argument("--animate", type=Path, metavar="BLEND", help="the scene with this traffic, to press play in")

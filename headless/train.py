@@ -19,7 +19,7 @@ from typing import Any
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import session
 from headless.charts.detection import save_training_chart
 from headless.detection.average_precision import evaluate
 from headless.detection.cloud_in_plan import CloudInPlan
@@ -32,6 +32,7 @@ from headless.detection.pillars import grid_of
 from headless.detection.settings import GROUPS, NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
+from headless.options import add_settings, new_parser, read_settings
 
 import bpy
 import numpy as np
@@ -49,19 +50,18 @@ RULES = {"ap_iou_0.7": Rule(iou=0.7), "ap_iou_0.5": Rule(iou=0.5), "ap_3d_iou_0.
 def main(argv: list[str]) -> None:
     """Train a detector, write it to a folder and evaluate it on the test runs."""
     options = _parser().parse_args(argv)
-    network = NetworkSettings(options.pillar, options.points, options.width, tuple(options.blocks), options.head)
-    training = TrainingSettings(steps=options.steps, batch=options.batch, seed=options.seed, threads=options.threads)
+    network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
     splits = {
         name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
     }
     require_separate(splits)
-    session.say(require_independent_splits(splits))
+    session.LOG.info(require_independent_splits(splits))
     check_device(options.device)
     session.check_folder(options.output)
     session.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
     grid = grid_of(geometry, network.pillar)
-    session.say(
+    session.LOG.info(
         f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m, from {grid.bottom:.1f} to {grid.top:.1f} m"
     )
 
@@ -94,8 +94,8 @@ def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry
     figures = {}
     for folder in runs:
         recording = recording_of(folder, geometry.name)
-        for sentence in suitability_warnings(detector, recording.sensors, recording.site, recording.frames[0].points):
-            session.say(f"warning: {folder}: {sentence}")
+        doubts = suitability_warnings(detector, recording.sensors, recording.site, recording.frames[0].points)
+        session.warn(f"{folder}: {doubt}" for doubt in doubts)
         results = _results(detector, folder, geometry.region)
         figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
         words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
@@ -121,12 +121,7 @@ def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[Fra
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="train",
-        description="Train a detector of road users on simulated scans of a site.",
-        formatter_class=survey.HelpWithDefaults,
-    )
-    network, training = NetworkSettings(), TrainingSettings()
+    parser = new_parser("train", "Train a detector of road users on simulated scans of a site.")
     parser.add_argument("scene", nargs="?", type=Path, help="the site's .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
     runs = parser.add_argument_group("folders of scans, by runs of traffic")
@@ -134,19 +129,11 @@ def _parser() -> argparse.ArgumentParser:
     runs.add_argument("--validation", nargs="+", type=Path, required=True, metavar="RUN", help="to see when to stop")
     runs.add_argument("--test", nargs="+", type=Path, default=[], metavar="RUN", help="to evaluate on")
     net = parser.add_argument_group("network")
-    net.add_argument(
-        "--head", choices=("centre", "anchor"), default=network.head, help="centres, or anchors as published"
-    )
-    net.add_argument("--pillar", type=float, default=network.pillar, metavar="M", help="side of a pillar in metres")
-    net.add_argument("--points", type=int, default=network.most_points, help="that a pillar keeps")
-    net.add_argument("--width", type=int, default=network.width, help="channels of the first block")
-    net.add_argument("--blocks", type=int, nargs=3, default=network.blocks, metavar="N", help="convolutions in each")
+    add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
     work = parser.add_argument_group("training")
-    work.add_argument("--steps", type=int, default=training.steps, help="updates of the weights")
-    work.add_argument("--batch", type=int, default=training.batch, help="windows in a step")
-    work.add_argument("--seed", type=int, default=training.seed, help="of weights and order")
+    add_settings(work, TrainingSettings, "steps", "batch", "seed")
     work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
-    work.add_argument("--threads", type=int, default=training.threads, help="of torch on the CPU")
+    add_settings(work, TrainingSettings, "threads")
     return parser
 
 

@@ -28,3 +28,12 @@ def pytest_unconfigure(config):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(config.stash[STATUS])
+
+
+@pytest.fixture(scope="session")
+def small_scene(tmp_path_factory):
+    """A scene that every command runs on in a moment, with traffic beside it."""
+    pytest.importorskip("bpy")
+    from small_scene import save_small_scene  # noqa: PLC0415 -- Blender's module need not be there
+
+    return save_small_scene(tmp_path_factory.mktemp("small"))

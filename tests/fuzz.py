@@ -442,13 +442,15 @@ def _read_blend(path: Path, _: bytes) -> None:
 
 
 def _detectors(folder: Path) -> list[bytes]:
-    from headless.detection.detector import Detector, Experience  # noqa: PLC0415
+    from headless.detection.detector import Detector, TrainingRecord  # noqa: PLC0415
     from headless.detection.pillars import grid_over  # noqa: PLC0415
     from headless.detection.settings import NetworkSettings  # noqa: PLC0415
 
     network = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
     grid = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), network.pillar)
-    Detector(network, grid, seed=1, experience=Experience(("type1",), ("Junction",))).save(folder / "sample.pt")
+    Detector(network, grid, seed=1, training_record=TrainingRecord(("type1",), ("Junction",))).save(
+        folder / "sample.pt"
+    )
     return [(folder / "sample.pt").read_bytes()]
 
 

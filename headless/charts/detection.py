@@ -9,12 +9,21 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from headless.coverage_study.charts import MARKS, SERIES
+from headless.charts.style import (
+    DASHED,
+    FAINT,
+    SERIES,
+    add_legend,
+    colour,
+    mark,
+    new_figure,
+    save_chart,
+    set_title,
+    style_axes,
+)
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -25,11 +34,10 @@ from seip_addon.core.pictures.callouts import place_callouts
 from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-GRID, FAINT = "#e3e6e8", "#c3c9ce"
 PANEL = (6.0, 4.4)  # inches
-DPI = 160
 BESIDE, ASIDE = 0.09, 0.035  # of the step between two numbers of sensors: from type to type, from mark to seeds
 SEED_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.4, "alpha": 0.55, "mew": 0.0, "zorder": 2}
+RINGED: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK}
 NAME: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
 
 STROKES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
@@ -40,7 +48,7 @@ Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Cell:
+class PrecisionCell:
     """What was reached with one type and number of sensors.
 
     Parameters
@@ -76,13 +84,13 @@ class Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PrecisionRecallLine:
     """Precision and recall of one type and number of sensors.
 
     Parameters
     ----------
     sensor, count
-        As in `Cell`.
+        As in `PrecisionCell`.
     recall, precision : (s,) float64, 0 to 1
         At each score, the highest first.
     """
@@ -95,7 +103,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Parts:
+class BinnedFigure:
     """A figure in parts of the road users, one line for each series.
 
     Parameters
@@ -118,7 +126,7 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class Setting:
+class DetectorSetting:
     """One setting of the detector and what it costs.
 
     Parameters
@@ -143,13 +151,13 @@ class Setting:
     default: bool = False
 
 
-def save_count_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title: str) -> None:
+def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
     """Draw average precision against the number of sensors, a line for each type, as PNG.
 
     Small dots are single seeds, marks their means, bars the intervals of the means.
     """
     _check(cells, "average precision against the number of sensors")
-    figure, (panel,) = _figure()
+    figure, (panel,) = new_figure(*PANEL)
     counts = sorted({cell.count for cell in cells})
     sensors = _sensors(cells)
     for row, sensor in enumerate(sensors):
@@ -158,19 +166,17 @@ def save_count_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title:
         panel.plot(x, [cell.mean for cell in own], label=sensor, linewidth=1.6, **_mark(row))
         for place, cell in zip(x, own, strict=True):
             _bar(panel, place, cell.interval, row)
-            panel.plot([place + ASIDE] * len(cell.values), cell.values, color=_colour(row), marker="o", **SEED_MARK)
+            panel.plot([place + ASIDE] * len(cell.values), cell.values, color=colour(row), marker="o", **SEED_MARK)
     panel.set_xticks(range(len(counts)), [f"{count}" for count in counts])
     panel.set_xlim(-0.4, len(counts) - 0.6)
-    panel.set_xlabel("number of sensors N", color=INK)
-    _precision_axis(panel, _reached(cells))
-    _finish(figure, panel, title)
-    save_png(path, figure)
+    _precision_axis(panel, _reached(cells), "number of sensors N")
+    save_chart(path, figure, title, [panel])
 
 
-def save_price_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title: str) -> None:
+def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
     """Draw average precision against price, with the front named, as PNG."""
     _check(cells, "average precision against price")
-    figure, (panel,) = _figure(PANEL[0] * 1.25)
+    figure, (panel,) = new_figure(PANEL[0] * 1.25, PANEL[1])
     best = _front(cells)
     _scatter(panel, cells, [cell.price for cell in cells])
     panel.step(
@@ -179,7 +185,7 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title:
         where="post",  # what is bought for less is at hand for more
         color=SOFT_INK,
         linewidth=1.1,
-        linestyle=(0, (4, 2)),
+        linestyle=DASHED,
         zorder=1,
         label="front: nothing cheaper detects as well",
     )
@@ -189,15 +195,19 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[Cell], title:
     panel.xaxis.set_minor_formatter(NullFormatter())
     prices = [cell.price for cell in cells]
     panel.set_xticks([tick for tick in _round_prices() if min(prices) / 1.5 <= tick <= max(prices) * 1.5])
-    panel.set_xlabel("price of all sensors", color=INK)
-    _precision_axis(panel, _reached(cells))
-    _finish(figure, panel, title)
+    _precision_axis(panel, _reached(cells), "price of all sensors")
+    add_legend(figure, [panel])
+    set_title(figure, title)
     _name(figure, panel, [(cell.price, cell.mean, cell.name, cell in best) for cell in cells])
     save_png(path, figure)
 
 
 def save_coverage_chart(
-    path: str | os.PathLike[str], cells: Sequence[Cell], correlation: float, interval: Interval | None, title: str
+    path: str | os.PathLike[str],
+    cells: Sequence[PrecisionCell],
+    correlation: float,
+    interval: Interval | None,
+    title: str,
 ) -> None:
     """Draw average precision against coverage, with their rank correlation, as PNG.
 
@@ -209,42 +219,41 @@ def save_coverage_chart(
         Its 95 % interval, where there is one.
     """
     _check(cells, "average precision against coverage")
-    figure, (panel,) = _figure()
+    figure, (panel,) = new_figure(*PANEL)
     _scatter(panel, cells, [cell.coverage for cell in cells])
     panel.margins(x=0.1)
     panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.0f} %"))
-    panel.set_xlabel("coverage: share of the road that the placement sees", color=INK)
-    _precision_axis(panel, _reached(cells))
+    _precision_axis(panel, _reached(cells), "coverage: share of the road that the placement sees")
     between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
     panel.set_title(f"rank correlation ρ = {correlation:.2f}{between}", color=SOFT_INK, fontsize=9.5)
-    _finish(figure, panel, title)
+    add_legend(figure, [panel])
+    set_title(figure, title)
     _name(figure, panel, [(cell.coverage, cell.mean, cell.name, False) for cell in cells])
     save_png(path, figure)
 
 
-def save_precision_recall_chart(path: str | os.PathLike[str], curves: Sequence[Curve], title: str) -> None:
+def save_precision_recall_chart(
+    path: str | os.PathLike[str], curves: Sequence[PrecisionRecallLine], title: str
+) -> None:
     """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
     _check(curves, "precision against recall")
-    figure, (panel,) = _figure()
+    figure, (panel,) = new_figure(*PANEL)
     sensors = list(dict.fromkeys(curve.sensor for curve in curves))
     counts = sorted({curve.count for curve in curves}, reverse=True)
     for curve in curves:
         stroke = STROKES[counts.index(curve.count) % len(STROKES)]
         label = f"{_named(curve.count, curve.sensor)}: AP {curve.average_precision:.2f}"
-        colour = _colour(sensors.index(curve.sensor))
-        panel.plot(curve.recall, curve.precision, color=colour, linestyle=stroke, linewidth=1.6, label=label)
+        style: dict[str, Any] = {"color": colour(sensors.index(curve.sensor)), "linestyle": stroke, "linewidth": 1.6}
+        panel.plot(curve.recall, curve.precision, label=label, **style)
     panel.set(xlim=(0, 1.01), ylim=(0, 1.02))
-    panel.set_xlabel("recall", color=INK)
-    panel.set_ylabel("precision", color=INK)
-    _dress(panel)
-    _finish(figure, panel, title)
-    save_png(path, figure)
+    style_axes(panel, "recall", "precision", "y")
+    save_chart(path, figure, title, [panel])
 
 
-def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[Parts], title: str) -> None:
+def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
     """Draw figures in parts of the road users, a panel for each way to part them, as PNG."""
     _check(panels, "detection by parts of the road users")
-    figure, axes = _figure(PANEL[0] * 0.85, count=len(panels))
+    figure, axes = new_figure(PANEL[0] * 0.85 * len(panels), PANEL[1], len(panels))
     for panel, parts in zip(axes, panels, strict=True):
         places = range(len(parts.edges) - 1)
         if parts.road_users:
@@ -256,11 +265,8 @@ def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[Parts], titl
         panel.set_ylim(bottom=0)
         if parts.road_users:
             panel.set_ylim(0, 1.03)
-        panel.set_xlabel(parts.what, color=INK)
-        panel.set_ylabel(parts.figure, color=INK)
-        _dress(panel)
-    _finish(figure, axes[0], title)
-    save_png(path, figure)
+        style_axes(panel, parts.what, parts.figure, "y")
+    save_chart(path, figure, title, axes[:1])
 
 
 def save_training_chart(
@@ -276,55 +282,37 @@ def save_training_chart(
         Average precision after so many steps; the best is marked.
     """
     _check(loss, "a training")
-    figure, (panel,) = _figure(PANEL[0] * 1.25)
-    steps = np.arange(1, len(loss) + 1)
-    panel.plot(steps, loss, color=FAINT, linewidth=0.7, label="loss")
-    panel.plot(steps, _smoothed(np.asarray(loss, dtype=np.float64)), color=SERIES[0], linewidth=1.6, label="smoothed")
+    figure, (panel,) = new_figure(PANEL[0] * 1.25, PANEL[1])
+    each = np.arange(1, len(loss) + 1)
+    panel.plot(each, loss, color=FAINT, linewidth=0.7, label="loss")
+    panel.plot(each, _smoothed(np.asarray(loss, dtype=np.float64)), color=SERIES[0], linewidth=1.6, label="smoothed")
     panel.set_yscale("log")
     panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     panel.yaxis.set_minor_formatter(NullFormatter())
     panel.set_xlim(0, len(loss))
-    panel.set_xlabel("step", color=INK)
-    panel.set_ylabel("loss", color=INK)
-    _dress(panel)
-    handles, labels = panel.get_legend_handles_labels()
+    style_axes(panel, "step", "loss", "y")
+    panels = [panel]
     if validation:
         beside = panel.twinx()
-        beside.plot(
-            list(validation),
-            list(validation.values()),
-            color=SERIES[1],
-            marker="s",
-            markersize=4,
-            label="validation AP",
-        )
+        panels.append(beside)
+        steps, reached = list(validation), list(validation.values())
+        beside.plot(steps, reached, color=SERIES[1], marker="s", markersize=4, label="validation AP")
         best = max(validation, key=lambda step: validation[step])
-        style: dict[str, Any] = {
-            "linestyle": "none",
-            "marker": "o",
-            "markersize": 12,
-            "mfc": "none",
-            "mec": INK,
-            "mew": 1.3,
-        }
-        beside.plot([best], [validation[best]], label=f"best: {validation[best]:.2f} after {best} steps", **style)
+        label = f"best: {validation[best]:.2f} after {best} steps"
+        beside.plot([best], [validation[best]], label=label, markersize=12, mew=1.3, **RINGED)
         beside.set_ylim(0, 1.02)
         beside.set_ylabel(f"{PRECISION} on validation frames", color=INK)
         beside.tick_params(colors=SOFT_INK)
         for side in ("top", "left"):
             beside.spines[side].set_visible(False)
-        more_handles, more_labels = beside.get_legend_handles_labels()
-        handles, labels = handles + more_handles, labels + more_labels
-    _legend(figure, handles, labels)
-    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
-    save_png(path, figure)
+    save_chart(path, figure, title, panels)
 
 
-def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Setting], title: str) -> None:
+def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[DetectorSetting], title: str) -> None:
     """Draw average precision against training seconds and inference milliseconds, the default marked, as PNG."""
     _check(settings, "settings of the detector")
-    figure, axes = _figure(PANEL[0] * 1.1, count=2)
+    figure, axes = new_figure(PANEL[0] * 2.2, PANEL[1], 2)
     families = list(dict.fromkeys(setting.family for setting in settings))
     costs = [[one.training for one in settings], [one.inference for one in settings]]
     for panel, cost, what in zip(
@@ -337,20 +325,12 @@ def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Setting]
             values = [one.average_precision for _, one in own]
             panel.plot([x for x, _ in own], values, label=family, linestyle="none", **_mark(row))
         chosen = [(x, one.average_precision) for x, one in zip(cost, settings, strict=True) if one.default]
-        style: dict[str, Any] = {
-            "linestyle": "none",
-            "marker": "o",
-            "markersize": 14,
-            "mfc": "none",
-            "mec": INK,
-            "mew": 1.4,
-        }
-        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", **style)
+        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", markersize=14, mew=1.4, **RINGED)
         panel.margins(x=0.15)
         panel.set_xlim(left=0)
-        panel.set_xlabel(what, color=INK)
-        _precision_axis(panel, [v for one in settings for v in (one.average_precision, *(one.interval or ()))])
-    _finish(figure, axes[0], title)
+        _precision_axis(panel, [v for one in settings for v in (one.average_precision, *(one.interval or ()))], what)
+    add_legend(figure, axes[:1])
+    set_title(figure, title)
     for panel, cost in zip(axes, costs, strict=True):
         named = [(x, one.average_precision, one.name, one.default) for x, one in zip(cost, settings, strict=True)]
         _name(figure, panel, named)
@@ -362,37 +342,15 @@ def _check(drawn: Sequence[object] | Mapping[str, object], what: str) -> None:
         raise SeipError(f"there is nothing to draw a chart of {what} from: evaluate a detector first")
 
 
-def _figure(width: float = PANEL[0], *, count: int = 1) -> tuple[Figure, Sequence[Axes]]:
-    """Return a figure with that many panels side by side."""
-    figure = Figure((width * count, PANEL[1]), dpi=DPI, facecolor=PAPER, layout="constrained")
-    FigureCanvasAgg(figure)  # measures text
-    return figure, figure.subplots(1, count, squeeze=False)[0]
-
-
-def _finish(figure: Figure, panel: Axes, title: str) -> None:
-    """Write the title, and below all panels the legend that they share."""
-    _legend(figure, *panel.get_legend_handles_labels())
-    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
-
-
-def _legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    widths = [0.6 + 0.07 * len(label) for label in labels]  # inches, about
-    room = figure.get_figwidth()
-    columns = len(labels) if sum(widths) < room else max(1, int(room // max(widths)))
-    legend = figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
-    for text in legend.get_texts():
-        text.set_parse_math(False)
-
-
 def _named(count: int, sensor: str) -> str:
     return f"{count} × {sensor}"
 
 
-def _sensors(cells: Sequence[Cell]) -> list[str]:
+def _sensors(cells: Sequence[PrecisionCell]) -> list[str]:
     return list(dict.fromkeys(cell.sensor for cell in cells))
 
 
-def _scatter(panel: Axes, cells: Sequence[Cell], x: Sequence[float]) -> None:
+def _scatter(panel: Axes, cells: Sequence[PrecisionCell], x: Sequence[float]) -> None:
     """Mark each cell's mean with its interval, a colour and a mark for each type."""
     for row, sensor in enumerate(_sensors(cells)):
         own = [(place, cell) for place, cell in zip(x, cells, strict=True) if cell.sensor == sensor]
@@ -404,43 +362,31 @@ def _scatter(panel: Axes, cells: Sequence[Cell], x: Sequence[float]) -> None:
 
 def _bar(panel: Axes, x: float, interval: Interval | None, row: int) -> None:
     if interval is not None:
-        panel.plot((x, x), interval, color=_colour(row), linewidth=1.1, marker="_", markersize=5, zorder=3)
+        panel.plot((x, x), interval, color=colour(row), linewidth=1.1, marker="_", markersize=5, zorder=3)
 
 
 def _mark(row: int) -> dict[str, Any]:
-    return {
-        "color": _colour(row),
-        "marker": MARKS[row % len(MARKS)],
-        "markersize": 6,
-        "mec": PAPER,
-        "mew": 0.7,
-        "zorder": 4,
-    }
+    return {"color": colour(row), "marker": mark(row), "markersize": 6, "mec": PAPER, "mew": 0.7, "zorder": 4}
 
 
-def _colour(row: int) -> str:
-    return SERIES[row % len(SERIES)]
-
-
-def _front(cells: Sequence[Cell]) -> list[Cell]:
+def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
     """Return the cells than which none costs no more and detects better (Pareto front), the cheapest first."""
-    best: list[Cell] = []
+    best: list[PrecisionCell] = []
     for cell in sorted(cells, key=lambda cell: (cell.price, -cell.mean)):
         if not best or cell.mean > best[-1].mean:
             best.append(cell)
     return best
 
 
-def _reached(cells: Sequence[Cell]) -> list[float]:
+def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
     return [value for cell in cells for value in (*cell.values, *(cell.interval or ()))]
 
 
-def _precision_axis(panel: Axes, reached: Sequence[float]) -> None:
+def _precision_axis(panel: Axes, reached: Sequence[float], x: str) -> None:
     """Show what was reached: differences near 1 would not be seen on an axis from 0."""
     lowest = min(value for value in reached if math.isfinite(value))
     panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
-    panel.set_ylabel(PRECISION, color=INK)
-    _dress(panel)
+    style_axes(panel, x, PRECISION, "y")
 
 
 def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
@@ -478,7 +424,7 @@ def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, 
     extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents])
     points = panel.transData.transform([(x, y) for x, y, _, _ in named])
-    radius, frame = 4.0 * DPI / 72, panel.get_window_extent()
+    radius, frame = 4.0 * figure.dpi / 72, panel.get_window_extent()
     lines = np.concatenate([_along(panel, line) for line in panel.get_lines()])
     centres = place_callouts(points, sizes, frame.extents, radius, lines)
     back = panel.transData.inverted()
@@ -498,11 +444,3 @@ def _along(panel: Axes, line: Line2D) -> Float:
         return corners
     along: Float = np.linspace(corners[:-1], corners[1:], 20).reshape(-1, 2)
     return along
-
-
-def _dress(panel: Axes) -> None:
-    panel.grid(axis="y", color=GRID, linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.tick_params(which="both", colors=SOFT_INK)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from headless.charts.style import new_figure, save_chart
+
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.path import Path
@@ -19,8 +20,8 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.drawing import SENSOR_MARK, save_png
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.pictures.drawing import SENSOR_MARK
+from seip_addon.core.pictures.palette import INK, SOFT_INK
 
 TRUTH, DETECTED, OTHER = "#00875a", "#d1242f", "#a9b1b8"
 WASH = TRUTH + "22"
@@ -83,15 +84,14 @@ def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], ti
     left, bottom, right, top = shapely.total_bounds([view.region for view in views])
     around = AROUND * max(right - left, top - bottom)
     shape = (top - bottom + 2 * around) / (right - left + 2 * around)
-    figure = Figure((SIDE * len(views), SIDE * shape + 1.1), dpi=DPI, facecolor=PAPER, layout="constrained")
-    for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+    figure, panels = new_figure(SIDE * len(views), SIDE * shape + 1.1, len(views), dpi=DPI)
+    for panel, view in zip(panels, views, strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
         _draw(panel, view)
     legend = figure.legend(handles=_legend(), frameon=False, fontsize=9, loc="outside lower center", ncols=7)
     for text in legend.get_texts():
         text.set_color(INK)
-    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
-    save_png(path, figure)
+    save_chart(path, figure, title)
 
 
 def _draw(panel: Axes, view: ErrorView) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from headless.coverage_study.charts import SERIES
+from headless.charts.style import SERIES, interval_ends, new_figure, save_chart, style_axes
 
 import numpy as np
 import shapely
@@ -13,16 +13,15 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
-from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.arrays import Float
+from seip_addon.core.estimates import Estimate
 from seip_addon.core.geometry.plan import closed, outline
-from seip_addon.core.pictures.drawing import draw_sensors, save_png
-from seip_addon.core.pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
+from seip_addon.core.pictures.drawing import draw_sensors
+from seip_addon.core.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
 from seip_addon.core.pictures.plan_view import CRACK, draw_area
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.robustness.estimates import Estimate
 from seip_addon.core.robustness.traffic_study import WHAT, InTraffic, TrafficStudy
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
@@ -49,8 +48,7 @@ def save_time_map(  # what is drawn, and where
     left, bottom, right, top = site.region.bounds
     around = AROUND * max(right - left, top - bottom)
     shape = (top - bottom + 2 * around) / (right - left + 2 * around)
-    figure = Figure((SIDE * len(placed.seen) + 0.9, SIDE * shape + 0.9), dpi=160, facecolor=PAPER, layout="constrained")
-    panels = figure.subplots(1, len(placed.seen), squeeze=False)[0]
+    figure, panels = new_figure(SIDE * len(placed.seen) + 0.9, SIDE * shape + 0.9, len(placed.seen))
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
         panel.set_title(f"{WHAT[layer]}: {seen.held.in_words(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
@@ -64,8 +62,7 @@ def save_time_map(  # what is drawn, and where
     bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME), ax=list(panels), shrink=0.7, pad=0.01)
     bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     bar.set_label("share of time for which it is seen", color=INK)
-    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
-    save_png(path, figure)
+    save_chart(path, figure, title)
 
 
 def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
@@ -76,8 +73,7 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     studies : sequence of (str, TrafficStudy)
         With what tells one from another, like ``2 × type1``.
     """
-    figure = Figure((11.5, 4.6), dpi=160, facecolor=PAPER, layout="constrained")
-    shares, changes = figure.subplots(1, 2)
+    figure, (shares, changes) = new_figure(11.5, 4.6, 2)
     rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
     _bars(shares, -1, [Estimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "promised, empty road")
     _bars(shares, 0, [empty.held for empty, _ in rows], "held in traffic")
@@ -91,14 +87,9 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
         axes.set_xticks(range(len(studies)), [name for name, _ in studies])
         axes.set_xlim(-0.6, len(studies) - 0.4)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=decimals))
-        axes.grid(axis="y", color="#e3e6e8", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.tick_params(colors=SOFT_INK)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
+        style_axes(axes, grid="y")
         axes.legend(frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
-    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
-    save_png(path, figure)
+    save_chart(path, figure, title)
 
 
 def negative(estimate: Estimate) -> Estimate:
@@ -126,16 +117,11 @@ def _bars(axes: Axes, place: int, estimates: Sequence[Estimate], label: str) -> 
     values = np.array([estimate.value for estimate in estimates])
     axes.bar(at, values, width=0.9 * THIRD, color=(SEEN_COLOURS[1], SERIES[1], SERIES[2])[place + 1], label=label)
     for x, estimate in zip(at, estimates, strict=True):
-        axes.plot([x, x], _ends(estimate), color=INK, linewidth=1.4)
+        axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
 
 
 def _dots(axes: Axes, place: float, estimates: Sequence[Estimate], colour: int, label: str) -> None:
     at = np.arange(len(estimates)) + place * THIRD
     for x, estimate in zip(at, estimates, strict=True):
-        axes.plot([x, x], _ends(estimate), color=SERIES[colour], linewidth=2.4)
+        axes.plot([x, x], interval_ends(estimate), color=SERIES[colour], linewidth=2.4)
     axes.plot(at, [each.value for each in estimates], "o", color=SERIES[colour], label=label)
-
-
-def _ends(estimate: Estimate) -> list[float]:
-    """Return the ends of an interval; where it is open it ends at the value."""
-    return [end if np.isfinite(end) else estimate.value for end in (estimate.low, estimate.high)]

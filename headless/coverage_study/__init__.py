@@ -1,11 +1,7 @@
-"""Coverage study of a site: types × heights × numbers, vanilla against weighted, and the claims of the paper.
-
-The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
-Evaluation of Infrastructure-based Collective Perception", section V.
-"""
+"""Coverage study of a site: types × heights × numbers, vanilla against weighted, and the claims of the paper."""
 
 from .cells import NUMBERS, WEIGHT_SHOWN, WEIGHTS, Case, Cell, CoverageStudy, EmptyCell, coverage_study, solve_cell
-from .claims import Claim, judge
+from .claims import coverage_claims
 
 __all__ = [
     "NUMBERS",
@@ -13,10 +9,9 @@ __all__ = [
     "WEIGHT_SHOWN",
     "Case",
     "Cell",
-    "Claim",
     "CoverageStudy",
     "EmptyCell",
+    "coverage_claims",
     "coverage_study",
-    "judge",
     "solve_cell",
 ]

@@ -4,38 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+
+from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, judge, judge_all
 
 from .cells import NUMBERS, WEIGHTS, Case, CoverageStudy, Span
 
 NEGLIGIBLE = 0.01
 """Share of the region below which a gain or loss of coverage counts as none."""
 
-HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "undecided"
 
-
-@dataclass(frozen=True)
-class Claim:
-    """A claim of the study and what this site says to it.
-
-    Parameters
-    ----------
-    number : int
-        Number in the study's list of claims.
-    verdict : str
-        ``holds``, ``does not hold``, or ``undecided`` where bounds leave it open.
-    evidence : str
-        The figures behind the verdict.
-    """
-
-    number: int
-    text: str
-    verdict: str
-    evidence: str
-
-
-def judge(study: CoverageStudy) -> tuple[Claim, ...]:
+def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
     """Hold claims 1 to 4 and 10 of the study against the solved cells.
 
     Claims that compare types, heights or weights are left out where there is
@@ -59,13 +38,13 @@ def _more_is_better(study: CoverageStudy) -> Claim:
     ]
     verdicts += [_rises(shares[b, n], shares[a, n]) for a, b in pairwise(study.sensors) for n in NUMBERS]
     gain = _gain(shares[best, most], shares[best, few])
-    verdicts.append(UNDECIDED if gain is None else _verdict(holds=gain[1] < NEGLIGIBLE, fails=gain[0] >= NEGLIGIBLE))
+    verdicts.append(UNDECIDED if gain is None else judge(holds=gain[1] < NEGLIGIBLE, fails=gain[0] >= NEGLIGIBLE))
     rows = [f"{sensor} " + ", ".join(_found(shares[sensor, n]) for n in NUMBERS) for sensor in study.sensors]
     gained = "" if gain is None else f"; {best} gains {_range(gain)} from N = {few} to {most}"
     return Claim(
         1,
         f"coverage rises with N and with a better type; for {best} the gain is negligible",
-        _all(verdicts),
+        judge_all(verdicts),
         f"N = {', '.join(map(str, NUMBERS))}: {'; '.join(rows)}{gained}",
     )
 
@@ -83,7 +62,7 @@ def _four_of_the_best(study: CoverageStudy) -> Claim:
     return Claim(
         2,
         text,
-        _all([_verdict(holds=_is_full(share), fails=share[1] < 1), _verdict(holds=spare, fails=settled)]),
+        judge_all([judge(holds=_is_full(share), fails=share[1] < 1), judge(holds=spare, fails=settled)]),
         f"{_found(share)} with {used} of {most} sensors used",
     )
 
@@ -104,7 +83,7 @@ def _heights(study: CoverageStudy) -> Claim:
     return Claim(
         3,
         f"{study.sensors[0]} does best at {lowest:g} m; the other types prefer higher, at every N",
-        _all(verdicts),
+        judge_all(verdicts),
         f"best height at N = {', '.join(map(str, NUMBERS))}: {'; '.join(rows)}",
     )
 
@@ -128,7 +107,7 @@ def _weighting(study: CoverageStudy) -> Claim:
     return Claim(
         4,
         "weighting raises central coverage of all but the best type without hurting the whole; the best gains nothing",
-        _all(verdicts),
+        judge_all(verdicts),
         f"N = {NUMBERS[-1]}, best weight that costs the whole under {NEGLIGIBLE:.0%}: {'; '.join(rows)}; where several "
         "placements are best, the figures are those of the one returned",
     )
@@ -160,13 +139,13 @@ def _is_proven(case: Case) -> bool:
 def _greedy(study: CoverageStudy) -> Claim:
     promise = 1 - 1 / math.e
     reached = [(case.greedy.objective, *case.span) for case in study.cases]
-    verdicts = [_verdict(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
+    verdicts = [judge(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
     worst = min(value / high for value, _, high in reached)
     short = sum(value < low * (1 - 1e-9) for value, low, _ in reached)
     return Claim(
         10,
         "greedy reaches 1 − 1/e of the optimum",
-        _all(verdicts),
+        judge_all(verdicts),
         f"at worst {worst:.1%} of the bound; below the integer program in {short} of {len(reached)} cells",
     )
 
@@ -176,7 +155,7 @@ def _rises(more: Span | None, less: Span | None) -> str:
     if more is None or less is None:
         return UNDECIDED
     full = 1 - NEGLIGIBLE
-    return _verdict(
+    return judge(
         holds=more[0] - less[1] > NEGLIGIBLE or less[0] >= full,
         fails=more[1] - less[0] <= NEGLIGIBLE and less[1] < full,
     )
@@ -185,7 +164,7 @@ def _rises(more: Span | None, less: Span | None) -> str:
 def _exceeds(more: Span | None, less: Span | None) -> str:
     if more is None or less is None:
         return UNDECIDED
-    return _verdict(holds=more[0] > less[1], fails=more[1] <= less[0])
+    return judge(holds=more[0] > less[1], fails=more[1] <= less[0])
 
 
 def _is_full(span: Span | None) -> bool:
@@ -224,14 +203,3 @@ def _found(span: Span | None) -> str:
 def _range(span: Span) -> str:
     low, high = (f"{value:.2%}" for value in span)
     return low if low == high else f"{low} to {high}"
-
-
-def _verdict(*, holds: bool, fails: bool) -> str:
-    """Return the verdict on what is known to hold, known to fail, or neither."""
-    if holds:
-        return HOLDS
-    return FAILS if fails else UNDECIDED
-
-
-def _all(verdicts: Sequence[str]) -> str:
-    return next((verdict for verdict in (FAILS, UNDECIDED) if verdict in verdicts), HOLDS)

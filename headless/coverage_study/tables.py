@@ -1,15 +1,14 @@
-"""Tables of a coverage study: every cell as CSV, the claims as Markdown."""
+"""Table of a coverage study: every cell as CSV."""
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
 
 from seip_addon.core.results.headings import tilt_degrees
 from seip_addon.core.storage.files import whole_file
 
-from . import Case, Claim, CoverageStudy, EmptyCell
+from . import Case, CoverageStudy, EmptyCell
 
 COLUMNS = (
     "sensor",
@@ -41,19 +40,6 @@ def save_study_table(path: str | os.PathLike[str], study: CoverageStudy) -> None
             writer.writerow(_key(cell) | (_figures(cell) if isinstance(cell, Case) else {"note": cell.note}))
 
 
-def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: str) -> None:
-    """Write the claims with their verdicts and figures as a Markdown table."""
-    lines = [
-        f"# {title}: claims of the study on this site",
-        "",
-        "| # | claim | verdict | figures |",
-        "|---|---|---|---|",
-    ]
-    lines += [f"| {c.number} | {_cell(c.text)} | **{c.verdict}** | {_cell(c.evidence)} |" for c in claims]
-    with whole_file(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
 def _key(cell: Case | EmptyCell) -> dict[str, str]:
     return {
         "sensor": cell.sensor,
@@ -80,8 +66,3 @@ def _figures(case: Case) -> dict[str, str]:
         "price_usd": f"{deployment.price:.2f}",
         "note": "; ".join(placement.notes),
     }
-
-
-def _cell(words: str) -> str:
-    """Return text that a Markdown table takes as one cell."""
-    return words.replace("|", "\\|")

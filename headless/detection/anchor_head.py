@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .heads import Candidates, Targets, cell_middles, inner_cells
+from .heads import BoxProposals, TrainingTargets, cell_middles, inner_cells
 from .losses import focal_loss
 from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid
@@ -90,7 +90,9 @@ class AnchorHead(nn.Module):
         output: Tensor = self.final(features)
         return output
 
-    def loss(self, output: Tensor, targets: list[Targets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+    def loss(
+        self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
+    ) -> dict[str, Tensor]:
         """Return the parts of the loss; see `heads.DetectionHead`."""
         predicted = _by_anchor(output)
         assigned = torch.stack([assignment(wanted, grid) for wanted in targets])
@@ -112,7 +114,7 @@ class AnchorHead(nn.Module):
         direction = functional.cross_entropy(found[:, 8:], direction_of(target[:, 6]), reduction="sum") / count
         return {"score": score, "box": 2.0 * box, "direction": 0.2 * direction}
 
-    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[Candidates]:
+    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
         """Return the boxes that anchors have become; see `heads.DetectionHead`."""
         found = []
         for cloud in _by_anchor(output):
@@ -124,7 +126,7 @@ class AnchorHead(nn.Module):
             predicted = cloud[anchor, row, column]
             boxes = decoded(predicted[:, 1:], anchor_boxes(grid, anchor, row, column))
             category = _categories(output.device)[anchor]
-            found.append(Candidates(boxes, score[best], category))
+            found.append(BoxProposals(boxes, score[best], category))
         return found
 
 
@@ -132,7 +134,7 @@ NOTHING, UNCLEAR = -1, -2
 """What an anchor is assigned to that must find no road user, and one that may do as it likes."""
 
 
-def assignment(wanted: Targets, grid: PillarGrid) -> Tensor:
+def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     """Return which box each anchor must find: (anchors, rows, columns) int64, or `NOTHING` or `UNCLEAR`.
 
     An anchor belongs to the road user of its class that overlaps it most, both
@@ -211,7 +213,7 @@ def direction_of(yaw: Tensor) -> Tensor:
     return (torch.remainder(yaw - DIRECTION_FROM, 2 * math.pi) >= math.pi).long()
 
 
-def _overlaps(wanted: Targets, grid: PillarGrid) -> Tensor:
+def _overlaps(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     """Return the overlaps (boxes, anchors, rows, columns) of anchors set along the axes; 0 across classes."""
     boxes = wanted.boxes
     x, y = cell_middles(grid, OUTPUT_STRIDE, boxes.device)

@@ -10,9 +10,9 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval, percentiles
 
 from .frame_results import FrameResult
-from .intervals import Interval, percentiles
 from .matching import Match, Rule, match
 
 BLOCK = 10.0
@@ -23,14 +23,14 @@ FEWEST_BLOCKS = 5
 
 RESAMPLES, AT_ONCE = 1000, 50
 
-Table = TypeVar("Table", "Judged", "Wanted")
+Table = TypeVar("Table", "EvaluatedDetections", "CountedTruth")
 
 MISSED = -np.inf
 """The score at which a road user is found that none finds."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class EvaluatedDetections:
     """The judged detections of all frames, best first; d of them.
 
     Parameters
@@ -61,7 +61,7 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class CountedTruth:
     """The road users of all frames that count; t of them.
 
     Parameters
@@ -71,7 +71,7 @@ class Wanted:
     frame : (t,) int64
         The frame it is in.
     category, points, visibility, distance
-        As in `Truth`.
+        As in `GroundTruth`.
     """
 
     score: Float
@@ -87,7 +87,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PrecisionRecall:
     """Precision and recall at each score that a detection has, the highest first.
 
     Parameters
@@ -112,8 +112,8 @@ class Evaluation:
     """
 
     rule: Rule
-    detections: Judged
-    wanted: Wanted
+    detections: EvaluatedDetections
+    wanted: CountedTruth
     block: Integer
 
     @property
@@ -145,12 +145,12 @@ def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
     return Evaluation(rule, _judged(frames, matches), _wanted(frames, matches), _blocks(frames))
 
 
-def precision_recall(evaluation: Evaluation) -> Curve:
+def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
     """Return precision and recall at each score."""
     detections = evaluation.detections
     last = _last_of_equals(detections.score)
     hits = np.cumsum(detections.hit)[last]
-    return Curve(detections.score[last], hits / (last + 1), hits / max(len(evaluation.wanted), 1))
+    return PrecisionRecall(detections.score[last], hits / (last + 1), hits / max(len(evaluation.wanted), 1))
 
 
 def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | None:
@@ -216,13 +216,13 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
     )
 
 
-def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Wanted:
+def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> CountedTruth:
     truths = [frame.truth for frame in frames]
     score = [
         np.append(frame.detected.score, MISSED)[found.found_by]  # NOBODY is the last
         for frame, found in zip(frames, matches, strict=True)
     ]
-    everyone = Wanted(
+    everyone = CountedTruth(
         score=np.concatenate(score),
         frame=np.repeat(np.arange(len(frames)), [len(truth) for truth in truths]),
         category=np.concatenate([truth.category for truth in truths]),
@@ -233,9 +233,9 @@ def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Wanted:
     return _rows(everyone, np.concatenate([found.counted for found in matches]))
 
 
-def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Judged:
+def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> EvaluatedDetections:
     found, pairs = [frame.detected for frame in frames], list(zip(frames, matches, strict=True))
-    everything = Judged(
+    everything = EvaluatedDetections(
         score=np.concatenate([boxes.score for boxes in found]),
         hit=np.concatenate([one.hit for one in matches]),
         frame=np.repeat(np.arange(len(frames)), [len(boxes) for boxes in found]),

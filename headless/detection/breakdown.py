@@ -11,7 +11,6 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float, Integer
 
 from .average_precision import Evaluation, part
-from .intervals import Interval
 
 ALONG_DISTANCE = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
 ALONG_POINTS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)
@@ -31,15 +30,12 @@ class Bin:
         Road users that had to be found.
     value : float
         NaN where there are none to take it of.
-    interval : (float, float) or None
-        95 % interval of ``value``, where it has one.
     """
 
     low: float
     high: float
     wanted: int
     value: float
-    interval: Interval | None = None
 
 
 def average_precision_by(evaluation: Evaluation, quantity: str, edges: Sequence[float]) -> tuple[Bin, ...]:

@@ -21,6 +21,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
@@ -31,21 +32,20 @@ from seip_addon.core.visibility.grid import VisibilityGrid
 
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
 from .breakdown import false_positives
-from .claims import Trial
+from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
 from .detections import Detections
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
-from .intervals import Interval
 from .kitti import kitti
 from .matching import Rule
 from .pillars import PillarGrid
-from .recordings import Configuration, Studio, TrafficRun
+from .recordings import SampledRun, SensorConfiguration, Simulator
 from .settings import GROUPS, NetworkSettings, TrainingSettings
 from .suitability import suitability_warnings
-from .training import Trained, deterministic, train
+from .training import TrainedDetector, deterministic, train
 
 RULES = {
     "bev_0.7": Rule(),
@@ -73,7 +73,7 @@ class Traffic:
 
     Parameters
     ----------
-    training, validation, test : tuple of TrafficRun
+    training, validation, test : tuple of SampledRun
         To learn from, to see by when that is enough, and to judge with.
 
     Raises
@@ -82,9 +82,9 @@ class Traffic:
         Two runs are nearly the same: their frames show the same vehicles in the same places.
     """
 
-    training: tuple[TrafficRun, ...]
-    validation: tuple[TrafficRun, ...]
-    test: tuple[TrafficRun, ...]
+    training: tuple[SampledRun, ...]
+    validation: tuple[SampledRun, ...]
+    test: tuple[SampledRun, ...]
 
     def __post_init__(self) -> None:
         self.overlap()
@@ -119,7 +119,7 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     return Traffic(runs[:-3], runs[-3:-2], runs[-2:])
 
 
-def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[TrafficRun, ...]:
+def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
     """Read runs, each looked at from `WARM_UP` on; see `read_traffic`."""
     runs = []
     for path in paths:
@@ -128,30 +128,30 @@ def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[Traff
         times = np.arange(begin + WARM_UP, end, every)
         if not len(times):
             raise SeipError(f"{path} is shorter than {WARM_UP:g} s: simulate more traffic")
-        runs.append(TrafficRun(path.stem, trajectories, times))
+        runs.append(SampledRun(path.stem, trajectories, times))
     return tuple(runs)
 
 
 @dataclass(frozen=True, eq=False)
-class Pupil:
+class ModelConfiguration:
     """A detector that is to be trained.
 
     Parameters
     ----------
     name : str
         Also of its file.
-    configurations : tuple of Configuration
+    configurations : tuple of SensorConfiguration
         Whose clouds it learns from, and is judged with.
     """
 
     name: str
-    configurations: tuple[Configuration, ...]
+    configurations: tuple[SensorConfiguration, ...]
     network: NetworkSettings
     training: TrainingSettings
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class DetectorOutcome:
     """What one detector made of one configuration's test frames.
 
     Parameters
@@ -162,26 +162,26 @@ class Judgement:
         From which on false positives are counted: the best balance of precision and recall on validation frames.
     """
 
-    pupil: Pupil
-    configuration: Configuration
+    model: ModelConfiguration
+    configuration: SensorConfiguration
     frames: tuple[FrameResult, ...]
     evaluation: Evaluation
     score: float
 
     @property
-    def trial(self) -> Trial:
+    def seed_result(self) -> SeedResult:
         """Its figures, as the claims need them."""
         case, false = self.configuration.case, false_positives(self.evaluation, self.score)
-        return Trial(
+        return SeedResult(
             sensor=case.sensor,
             count=case.count,
-            seed=self.pupil.training.seed,
+            seed=self.model.training.seed,
             average_precision=self.evaluation.average_precision,
             price=case.deployment.price,
             coverage=case.deployment.coverage,
             false_positives=false.per_frame,
             sparse=false.sparse,
-            padded=self.pupil.network.padded,
+            padded=self.model.network.padded,
         )
 
     @cached_property
@@ -197,33 +197,33 @@ class Judgement:
         return average_precision_interval(self.evaluation, seed=0)
 
 
-def pupils(
-    configurations: Sequence[Configuration],
+def model_configurations(
+    configurations: Sequence[SensorConfiguration],
     network: NetworkSettings,
     training: TrainingSettings,
     *,
     seeds: int,
     separate: bool,
-) -> list[Pupil]:
-    """Return who is to be trained: one detector for all configurations, or one for each, with every seed."""
+) -> list[ModelConfiguration]:
+    """Return the models to be trained: one detector for all configurations, or one for each, with every seed."""
     groups = (
         {one.name.replace(" × ", "x"): (one,) for one in configurations} if separate else {"": tuple(configurations)}
     )
     return [
-        Pupil(f"detector{name and '-'}{name}-{seed}", group, network, replace(training, seed=seed))
+        ModelConfiguration(f"detector{name and '-'}{name}-{seed}", group, network, replace(training, seed=seed))
         for name, group in groups.items()
         for seed in range(1, seeds + 1)
     ]
 
 
-def padded(some: Sequence[Pupil]) -> list[Pupil]:
+def padded(some: Sequence[ModelConfiguration]) -> list[ModelConfiguration]:
     """Return the same with pillars that are padded with zeros: the ablation of claim 9."""
-    return [replace(pupil, name=f"{pupil.name}-padded", network=replace(pupil.network, padded=True)) for pupil in some]
+    return [replace(model, name=f"{model.name}-padded", network=replace(model.network, padded=True)) for model in some]
 
 
 def place_all(
     site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, *, solver: str, time_limit: float, effort: float
-) -> Generator[Progress, None, tuple[Configuration, ...]]:
+) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
     """Place 1, 2 and 4 sensors of each type where they cover most.
 
     Raises
@@ -240,32 +240,32 @@ def place_all(
         steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit, effort=effort)
         placed.append((yield from within(progress, steps)))
     yield Progress(len(cells), len(cells), "placed")
-    return tuple(Configuration(case) for case in placed)
+    return tuple(SensorConfiguration(case) for case in placed)
 
 
 @dataclass(frozen=True, eq=False)
-class Lessons:
+class TrainingSet:
     """What detectors learn from, and by what is seen when that is enough: recordings by their configuration's name."""
 
     training: dict[str, list[SampledRecording]]
     validation: dict[str, list[SampledRecording]]
 
 
-def simulate_lessons(
-    studio: Studio,
-    configurations: Sequence[Configuration],
+def simulate_training_set(
+    simulator: Simulator,
+    configurations: Sequence[SensorConfiguration],
     traffic: Traffic,
     grid: PillarGrid,
     most_points: int,
-) -> Generator[Progress, None, Lessons]:
+) -> Generator[Progress, None, TrainingSet]:
     """Simulate what the configurations measure, and keep what a detector on a grid learns from it."""
-    lessons = Lessons({}, {})
+    training_set = TrainingSet({}, {})
     total = sum(len(run.times) for run in (*traffic.training, *traffic.validation)) * len(configurations)
     done = 0
     for configuration in configurations:
-        for kept, runs in ((lessons.training, traffic.training), (lessons.validation, traffic.validation)):
+        for kept, runs in ((training_set.training, traffic.training), (training_set.validation, traffic.validation)):
             kept[configuration.name] = [
-                SampledRecording(studio.record(configuration, run), grid, most_points) for run in runs
+                SampledRecording(simulator.record(configuration, run), grid, most_points) for run in runs
             ]
             for sampled in kept[configuration.name]:
                 for number in range(len(sampled)):
@@ -273,27 +273,27 @@ def simulate_lessons(
                     sampled.get(number)
                     done += 1
     yield Progress(total, total, "simulated")
-    return lessons
+    return training_set
 
 
 def training(
-    pupil: Pupil, lessons: Lessons, *, device: str, store: Path | None = None
-) -> Generator[Progress, None, Trained]:
-    """Train a detector on the lessons of its configurations."""
-    names = [configuration.name for configuration in pupil.configurations]
+    model: ModelConfiguration, training_set: TrainingSet, *, device: str, store: Path | None = None
+) -> Generator[Progress, None, TrainedDetector]:
+    """Train a detector on the training set of its configurations."""
+    names = [configuration.name for configuration in model.configurations]
     return train(
-        [recording for name in names for recording in lessons.training[name]],
-        [recording for name in names for recording in lessons.validation[name]],
-        pupil.network,
-        pupil.training,
+        [recording for name in names for recording in training_set.training[name]],
+        [recording for name in names for recording in training_set.validation[name]],
+        model.network,
+        model.training,
         device=device,
         store=store,
     )
 
 
 def train_all(
-    pupils: Sequence[Pupil], lessons: Lessons, folder: Path, *, device: str
-) -> Generator[Progress, None, list[Trained]]:
+    models: Sequence[ModelConfiguration], training_set: TrainingSet, folder: Path, *, device: str
+) -> Generator[Progress, None, list[TrainedDetector]]:
     """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again.
 
     Parameters
@@ -303,72 +303,72 @@ def train_all(
     device : str
         Of torch.
     """
-    trainings = [training(pupil, lessons, device=device, store=folder / f"{pupil.name}.pt") for pupil in pupils]
+    trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
     at_once = SIDE_BY_SIDE if device == "cpu" else 1
-    with deterministic(pupils[0].training.threads):  # all the time, as torch keeps one such setting for all threads
+    with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
         return (yield from side_by_side(trainings, at_once))
 
 
-def judge_all(
-    studio: Studio, pupils: Sequence[Pupil], detectors: Sequence[Detector], traffic: Traffic
-) -> Generator[Progress, None, list[Judgement]]:
+def evaluate_all(
+    simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
+) -> Generator[Progress, None, list[DetectorOutcome]]:
     """Judge every detector with each of its configurations; a frame is simulated once for all of them."""
-    configurations = {one.name: one for pupil in pupils for one in pupil.configurations}.values()
+    configurations = {one.name: one for model in models for one in model.configurations}.values()
     total = len(configurations) * sum(len(run.times) for run in (*traffic.validation, *traffic.test))
     done = 0
     tried: dict[tuple[str, str], list[FrameResult]] = {}
     judged: dict[tuple[str, str], list[FrameResult]] = {}
     for configuration in configurations:
         asked = [
-            (pupil, detector)
-            for pupil, detector in zip(pupils, detectors, strict=True)
-            if configuration in pupil.configurations
+            (model, detector)
+            for model, detector in zip(models, detectors, strict=True)
+            if configuration in model.configurations
         ]
         for results, runs in ((tried, traffic.validation), (judged, traffic.test)):
             for run in runs:
                 for number in range(len(run.times)):
                     yield Progress(done, total, f"detect with {configuration.name}")
                     done += 1
-                    frame = studio.frame(configuration, run, number)
+                    frame = simulator.frame(configuration, run, number)
                     cloud = CloudInPlan(frame.points)
-                    for pupil, detector in asked:
-                        with deterministic(pupil.training.threads):
+                    for model, detector in asked:
+                        with deterministic(model.training.threads):
                             found = detect(detector, frame.points, frame.intensity)
-                        result = _result(studio, configuration, run, frame, cloud, found)
-                        results.setdefault((pupil.name, configuration.name), []).append(result)
+                        result = _result(simulator, configuration, run, frame, cloud, found)
+                        results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "judged")
-    return [judgement for pupil in pupils for judgement in _judgements(pupil, tried, judged)]
+    return [outcome for model in models for outcome in _outcomes(model, tried, judged)]
 
 
-def foreseen(
-    studio: Studio, pupils: Sequence[Pupil], detectors: Sequence[Detector], traffic: Traffic
+def suitability_by_configuration(
+    simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
 ) -> dict[str, tuple[str, ...]]:
     """Return what speaks against trusting the detectors with each configuration, by its name, in sentences."""
     found: dict[str, dict[str, None]] = {}
-    frames = {one.name: studio.frame(one, traffic.test[0], 0) for pupil in pupils for one in pupil.configurations}
-    for pupil, detector in zip(pupils, detectors, strict=True):
-        for one in pupil.configurations:
-            sentences = suitability_warnings(detector, [one.case.sensor], studio.site, frames[one.name].points)
+    frames = {one.name: simulator.frame(one, traffic.test[0], 0) for model in models for one in model.configurations}
+    for model, detector in zip(models, detectors, strict=True):
+        for one in model.configurations:
+            sentences = suitability_warnings(detector, [one.case.sensor], simulator.site, frames[one.name].points)
             found.setdefault(one.name, {}).update(dict.fromkeys(sentences))
     return {name: tuple(sentences) for name, sentences in found.items()}
 
 
-def _judgements(
-    pupil: Pupil,
+def _outcomes(
+    model: ModelConfiguration,
     tried: Mapping[tuple[str, str], list[FrameResult]],
     judged: Mapping[tuple[str, str], list[FrameResult]],
-) -> Iterator[Judgement]:
-    names = [configuration.name for configuration in pupil.configurations]
-    score = balanced_score(evaluate([frame for name in names for frame in tried[pupil.name, name]], MAIN))
-    for configuration in pupil.configurations:
-        frames = tuple(judged[pupil.name, configuration.name])
-        yield Judgement(pupil, configuration, frames, evaluate(frames, MAIN), score)
+) -> Iterator[DetectorOutcome]:
+    names = [configuration.name for configuration in model.configurations]
+    score = balanced_score(evaluate([frame for name in names for frame in tried[model.name, name]], MAIN))
+    for configuration in model.configurations:
+        frames = tuple(judged[model.name, configuration.name])
+        yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN), score)
 
 
 def _result(
-    studio: Studio,
-    configuration: Configuration,
-    run: TrafficRun,
+    simulator: Simulator,
+    configuration: SensorConfiguration,
+    run: SampledRun,
     frame: Frame,
     cloud: CloudInPlan,
     found: Detections,
@@ -378,7 +378,7 @@ def _result(
         cloud,
         found,
         classes=tuple(GROUPS.values()),
-        region=studio.static.region,
+        region=simulator.static.region,
         sensors=configuration.places,
         run=run.name,
     )

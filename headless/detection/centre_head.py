@@ -20,7 +20,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .heads import Candidates, Targets, cell_middles, inner_cells
+from .heads import BoxProposals, TrainingTargets, cell_middles, inner_cells
 from .losses import heat_map_loss, weighted_mean
 from .network import OUTPUT_STRIDE, convolution
 from .pillars import PillarGrid
@@ -70,7 +70,9 @@ class CentreHead(nn.Module):
         """Return the channels of heat, one for each class, and of boxes: (b, classes + 11, rows, columns)."""
         return torch.cat((self.heat(features), self.box(features)), dim=1)
 
-    def loss(self, output: Tensor, targets: list[Targets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+    def loss(
+        self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
+    ) -> dict[str, Tensor]:
         """Return the parts of the loss; see `heads.DetectionHead`."""
         maps = [_target(wanted, grid, output.device) for wanted in targets]
         heat, owner = (torch.stack([pair[part] for pair in maps]) for part in (0, 1))
@@ -86,7 +88,7 @@ class CentreHead(nn.Module):
         middle = cell_bottoms(grid, row, column)
         return {"heat": score, **box_losses(predicted, target, middle, weight)}
 
-    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[Candidates]:
+    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
         """Return a box for each peak of heat; see `heads.DetectionHead`."""
         heat = torch.sigmoid(output[:, : len(CLASSES)])
         heat = heat * (heat == functional.max_pool2d(heat, 3, 1, 1))
@@ -99,7 +101,7 @@ class CentreHead(nn.Module):
             boxes = _boxes(predicted, cell_bottoms(grid, row, column))
             overlap = torch.sigmoid(predicted[:, OVERLAP])
             score = values[category, row, column].pow(1 - OVERLAP_POWER) * overlap.pow(OVERLAP_POWER)
-            found.append(Candidates(boxes, score, category))
+            found.append(BoxProposals(boxes, score, category))
         return found
 
 
@@ -144,7 +146,7 @@ def cell_bottoms(grid: PillarGrid, row: Tensor, column: Tensor) -> Tensor:
     return torch.stack((x[column], y[row], torch.full_like(x[column], grid.bottom)), dim=1)
 
 
-def _target(wanted: Targets, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
+def _target(wanted: TrainingTargets, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
     """Return the heat (classes, rows, columns) of a cloud and whose box each cell learns (rows, columns), or -1."""
     learnt = torch.nonzero(wanted.learnt)[:, 0]
     category = wanted.category[learnt]

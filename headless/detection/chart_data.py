@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from headless.charts.detection import Cell, Curve, Parts
+from headless.charts.detection import BinnedFigure, PrecisionCell, PrecisionRecallLine
 from headless.charts.error_view import ErrorView
 
 import numpy as np
@@ -13,49 +13,49 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
+from seip_addon.core.estimates import mean_interval
 
 from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin
-from .claims import Trial
+from .claims import SeedResult
 from .frame_results import FrameResult
-from .intervals import mean_interval
 from .matching import NOBODY, Rule, match
 
 IN_PLAN = [0, 1, 3, 4, 6]
 
 
-def cells(trials: Sequence[Trial]) -> tuple[Cell, ...]:
+def cells(trials: Sequence[SeedResult]) -> tuple[PrecisionCell, ...]:
     """Return each type and number of sensors with the average precision of all its seeds."""
-    grouped: dict[tuple[str, int], list[Trial]] = {}
+    grouped: dict[tuple[str, int], list[SeedResult]] = {}
     for trial in trials:
         grouped.setdefault((trial.sensor, trial.count), []).append(trial)
     made = []
     for (sensor, count), own in grouped.items():
         values = tuple(trial.average_precision for trial in own)
         interval = mean_interval(values) if len(values) > 1 else None
-        made.append(Cell(sensor, count, own[0].price, own[0].coverage, values, interval))
+        made.append(PrecisionCell(sensor, count, own[0].price, own[0].coverage, values, interval))
     return tuple(made)
 
 
-def curve(sensor: str, count: int, evaluation: Evaluation) -> Curve:
+def curve(sensor: str, count: int, evaluation: Evaluation) -> PrecisionRecallLine:
     """Return precision and recall of one type and number of sensors."""
     found = precision_recall(evaluation)
-    return Curve(sensor, count, found.recall, found.precision, evaluation.average_precision)
+    return PrecisionRecallLine(sensor, count, found.recall, found.precision, evaluation.average_precision)
 
 
-def parts(what: str, figure: str, lines: Mapping[str, Sequence[Bin]]) -> Parts:
+def parts(what: str, figure: str, lines: Mapping[str, Sequence[Bin]]) -> BinnedFigure:
     """Return a figure in parts, one line for each name.
 
     Parameters
     ----------
     what, figure : str
-        As in `Parts`.
+        As in `BinnedFigure`.
     lines : mapping of str to sequence of Bin
         With the same edges; road users are drawn as the first has them.
     """
     first = next(iter(lines.values()), ())
     wanted = tuple(one.wanted for one in first)
-    return Parts(
+    return BinnedFigure(
         what=what,
         figure=figure,
         edges=(*(one.low for one in first), *(one.high for one in first[-1:])),

@@ -1,8 +1,6 @@
-"""Verdicts on the paper's claims about detection, for one site.
+"""Verdicts on the paper's claims about detection, 5 to 9, for one site.
 
-Claims 5 to 9 of Qu, Huang and Suo, "SEIP: Simulation-based Design and
-Evaluation of Infrastructure-based Collective Perception", section V. Gains are
-in points of average precision. All figures are means over the seeds of the
+Gains are in points of average precision. All figures are means over the seeds of the
 training with Student's 95 % interval; seeds are compared pair by pair. A claim
 holds where the interval lies within what is claimed, does not hold where it
 lies outside, and is undecided between the two. Where the study says "about",
@@ -14,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from headless.coverage_study import NUMBERS, Claim
-from headless.coverage_study.claims import UNDECIDED
+from headless.claims import UNDECIDED, Claim, judge_above, judge_all, judge_within
+from headless.coverage_study import NUMBERS
 
 import numpy as np
 
-from .intervals import Interval, judge_above, judge_all, judge_within, mean_interval
+from seip_addon.core.estimates import Interval, mean_interval
 
 ABOUT = 2.0
 """Factor up to which a figure is about another."""
@@ -34,7 +32,7 @@ FEW, SOME, MANY = NUMBERS
 
 
 @dataclass(frozen=True)
-class Trial:
+class SeedResult:
     """One training, judged with one placement.
 
     Parameters
@@ -52,7 +50,7 @@ class Trial:
     coverage : float, 0 to 1
         Share of targets that the placement sees.
     false_positives : float
-        Per frame, at a score that all trials of a training share.
+        Per frame, at a score that all results of a training share.
     sparse : float, 0 to 1
         Share of these where the cloud is sparser than around half of the hits; NaN where there are none.
     padded : bool
@@ -70,18 +68,18 @@ class Trial:
     padded: bool = False
 
 
-def judge(trials: Sequence[Trial]) -> tuple[Claim, ...]:
+def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
     """Hold claims 5 to 9 of the study against what was measured.
 
     Claims for which a type or the ablation is missing are left out.
 
     Parameters
     ----------
-    trials : sequence of Trial
+    results : sequence of SeedResult
         Types in the order from the simplest to the best; several seeds of each.
     """
-    masked = [trial for trial in trials if not trial.padded]
-    sensors = list(dict.fromkeys(trial.sensor for trial in masked))
+    masked = [result for result in results if not result.padded]
+    sensors = list(dict.fromkeys(result.sensor for result in masked))
     claims = [
         _gains(number, masked, sensor, published)
         for number, sensor, published in zip((5, 6), sensors, PUBLISHED_GAINS, strict=False)  # a study may have one
@@ -90,14 +88,14 @@ def judge(trials: Sequence[Trial]) -> tuple[Claim, ...]:
         claims.append(_simple_sensors_gain_more(masked, sensors))
     if sensors:
         claims.append(_false_where_sparse(masked, sensors[0]))
-    if len(masked) < len(trials):
-        claims.append(_padding(trials))
+    if len(masked) < len(results):
+        claims.append(_padding(results))
     return tuple(claims)
 
 
-def _gains(number: int, trials: Sequence[Trial], sensor: str, published: tuple[float, float]) -> Claim:
+def _gains(number: int, results: Sequence[SeedResult], sensor: str, published: tuple[float, float]) -> Claim:
     steps = ((FEW, SOME), (SOME, MANY))
-    gains = [_mean(_gain(trials, sensor, *step)) for step in steps]
+    gains = [_mean(_gain(results, sensor, *step)) for step in steps]
     verdicts = [_about(gain, expected) for gain, expected in zip(gains, published, strict=True)]
     figures = [f"{a} to {b}: {gain.points()}" for (a, b), gain in zip(steps, gains, strict=True)]
     return Claim(
@@ -109,11 +107,11 @@ def _gains(number: int, trials: Sequence[Trial], sensor: str, published: tuple[f
     )
 
 
-def _simple_sensors_gain_more(trials: Sequence[Trial], sensors: Sequence[str]) -> Claim:
+def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[str]) -> Claim:
     simple, *better = sensors
-    gains = {sensor: _gain(trials, sensor, FEW, MANY) for sensor in sensors}
+    gains = {sensor: _gain(results, sensor, FEW, MANY) for sensor in sensors}
     leads = [_mean(_differences(gains[simple], gains[other])) for other in better]
-    rows = [f"{sensor} {_mean(gains[sensor]).points()}{_per_price(trials, sensor)}" for sensor in sensors]
+    rows = [f"{sensor} {_mean(gains[sensor]).points()}{_per_price(results, sensor)}" for sensor in sensors]
     ahead = [f"{lead.points()} more than {other}" for other, lead in zip(better, leads, strict=True)]
     return Claim(
         7,
@@ -123,10 +121,10 @@ def _simple_sensors_gain_more(trials: Sequence[Trial], sensors: Sequence[str]) -
     )
 
 
-def _false_where_sparse(trials: Sequence[Trial], sensor: str) -> Claim:
-    false = {count: _by_seed(trials, sensor, count, lambda trial: trial.false_positives) for count in NUMBERS}
+def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
+    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in NUMBERS}
     more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
-    sparse = [_mean(_by_seed(trials, sensor, count, lambda trial: trial.sparse)) for count in (FEW, SOME)]
+    sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse)) for count in (FEW, SOME)]
     rows = [f"N = {count} {_mean(false[count]).plain()}" for count in NUMBERS]
     shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
     return Claim(
@@ -137,12 +135,12 @@ def _false_where_sparse(trials: Sequence[Trial], sensor: str) -> Claim:
     )
 
 
-def _padding(trials: Sequence[Trial]) -> Claim:
-    cells = dict.fromkeys((trial.sensor, trial.count) for trial in trials if trial.padded)
+def _padding(results: Sequence[SeedResult]) -> Claim:
+    cells = dict.fromkeys((result.sensor, result.count) for result in results if result.padded)
     rows, verdicts = [], []
     for sensor, count in cells:
         padded, masked = (
-            _by_seed([trial for trial in trials if trial.padded == which], sensor, count, _sparse_false_positives)
+            _by_seed([result for result in results if result.padded == which], sensor, count, _sparse_false_positives)
             for which in (True, False)
         )
         more = _mean(_differences(padded, masked))
@@ -191,14 +189,14 @@ def _mean(of: BySeed) -> _Mean:
     return _Mean(float(np.mean(values)), len(values), interval)
 
 
-def _by_seed(trials: Sequence[Trial], sensor: str, count: int, figure: Callable[[Trial], float]) -> BySeed:
+def _by_seed(results: Sequence[SeedResult], sensor: str, count: int, figure: Callable[[SeedResult], float]) -> BySeed:
     """Return a figure of one cell by seed; a seed for which it is not known is left out."""
-    cell = {trial.seed: figure(trial) for trial in trials if (trial.sensor, trial.count) == (sensor, count)}
+    cell = {result.seed: figure(result) for result in results if (result.sensor, result.count) == (sensor, count)}
     return {seed: value for seed, value in cell.items() if not np.isnan(value)}
 
 
-def _gain(trials: Sequence[Trial], sensor: str, few: int, more: int) -> BySeed:
-    before, after = (_by_seed(trials, sensor, n, lambda trial: trial.average_precision) for n in (few, more))
+def _gain(results: Sequence[SeedResult], sensor: str, few: int, more: int) -> BySeed:
+    before, after = (_by_seed(results, sensor, n, lambda result: result.average_precision) for n in (few, more))
     return _differences(after, before)
 
 
@@ -206,17 +204,17 @@ def _differences(more: BySeed, less: BySeed) -> BySeed:
     return {seed: more[seed] - less[seed] for seed in more if seed in less}
 
 
-def _sparse_false_positives(trial: Trial) -> float:
-    return trial.false_positives * trial.sparse if trial.false_positives else 0.0
+def _sparse_false_positives(result: SeedResult) -> float:
+    return result.false_positives * result.sparse if result.false_positives else 0.0
 
 
-def _per_price(trials: Sequence[Trial], sensor: str) -> str:
+def _per_price(results: Sequence[SeedResult], sensor: str) -> str:
     """Return the gain for each thousand dollars that the added sensors cost, in words."""
-    price = {count: _mean(_by_seed(trials, sensor, count, lambda trial: trial.price)).value for count in (FEW, MANY)}
+    price = {count: _mean(_by_seed(results, sensor, count, lambda result: result.price)).value for count in (FEW, MANY)}
     spent = (price[MANY] - price[FEW]) / 1000
     if not spent > 0:
         return ""
-    return f", {100 * _mean(_gain(trials, sensor, FEW, MANY)).value / spent:+.2f} for each $1,000"
+    return f", {100 * _mean(_gain(results, sensor, FEW, MANY)).value / spent:+.2f} for each $1,000"
 
 
 def _seeds(gains: Sequence[_Mean]) -> str:

@@ -10,7 +10,7 @@ import sys
 import threading
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -36,7 +36,7 @@ _SEEDED = threading.Lock()  # torch draws first weights from one source of rando
 
 
 @dataclass(frozen=True)
-class Experience:
+class TrainingRecord:
     """What a detector has learnt from, as far as it is known.
 
     Parameters
@@ -60,15 +60,19 @@ class Detector(nn.Module):
         That of the whole extent.
     seed : int
         Of the weights it begins with.
-    experience : Experience
+    training_record : TrainingRecord
         What it has learnt from, or is to learn from.
     """
 
     def __init__(
-        self, settings: NetworkSettings, grid: PillarGrid, seed: int = 0, experience: Experience = Experience()
+        self,
+        settings: NetworkSettings,
+        grid: PillarGrid,
+        seed: int = 0,
+        training_record: TrainingRecord = TrainingRecord(),
     ) -> None:
         super().__init__()
-        self.settings, self.grid, self.experience = settings, grid, experience
+        self.settings, self.grid, self.training_record = settings, grid, training_record
         with _SEEDED, torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.feature_map = FeatureMap(settings)
@@ -102,7 +106,7 @@ class Detector(nn.Module):
         return {
             "settings": _plain(asdict(self.settings)),
             "grid": asdict(self.grid),
-            "experience": _plain(asdict(self.experience)),
+            "experience": _plain(asdict(self.training_record)),
         }
 
     @classmethod
@@ -119,9 +123,9 @@ class Detector(nn.Module):
             settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
             grid = PillarGrid(**state["grid"])
             _check_grid(grid, settings)
-            experience = _experience(state.get("experience", {}))
+            training_record = _training_record(state.get("experience", {}))
             _check_finite(state["weights"])
-            detector = cls(settings, grid, experience=experience)
+            detector = cls(settings, grid, training_record=training_record)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
 
@@ -148,7 +152,7 @@ def on_grid(detector: Detector, grid: PillarGrid) -> Detector:
 
 
 def _with_the_same_weights(detector: Detector, settings: NetworkSettings, grid: PillarGrid) -> Detector:
-    other = Detector(settings, grid, experience=detector.experience)
+    other = Detector(settings, grid, training_record=detector.training_record)
     other.load_state_dict(detector.state_dict())
     return other.to(detector.device).eval()
 
@@ -171,7 +175,8 @@ def save_state(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
     """Write plain values and tensors, with a digest of them."""
     full = {"schema": SCHEMA, "version": VERSION, **state}
     content = io.BytesIO()  # to no file: its name would go into the bytes, and a full disk leave it unclosed
-    torch.save(_shared_text({**full, "digest": _digest(full)}), content)
+    # Equal texts as one object, which pickle writes once: equal values give equal bytes.
+    torch.save(_replaced({**full, "digest": _digest(full)}, str, sys.intern), content)
     with whole_file(path) as temporary:
         temporary.write_bytes(content.getvalue())
 
@@ -272,48 +277,34 @@ def _check_finite(weights: Mapping[str, Tensor]) -> None:
         raise _ContentError("its weights are not finite")
 
 
-def _experience(known: Mapping[str, Any]) -> Experience:
+def _training_record(known: Mapping[str, Any]) -> TrainingRecord:
     listed = all(isinstance(values, list | tuple) for values in known.values())
     if not listed or not all(isinstance(name, str) for values in known.values() for name in values):
         raise _ContentError("what it has learnt from has no names")
-    return Experience(**{name: tuple(values) for name, values in known.items()})
+    return TrainingRecord(**{name: tuple(values) for name, values in known.items()})
 
 
 def _tensors(value: Any) -> Iterator[Tensor]:  # noqa: ANN401  # plain values of any kind
     if isinstance(value, Tensor):
         yield value
-    elif isinstance(value, Mapping):
-        for part in value.values():
-            yield from _tensors(part)
-    elif isinstance(value, list | tuple):
-        for part in value:
+    elif isinstance(value, Mapping | list | tuple):
+        for part in value.values() if isinstance(value, Mapping) else value:
             yield from _tensors(part)
 
 
 def _digest(state: Mapping[str, Any]) -> str:
     """Return the digest of plain values and tensors, in their order."""
-    return digest(repr(_digested(state)))
+    return digest(repr(_replaced(state, Tensor, lambda tensor: digest(tensor.detach().cpu().numpy()))))
 
 
-def _digested(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
-    """Return a value with digests in place of its tensors."""
-    if isinstance(value, Tensor):
-        return digest(value.detach().cpu().numpy())
+def _replaced(value: Any, kind: type, change: Callable[[Any], Any]) -> Any:  # noqa: ANN401  # plain values of any kind
+    """Return nested values with each part of some kind changed, tuples as lists."""
+    if isinstance(value, kind):
+        return change(value)
     if isinstance(value, Mapping):
-        return {key: _digested(part) for key, part in value.items()}
+        return {_replaced(key, kind, change): _replaced(part, kind, change) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_digested(part) for part in value]
-    return value
-
-
-def _shared_text(value: Any) -> Any:  # noqa: ANN401  # plain values of any kind
-    """Return a value in which equal texts are one object, which pickle writes once: equal values give equal bytes."""
-    if isinstance(value, str):
-        return sys.intern(value)
-    if isinstance(value, dict):
-        return {_shared_text(key): _shared_text(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_shared_text(part) for part in value]
+        return [_replaced(part, kind, change) for part in value]
     return value
 
 

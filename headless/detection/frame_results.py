@@ -20,7 +20,7 @@ NEIGHBOURHOOD = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class GroundTruth:
     """The road users of a frame, all of them; g boxes.
 
     Parameters
@@ -51,13 +51,13 @@ class Truth:
 
 
 @dataclass(frozen=True, eq=False)
-class Detected:
+class EvaluatedBoxes:
     """The detections of a frame; k boxes.
 
     Parameters
     ----------
     boxes : (k, 7) float64
-        As in `Truth`.
+        As in `GroundTruth`.
     score : (k,) float64
     category : (k,) str
         What it was taken for; a class of several categories goes by its first.
@@ -66,7 +66,7 @@ class Detected:
     density : (k,) float64, per square metre
         Returns within `NEIGHBOURHOOD` of its middle in plan.
     inside, distance
-        As in `Truth`.
+        As in `GroundTruth`.
     """
 
     boxes: Float
@@ -96,8 +96,8 @@ class FrameResult:
 
     run: str
     time: float
-    truth: Truth
-    detected: Detected
+    truth: GroundTruth
+    detected: EvaluatedBoxes
 
 
 def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what errors are told apart by
@@ -131,7 +131,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     return FrameResult(
         run=run,
         time=frame.time,
-        truth=Truth(
+        truth=GroundTruth(
             boxes=np.column_stack([labels.centre, labels.size, labels.yaw]),
             category=labels.category,
             points=labels.points.sum(axis=1),
@@ -139,7 +139,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
             inside=labels.inside,
             distance=_nearest(labels.centre, sensors),
         ),
-        detected=Detected(
+        detected=EvaluatedBoxes(
             boxes=boxes,
             score=detections.score,
             category=first[detections.category],

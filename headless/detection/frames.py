@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
@@ -17,7 +17,7 @@ from seip_addon.core.scans.frame import Frame
 from seip_addon.core.scans.run_folder import frame_path, load_manifest
 from seip_addon.core.traffic.run_overlap import VehiclePositions, require_independent
 
-from .detector import Experience
+from .detector import TrainingRecord
 from .pillars import PillarGrid, fill_pillars
 from .settings import CLASS_OF
 
@@ -58,34 +58,40 @@ def recording_of(folder: Path, site: str = "") -> Recording:
     record = load_manifest(folder)
     if not record["complete"]:
         raise SeipError(f"the run in {folder} was stopped half-way: run the same simulation again to finish it")
-    frames = FrameFiles([frame_path(folder, number) for number in range(len(record["frames"]))])
+    frames = LazyFrames(len(record["frames"]), lambda number: Frame.load(frame_path(folder, number)))
     sensors = tuple(str(sensor["sensor"]) for sensor in record["sensors"])
     return Recording(str(folder), str(record["trajectories"]["source"]), frames, sensors, site)
 
 
-class FrameFiles(Sequence[Frame]):
-    """Frames in files, read when they are asked for."""
+class LazyFrames(Sequence[Frame]):
+    """Frames that are read, or simulated, each time that they are asked for.
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self._paths = tuple(paths)
+    Parameters
+    ----------
+    load : callable
+        From a frame's number to the frame.
+    """
+
+    def __init__(self, count: int, load: Callable[[int], Frame]) -> None:
+        self._numbers, self._load = range(count), load
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self._paths)
+        return len(self._numbers)
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
     @overload
-    def __getitem__(self, index: slice) -> FrameFiles: ...
-    def __getitem__(self, index: int | slice) -> Frame | FrameFiles:
-        """Read one frame, or return some that are not read yet."""
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Load one frame or several."""
         if isinstance(index, slice):
-            return FrameFiles(self._paths[index])
-        return Frame.load(self._paths[index])
+            return [self._load(number) for number in self._numbers[index]]
+        return self._load(self._numbers[index])
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class TrainingSample:
     """What a detector learns from a frame.
 
     Parameters
@@ -106,13 +112,13 @@ class Sample:
     returns: Integer
 
 
-def sample_of(frame: Frame, grid: PillarGrid, most_points: int) -> Sample:
+def sample_of(frame: Frame, grid: PillarGrid, most_points: int) -> TrainingSample:
     """Return what a detector on a grid, whose pillars keep ``most_points``, can learn from a frame."""
     labels = frame.labels
     points = np.column_stack((frame.points, frame.intensity))
     kept = np.sort(fill_pillars(points, grid, most_points).chosen)
     inside = grid.holds(labels.centre)
-    return Sample(
+    return TrainingSample(
         points=points[kept],
         boxes=np.column_stack((labels.centre, labels.size, labels.yaw))[inside],
         category=np.array([CLASS_OF[name] for name in labels.category[inside].tolist()], dtype=np.int64),
@@ -131,26 +137,26 @@ class SampledRecording:
 
     def __init__(self, recording: Recording, grid: PillarGrid, most_points: int) -> None:
         self.recording, self.grid, self.most_points = recording, grid, most_points
-        self._made: dict[int, Sample] = {}
+        self._made: dict[int, TrainingSample] = {}
 
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.recording.frames)
 
-    def get(self, frame: int) -> Sample:
+    def get(self, frame: int) -> TrainingSample:
         """Return the sample of a frame."""
         if frame not in self._made:
             self._made[frame] = sample_of(self.recording.frames[frame], self.grid, self.most_points)
         return self._made[frame]
 
 
-def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -> Sample:
+def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -> TrainingSample:
     """Return a random sample: every recording is as likely, however many frames it has."""
     recording = recordings[int(random.integers(len(recordings)))]
     return recording.get(int(random.integers(len(recording))))
 
 
-def spread(recordings: Sequence[SampledRecording], most: int) -> list[Sample]:
+def spread(recordings: Sequence[SampledRecording], most: int) -> list[TrainingSample]:
     """Return so many samples at most, of all recordings in turn and from all over each."""
     each = max(1, most // len(recordings))
     chosen = []
@@ -160,9 +166,9 @@ def spread(recordings: Sequence[SampledRecording], most: int) -> list[Sample]:
     return chosen
 
 
-def experience_of(recordings: Sequence[Recording]) -> Experience:
+def training_record_of(recordings: Sequence[Recording]) -> TrainingRecord:
     """Return of which sensor types and sites recordings are."""
-    return Experience(
+    return TrainingRecord(
         sensors=tuple(sorted({sensor for recording in recordings for sensor in recording.sensors})),
         sites=tuple(sorted({recording.site for recording in recordings} - {""})),
     )
@@ -207,7 +213,7 @@ def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str
 
 
 def _positions(recording: Recording) -> VehiclePositions:
-    frames = [recording.frames[number] for number in range(len(recording.frames))]
+    frames = recording.frames[:]
     return VehiclePositions(
         name=recording.name,
         time=np.array([frame.time for frame in frames]),

@@ -12,7 +12,7 @@ from .pillars import PillarGrid
 
 
 @dataclass(frozen=True, eq=False)
-class Targets:
+class TrainingTargets:
     """The road users in one cloud; k boxes.
 
     Parameters
@@ -30,7 +30,7 @@ class Targets:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class BoxProposals:
     """Boxes of one cloud before those that overlap better ones are removed; k boxes.
 
     Parameters
@@ -48,20 +48,22 @@ class Candidates:
 class DetectionHead(Protocol):
     """What every head can do, beside being a module."""
 
-    def loss(self, output: Tensor, targets: list[Targets], grid: PillarGrid, margin: float) -> dict[str, Tensor]:
+    def loss(
+        self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float
+    ) -> dict[str, Tensor]:
         """Return the parts of the loss, weighted, whose sum is learnt from.
 
         Parameters
         ----------
         output : (b, channels, rows, columns) Tensor
             What the head returns.
-        targets : list of b Targets
+        targets : list of b TrainingTargets
             In the coordinates of the grid.
         margin : float, metres
             A border in which nothing is learnt: it shows parts of what stands beyond.
         """
 
-    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[Candidates]:
+    def candidates(self, output: Tensor, grid: PillarGrid, least_score: float) -> list[BoxProposals]:
         """Return the boxes of each cloud whose score is not below ``least_score``."""
 
 

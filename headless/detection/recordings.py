@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
 
 from headless.coverage_study import Case
 
@@ -25,11 +23,11 @@ from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
 
-from .frames import Recording
+from .frames import LazyFrames, Recording
 
 
 @dataclass(frozen=True, eq=False)
-class TrafficRun:
+class SampledRun:
     """One run of traffic and the instants at which it is looked at.
 
     Parameters
@@ -50,7 +48,7 @@ class TrafficRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Configuration:
+class SensorConfiguration:
     """A number of sensors of one type, placed where they cover most."""
 
     case: Case
@@ -74,7 +72,7 @@ class Configuration:
         return np.array([sensor.xyz for sensor in self.sensors])
 
 
-class Studio:
+class Simulator:
     """A scene in which runs of traffic are recorded.
 
     What stands still is cast against once for a configuration and a run, and
@@ -90,33 +88,16 @@ class Studio:
         self.static, self.settings, self.site = static, settings, site
         self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
 
-    def record(self, configuration: Configuration, run: TrafficRun) -> Recording:
+    def record(self, configuration: SensorConfiguration, run: SampledRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
-        frames = _Frames(self, configuration, run)
+        frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
         return Recording(name, run.key, frames, (configuration.case.sensor,), self.site)
 
-    def frame(self, configuration: Configuration, run: TrafficRun, number: int) -> Frame:
+    def frame(self, configuration: SensorConfiguration, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
-    def _prepared(self, configuration: Configuration, run: TrafficRun) -> Simulation:
+    def _prepared(self, configuration: SensorConfiguration, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))
-
-
-class _Frames(Sequence[Frame]):
-    def __init__(self, studio: Studio, configuration: Configuration, run: TrafficRun) -> None:
-        self._studio, self._configuration, self._run = studio, configuration, run
-
-    def __len__(self) -> int:
-        return len(self._run.times)
-
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Frame]: ...
-    def __getitem__(self, index: int | slice) -> Frame | Sequence[Frame]:
-        if isinstance(index, slice):
-            return [self[number] for number in range(len(self))[index]]
-        return self._studio.frame(self._configuration, self._run, range(len(self))[index])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.settings import setting
 
 Head = Literal["centre", "anchor"]
 
@@ -69,11 +70,11 @@ class NetworkSettings:
         to see what harm that does.
     """
 
-    pillar: float = 0.4
-    most_points: int = 16
-    width: int = 32
-    blocks: tuple[int, int, int] = (2, 3, 3)
-    head: Head = "centre"
+    pillar: float = setting(0.4, "side of a pillar in metres", unit="m", minimum=0.05, maximum=2.0, metavar="M")
+    most_points: int = setting(16, "that a pillar keeps", minimum=1, maximum=32, option="points")
+    width: int = setting(32, "channels of the first block", minimum=8, maximum=256)
+    blocks: tuple[int, int, int] = setting((2, 3, 3), "convolutions in each", minimum=0, maximum=20, metavar="N")
+    head: Head = setting("centre", "centres, or anchors as published")
     padded: bool = False
 
     def __post_init__(self) -> None:
@@ -120,16 +121,16 @@ class TrainingSettings:
         as quick as two on windows of this size, and far quicker where other work wants the second core.
     """
 
-    steps: int = 1800
-    batch: int = 16
+    steps: int = setting(1800, "updates of the weights", minimum=1)
+    batch: int = setting(16, "windows in a step", minimum=1)
     window: float = 25.6
     learning_rate: float = 6e-3
     weight_decay: float = 0.01
     least_points: int = 3
     validate_every: int = 300
     patience: int = 3
-    seed: int = 1
-    threads: int = 1
+    seed: int = setting(1, "of weights and order", minimum=0)
+    threads: int = setting(1, "of torch on the CPU", minimum=1)
 
     def __post_init__(self) -> None:
         checks = {

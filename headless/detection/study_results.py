@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from headless.charts.detection import (
-    Parts,
+    BinnedFigure,
     save_count_chart,
     save_coverage_chart,
     save_parts_chart,
@@ -18,10 +18,11 @@ from headless.charts.detection import (
     save_training_chart,
 )
 from headless.charts.error_view import save_error_view
-from headless.coverage_study import Claim
+from headless.claims import Claim
 
 import numpy as np
 
+from seip_addon.core.estimates import Interval, rank_correlation, rank_correlation_interval
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .breakdown import (
@@ -34,11 +35,10 @@ from .breakdown import (
     false_by,
     recall_by,
 )
-from .case_study import MAIN, Judgement, Pupil, Traffic
+from .case_study import MAIN, DetectorOutcome, ModelConfiguration, Traffic
 from .chart_data import cells, curve, error_view, parts
-from .intervals import Interval, rank_correlation, rank_correlation_interval
-from .recordings import Studio
-from .training import Trained
+from .recordings import Simulator
+from .training import TrainedDetector
 
 SCHEMA = "seip-evaluation/1"
 
@@ -51,40 +51,40 @@ class StudyResults:
     ----------
     name : str
         Of the site.
-    studio : Studio
+    simulator : Simulator
         To draw frames with.
     """
 
     name: str
-    studio: Studio
+    simulator: Simulator
     traffic: Traffic
-    pupils: tuple[Pupil, ...]
-    judgements: tuple[Judgement, ...]
+    models: tuple[ModelConfiguration, ...]
+    outcomes: tuple[DetectorOutcome, ...]
 
     @property
-    def masked(self) -> list[Judgement]:
+    def masked(self) -> list[DetectorOutcome]:
         """Those without the ablation."""
-        return [judgement for judgement in self.judgements if not judgement.pupil.network.padded]
+        return [outcome for outcome in self.outcomes if not outcome.model.network.padded]
 
     @property
-    def first(self) -> list[Judgement]:
+    def first(self) -> list[DetectorOutcome]:
         """Those of one training for each configuration, to be shown where only one can be."""
-        found: dict[str, Judgement] = {}
-        for judgement in self.masked:
-            found.setdefault(judgement.configuration.name, judgement)
+        found: dict[str, DetectorOutcome] = {}
+        for outcome in self.masked:
+            found.setdefault(outcome.configuration.name, outcome)
         return list(found.values())
 
     @property
     def correlation(self) -> tuple[float, Interval | None]:
         """Rank correlation of coverage and average precision over the configurations, with its interval."""
-        points = cells([judgement.trial for judgement in self.masked])
+        points = cells([outcome.seed_result for outcome in self.masked])
         coverage, precision = [cell.coverage for cell in points], [cell.mean for cell in points]
         return rank_correlation(coverage, precision), rank_correlation_interval(coverage, precision, seed=0)
 
 
-def save_charts(folder: Path, results: StudyResults, trained: Sequence[Trained]) -> None:
+def save_charts(folder: Path, results: StudyResults, trained: Sequence[TrainedDetector]) -> None:
     """Draw every chart of the study into a folder."""
-    points = cells([judgement.trial for judgement in results.masked])
+    points = cells([outcome.seed_result for outcome in results.masked])
     save_count_chart(folder / "ap_by_count.png", points, results.name)
     save_price_chart(folder / "ap_by_price.png", points, results.name)
     save_coverage_chart(folder / "ap_by_coverage.png", points, *results.correlation, results.name)
@@ -96,15 +96,15 @@ def save_charts(folder: Path, results: StudyResults, trained: Sequence[Trained])
         own = [one for one in results.first if one.configuration.case.sensor == sensor]
         save_parts_chart(folder / f"where_{sensor}.png", _parts(own), f"{results.name}, {sensor}")
         _save_errors(folder / f"errors_{sensor}.png", results, own)
-    for pupil, one in zip(results.pupils, trained, strict=True):
-        save_training_chart(folder / f"{pupil.name}.png", one.curve.loss, one.curve.validation, pupil.name)
+    for model, one in zip(results.models, trained, strict=True):
+        save_training_chart(folder / f"{model.name}.png", one.curve.loss, one.curve.validation, model.name)
 
 
-def _parts(judgements: Sequence[Judgement]) -> list[Parts]:
+def _parts(outcomes: Sequence[DetectorOutcome]) -> list[BinnedFigure]:
     """Return the panels of where road users are found and where detections are false."""
 
-    def panel(what: str, figure: str, bins: Callable[[Judgement], Sequence[Bin]]) -> Parts:
-        return parts(what, figure, {one.configuration.name: bins(one) for one in judgements})
+    def panel(what: str, figure: str, bins: Callable[[DetectorOutcome], Sequence[Bin]]) -> BinnedFigure:
+        return parts(what, figure, {one.configuration.name: bins(one) for one in outcomes})
 
     return [
         panel(
@@ -130,10 +130,10 @@ def _parts(judgements: Sequence[Judgement]) -> list[Parts]:
     ]
 
 
-def _save_errors(path: Path, results: StudyResults, judgements: Sequence[Judgement]) -> None:
+def _save_errors(path: Path, results: StudyResults, outcomes: Sequence[DetectorOutcome]) -> None:
     """Draw the test frame with the most road users as each of some configurations sees it."""
     run = results.traffic.test[0]
-    inside = [int(frame.truth.inside.sum()) for frame in judgements[0].frames[: len(run.times)]]
+    inside = [int(frame.truth.inside.sum()) for frame in outcomes[0].frames[: len(run.times)]]
     number = int(np.argmax(inside))
     views = [
         error_view(
@@ -141,43 +141,43 @@ def _save_errors(path: Path, results: StudyResults, judgements: Sequence[Judgeme
             one.frames[number],
             MAIN,
             score=one.score,
-            cloud=results.studio.frame(one.configuration, run, number).points,
-            region=results.studio.static.region,
+            cloud=results.simulator.frame(one.configuration, run, number).points,
+            region=results.simulator.static.region,
             sensors=one.configuration.places,
         )
-        for one in judgements
+        for one in outcomes
     ]
     save_error_view(path, views, f"{results.name}, {run.name} at {run.times[number]:.1f} s")
 
 
 def save_table(path: Path, results: StudyResults) -> None:
     """Write one row for each detector and configuration as CSV."""
-    rows = [_row(judgement) for judgement in results.judgements]
+    rows = [_row(outcome) for outcome in results.outcomes]
     with whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
 
 
-def _row(judgement: Judgement) -> dict[str, str]:
-    trial, interval = judgement.trial, judgement.interval
+def _row(outcome: DetectorOutcome) -> dict[str, str]:
+    seed_result, interval = outcome.seed_result, outcome.interval
     low, high = ("", "") if interval is None else (f"{end:.4f}" for end in interval)
     return {
-        "detector": judgement.pupil.name,
-        "sensor": trial.sensor,
-        "count": f"{trial.count}",
-        "seed": f"{trial.seed}",
-        "padded": f"{trial.padded}".lower(),
-        "price_usd": f"{trial.price:.2f}",
-        "coverage": f"{trial.coverage:.4f}",
-        **{f"ap_{name}": f"{value:.4f}" for name, value in judgement.precisions.items()},
+        "detector": outcome.model.name,
+        "sensor": seed_result.sensor,
+        "count": f"{seed_result.count}",
+        "seed": f"{seed_result.seed}",
+        "padded": f"{seed_result.padded}".lower(),
+        "price_usd": f"{seed_result.price:.2f}",
+        "coverage": f"{seed_result.coverage:.4f}",
+        **{f"ap_{name}": f"{value:.4f}" for name, value in outcome.precisions.items()},
         "ap_low": low,
         "ap_high": high,
-        "score": f"{judgement.score:.4f}",
-        "false_positives_per_frame": f"{trial.false_positives:.4f}",
-        "false_positives_in_sparse_places": "" if np.isnan(trial.sparse) else f"{trial.sparse:.4f}",
-        "frames": f"{len(judgement.frames)}",
-        "vehicles": f"{len(judgement.evaluation.wanted)}",
+        "score": f"{outcome.score:.4f}",
+        "false_positives_per_frame": f"{seed_result.false_positives:.4f}",
+        "false_positives_in_sparse_places": "" if np.isnan(seed_result.sparse) else f"{seed_result.sparse:.4f}",
+        "frames": f"{len(outcome.frames)}",
+        "vehicles": f"{len(outcome.evaluation.wanted)}",
     }
 
 
@@ -190,7 +190,7 @@ def save_record(
 ) -> None:
     """Write settings, sensors, figures and claims as JSON."""
     correlation, interval = results.correlation
-    configurations = {one.configuration.name: one.configuration for one in results.judgements}
+    configurations = {one.configuration.name: one.configuration for one in results.outcomes}
     save_json(
         path,
         {
@@ -203,7 +203,7 @@ def save_record(
             },
             "detectors": [
                 {"name": one.name, "network": asdict(one.network), "training": asdict(one.training)}
-                for one in results.pupils
+                for one in results.models
             ],
             "configurations": [
                 {
@@ -219,7 +219,7 @@ def save_record(
                 }
                 for name, one in configurations.items()
             ],
-            "figures": [_row(judgement) for judgement in results.judgements],
+            "figures": [_row(outcome) for outcome in results.outcomes],
             "coverage_and_ap": {
                 "rank_correlation": None if np.isnan(correlation) else correlation,
                 "interval": interval,
@@ -231,7 +231,7 @@ def save_record(
 
 def in_words(results: StudyResults) -> Iterator[str]:
     """Yield a line for each configuration, and one on whether coverage foretells detection."""
-    for cell in cells([judgement.trial for judgement in results.masked]):
+    for cell in cells([outcome.seed_result for outcome in results.masked]):
         between = "" if cell.interval is None else f" ({cell.interval[0]:.1%} to {cell.interval[1]:.1%})"
         yield (
             f"{cell.name}: AP {cell.mean:.1%}{between} of vehicles at an overlap of 0.7 in plan, "

@@ -37,7 +37,7 @@ def suitability_warnings(
 
 
 def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
-    learnt, foreign = detector.experience.sensors, sorted(set(sensors) - set(detector.experience.sensors))
+    learnt, foreign = detector.training_record.sensors, sorted(set(sensors) - set(detector.training_record.sensors))
     if not learnt or not foreign:
         return ""
     return (
@@ -47,7 +47,7 @@ def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
 
 
 def _of_site(detector: Detector, site: str) -> str:
-    sites = detector.experience.sites
+    sites = detector.training_record.sites
     if not sites or not site or site in sites:
         return ""
     return (

@@ -24,9 +24,9 @@ from seip_addon.core.progress import Progress
 
 from .average_precision import evaluate
 from .detector import Detector, fault_of, load_state, save_state
-from .frame_results import Detected, FrameResult, Truth
-from .frames import Sample, SampledRecording, drawn, experience_of, require_separate, spread
-from .heads import Targets
+from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
+from .frames import SampledRecording, TrainingSample, drawn, require_separate, spread, training_record_of
+from .heads import TrainingTargets
 from .inference import detect
 from .matching import Rule
 from .pillars import PillarGrid, Pillars, fill_pillars, stacked
@@ -49,7 +49,7 @@ STEEPEST = 10.0
 
 
 @dataclass(frozen=True)
-class Curve:
+class LearningCurve:
     """How a training went.
 
     Parameters
@@ -70,7 +70,7 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class TrainedDetector:
     """A detector and how it came about.
 
     Parameters
@@ -80,7 +80,7 @@ class Trained:
     """
 
     detector: Detector
-    curve: Curve
+    curve: LearningCurve
 
 
 def train(
@@ -91,7 +91,7 @@ def train(
     *,
     device: str = "cpu",
     store: str | os.PathLike[str] | None = None,
-) -> Generator[Progress, None, Trained]:
+) -> Generator[Progress, None, TrainedDetector]:
     """Train a detector.
 
     Parameters
@@ -110,7 +110,7 @@ def train(
 
     Returns
     -------
-    Trained
+    TrainedDetector
         The same bytes for the same arguments, on one kind of processor.
 
     Raises
@@ -147,9 +147,9 @@ class _Run:
         device: str,
     ) -> None:
         self.settings = settings
-        self.lessons, self.aside = _with_frames(recordings), _with_frames(validation)
-        experience = experience_of([sampled.recording for sampled in self.lessons])
-        self.detector = Detector(network, self.lessons[0].grid, settings.seed, experience).to(device)
+        self.training_set, self.aside = _with_frames(recordings), _with_frames(validation)
+        training_record = training_record_of([sampled.recording for sampled in self.training_set])
+        self.detector = Detector(network, self.training_set[0].grid, settings.seed, training_record).to(device)
         self.optimiser = torch.optim.AdamW(
             self.detector.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
@@ -158,7 +158,7 @@ class _Run:
         )
         self.window = STRIDE * math.ceil(settings.window / (network.pillar * STRIDE) - 1e-9)
         self.step = 0
-        self.curve = Curve()
+        self.curve = LearningCurve()
         self.best = _copied(self.detector.state_dict())
 
     @property
@@ -171,7 +171,7 @@ class _Run:
         """Do one step."""
         self.detector.train()
         random = np.random.default_rng([self.settings.seed, 1, self.step])
-        batch = self._batch([drawn(self.lessons, random) for _ in range(self.settings.batch)], random)
+        batch = self._batch([drawn(self.training_set, random) for _ in range(self.settings.batch)], random)
         loss = self._loss(batch)
         self.optimiser.zero_grad()
         loss.backward()
@@ -198,10 +198,10 @@ class _Run:
             what += f", validation AP {100 * next(reversed(self.curve.validation.values())):.1f} %"
         return Progress(self.step, self.settings.steps, what)
 
-    def result(self) -> Trained:
+    def result(self) -> TrainedDetector:
         """Return the best detector so far."""
         self.detector.load_state_dict(self.best)
-        return Trained(self.detector.eval(), self.curve)
+        return TrainedDetector(self.detector.eval(), self.curve)
 
     def store(self, path: str | os.PathLike[str]) -> None:
         """Write all that is needed to go on, and the best weights so far as those of a detector."""
@@ -239,17 +239,17 @@ class _Run:
             )
         with fault_of(path):
             self.step = int(earlier["step"])
-            self.curve = Curve(**earlier["curve"])
+            self.curve = LearningCurve(**earlier["curve"])
             self.best = state["weights"]
             self.detector.load_state_dict(earlier["weights"])
             self.optimiser.load_state_dict(earlier["optimiser"])
             self.schedule.load_state_dict(earlier["schedule"])
 
     def _sources(self) -> list[list[str | int]]:
-        both = (*self.lessons, *self.aside)
+        both = (*self.training_set, *self.aside)
         return [[sampled.recording.name, sampled.recording.traffic, len(sampled)] for sampled in both]
 
-    def _batch(self, samples: Sequence[Sample], random: np.random.Generator) -> _Batch:
+    def _batch(self, samples: Sequence[TrainingSample], random: np.random.Generator) -> _Batch:
         return _batch(samples, self.detector, self.window, self.settings.least_points, random)
 
     def _loss(self, batch: _Batch) -> Tensor:
@@ -270,12 +270,12 @@ class _Batch:
     """Windows moved onto one grid."""
 
     pillars: Pillars
-    targets: list[Targets]
+    targets: list[TrainingTargets]
     grid: PillarGrid
 
 
 def _batch(
-    samples: Sequence[Sample], detector: Detector, window: int, least_points: int, random: np.random.Generator
+    samples: Sequence[TrainingSample], detector: Detector, window: int, least_points: int, random: np.random.Generator
 ) -> _Batch:
     """Return a window of each sample, turned, mirrored and stretched."""
     clouds, targets = [], []
@@ -287,7 +287,7 @@ def _batch(
     return _Batch(stacked(clouds, grid), targets, grid)
 
 
-def vary(sample: Sample, window: PillarGrid, random: np.random.Generator) -> Sample:
+def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator) -> TrainingSample:
     """Return what a window about a random road user shows, moved to the window and varied.
 
     It is turned by quarters of a circle and a little more, mirrored and
@@ -318,17 +318,17 @@ def vary(sample: Sample, window: PillarGrid, random: np.random.Generator) -> Sam
     boxes[:, 3:6] *= scale
     boxes[:, 6] = angle + (-boxes[:, 6] if mirrored else boxes[:, 6])
     seen = (np.abs(boxes[:, :2] - middle) <= size / 2).all(axis=1)
-    return Sample(points, boxes[seen], sample.category[seen], sample.returns[seen])
+    return TrainingSample(points, boxes[seen], sample.category[seen], sample.returns[seen])
 
 
-def judged(detector: Detector, sample: Sample) -> FrameResult:
+def judged(detector: Detector, sample: TrainingSample) -> FrameResult:
     """Return what a detector finds in a sample, all of which counts, beside what is there."""
     found = detect(detector, sample.points[:, :3], sample.points[:, 3])
     names = np.array([members[0] for members in GROUPS.values()], dtype=np.str_)
     return FrameResult(
         run="",
         time=0.0,
-        truth=Truth(
+        truth=GroundTruth(
             boxes=sample.boxes,
             category=names[sample.category],
             points=sample.returns,
@@ -336,7 +336,7 @@ def judged(detector: Detector, sample: Sample) -> FrameResult:
             inside=np.ones(len(sample.boxes), dtype=np.bool_),
             distance=np.zeros(len(sample.boxes)),
         ),
-        detected=Detected(
+        detected=EvaluatedBoxes(
             boxes=found.boxes,
             score=found.score,
             category=names[found.category],
@@ -348,8 +348,8 @@ def judged(detector: Detector, sample: Sample) -> FrameResult:
     )
 
 
-def _targets(sample: Sample, least_points: int, device: torch.device) -> Targets:
-    return Targets(
+def _targets(sample: TrainingSample, least_points: int, device: torch.device) -> TrainingTargets:
+    return TrainingTargets(
         boxes=torch.from_numpy(sample.boxes.astype(np.float32)).to(device),
         category=torch.from_numpy(sample.category).to(device),
         learnt=torch.from_numpy(sample.returns >= least_points).to(device),

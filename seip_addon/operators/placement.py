@@ -15,8 +15,8 @@ from ..core.errors import SeipError
 from ..core.placement.goal import Goal, check_goal
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
-from ..core.workflows.robust import Precaution, check_precaution, place_robustly
-from ..core.workflows.survey import Circumstances, place, record_of
+from ..core.workflows.robust import RobustnessSettings, check_robust_goal, place_robustly
+from ..core.workflows.survey import Provenance, place, record_of
 from ..scene.write import write_result
 from ..session import SceneSurvey
 from .results import keep_result
@@ -32,16 +32,16 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Read the scene where it has changed, and state the goal."""
         asked = scene.seip.goal
-        precaution = asked.precaution()
-        self._pose_errors = asked.pose_errors and precaution is None
-        return _placed(scene_survey.survey(scene), asked.goal(), precaution, pose_errors=self._pose_errors)
+        robustness = asked.robustness()
+        self._pose_errors = asked.pose_errors and robustness is None
+        return _placed(scene_survey.survey(scene), asked.goal(), robustness, pose_errors=self._pose_errors)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
         if result.plan is None or result.grid is None:
             raise RuntimeError("the work ended without a placement")
         deployment = result.plan.deployment
-        circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        circumstances = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         record = record_of(
             result.layout, result.grid, result.plan, circumstances, render=False, pose_errors=self._pose_errors
         )
@@ -53,20 +53,20 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
 def _placed(
     surveying: Generator[Progress, None, SceneSurvey],
     goal: Goal,
-    precaution: Precaution | None,
+    robustness: RobustnessSettings | None,
     *,
     pose_errors: bool = False,
 ) -> Generator[Progress, None, SceneSurvey]:
-    if precaution is not None:
-        check_precaution(goal)
+    if robustness is not None:
+        check_robust_goal(goal)
     known = yield from surveying
     check_goal(known.layout.site, known.layout.models, goal)
     known, grid = yield from scene_survey.with_visibility(known)
     began = time.perf_counter()
-    if precaution is None:
+    if robustness is None:
         plan = yield from place(known.layout, grid, goal, pose_errors=pose_errors)
     else:
-        plan = (yield from place_robustly(known.layout, grid, goal, precaution)).plan
+        plan = (yield from place_robustly(known.layout, grid, goal, robustness)).plan
     return replace(known, plan=plan, durations=known.timed("placement", began))
 
 

@@ -25,7 +25,7 @@ from ..core.storage.files import check_folder, digest
 from ..core.visibility.grid import VisibilityGrid
 from ..core.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.workflows.by_hand import judge
-from ..core.workflows.survey import Circumstances, record_of, recorded_goal
+from ..core.workflows.survey import Provenance, record_of, recorded_goal
 from ..scene.blend_file import save_blend
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
@@ -300,7 +300,7 @@ class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
         plan, grid = _plan_and_grid(result)
         live_coverage.stop()
         take_over(scene, result.layout.site, plan.deployment, labelled_sensors(scene, hidden=True))
-        circumstances = Circumstances(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        circumstances = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         keep_result(scene, result, record_of(result.layout, grid, plan, circumstances, render=False))
         self.report({"INFO"}, f"coverage {plan.deployment.coverage:.2%} where the sensors hang")
 

@@ -11,7 +11,7 @@ from .. import selection
 from ..core.placement.goal import DEFAULT_COUNT, Goal
 from ..core.robustness.pose_errors import STEEPEST, WIDEST, PoseErrors
 from ..core.robustness.risk import Risk
-from ..core.workflows.robust import Precaution
+from ..core.workflows.robust import RobustnessSettings
 from .conversion import as_typed
 
 TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
@@ -134,7 +134,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
         )
 
-    def precaution(self) -> Precaution | None:
+    def robustness(self) -> RobustnessSettings | None:
         """Return what the placement is to stand, None where it trusts the map.
 
         Raises
@@ -146,7 +146,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             return None
         position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
         risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
-        return Precaution(risk, PoseErrors(position, position, tilt, tilt))
+        return RobustnessSettings(risk, PoseErrors(position, position, tilt, tilt))
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

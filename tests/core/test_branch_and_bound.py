@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from itertools import combinations
 
-from headless.street_visibility import street_problem
+from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest

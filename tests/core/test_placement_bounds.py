@@ -3,7 +3,7 @@
 import math
 from itertools import combinations
 
-from headless.street_visibility import street_problem
+from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest

@@ -14,11 +14,11 @@ from scipy import stats
 from synthetic_junction import junction_site, prism
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views, draws_for
-from seip_addon.core.robustness.estimates import mean_of, quantile_gain, quantile_of
 from seip_addon.core.robustness.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
 from seip_addon.core.robustness.pose_study import StudySettings, pose_study, pose_warnings
 from seip_addon.core.scans.sensor import level_orientation

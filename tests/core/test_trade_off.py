@@ -1,6 +1,6 @@
 """The front of ways to an answer, and how costs grow."""
 
-from headless.lab.benchmark.pareto_front import Way, front, growth_exponent
+from headless.lab.benchmark.pareto_front import Method, front, growth_exponent
 from headless.lab.benchmark.pictures import save_growth_chart, save_trade_off_chart
 
 import numpy as np
@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 WAYS = st.lists(
-    st.tuples(st.integers(1, 9), st.integers(0, 9)).map(lambda at: Way("", "", float(at[0]), float(at[1]))), min_size=1
+    st.tuples(st.integers(1, 9), st.integers(0, 9)).map(lambda at: Method("", "", float(at[0]), float(at[1]))),
+    min_size=1,
 )
 
 
@@ -18,7 +19,7 @@ def dominates(a, b):
 
 
 def test_a_front_by_hand():
-    slow, quick, worse = Way("slow", "", 9.0, 0.0), Way("quick", "", 1.0, 0.2), Way("worse", "", 2.0, 0.3)
+    slow, quick, worse = Method("slow", "", 9.0, 0.0), Method("quick", "", 1.0, 0.2), Method("worse", "", 2.0, 0.3)
     assert front([slow, worse, quick]) == [quick, slow]
 
 
@@ -35,7 +36,11 @@ def test_the_exponent_of_a_power_law_is_found(exponent, factor):
 
 
 def test_charts_are_drawn(tmp_path):
-    ways = [Way("exact", "full", 9.0, 0.0), Way("lazy", "lazy", 1.0, 0.0, default=True), Way("rough", "full", 0.5, 0.1)]
+    ways = [
+        Method("exact", "full", 9.0, 0.0),
+        Method("lazy", "lazy", 1.0, 0.0, default=True),
+        Method("rough", "full", 0.5, 0.1),
+    ]
     save_trade_off_chart(tmp_path / "a.png", {"error": ways}, "title", "subtitle", 1e-3)
     save_growth_chart(tmp_path / "b.png", {"s": [("targets", (1.0, 2.0), (1.0, 4.0))]}, "title")
     for name in ("a.png", "b.png"):

@@ -15,13 +15,13 @@ from synthetic_junction import junction_site
 from traffic_by_hand import make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Estimate, mean_of, mean_over_time
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement import solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.disturbed_views import Surroundings
-from seip_addon.core.robustness.estimates import Estimate, mean_of, mean_over_time
 from seip_addon.core.robustness.robust_placement import at_least
 from seip_addon.core.robustness.traffic_instants import NOBODY, WARM_UP, spread_instants
 from seip_addon.core.robustness.traffic_presence import road_user_seconds

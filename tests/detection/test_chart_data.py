@@ -13,7 +13,7 @@ pytest.importorskip("torch", reason="the detector's torch is optional")
 from headless.detection.average_precision import evaluate
 from headless.detection.breakdown import average_precision_by, false_by
 from headless.detection.chart_data import cells, curve, error_view, parts
-from headless.detection.claims import Trial
+from headless.detection.claims import SeedResult
 from headless.detection.matching import Rule
 
 RULE = Rule()
@@ -24,7 +24,7 @@ TOLD = frame(
 
 
 def test_cells_gather_seeds():
-    one = Trial("type1", 2, 0, 0.6, 12_000, 0.5, 1.0, 0.5)
+    one = SeedResult("type1", 2, 0, 0.6, 12_000, 0.5, 1.0, 0.5)
     trials = [one, replace(one, seed=1, average_precision=0.7), replace(one, sensor="type2", average_precision=0.8)]
     first, second = cells(trials)
     assert (first.name, first.price, first.coverage, first.values) == ("2 × type1", 12_000, 0.5, (0.6, 0.7))

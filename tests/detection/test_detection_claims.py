@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.detection.claims import Trial, judge
+from headless.detection.claims import SeedResult, detection_claims
 
 import pytest
 
@@ -19,7 +19,7 @@ def trials(precision=None, *, false=FALSE, sparse=0.8, spread=SPREAD, padded=Non
         way = 1 if sensor == "type1" else -1  # seeds that suit one type do not suit another
         for count, value, wrong in zip((1, 2, 4), reached, false, strict=True):
             for seed, off in enumerate(spread):
-                one = Trial(
+                one = SeedResult(
                     sensor=sensor,
                     count=count,
                     seed=seed,
@@ -36,11 +36,11 @@ def trials(precision=None, *, false=FALSE, sparse=0.8, spread=SPREAD, padded=Non
 
 
 def verdicts(*told, **more):
-    return {claim.number: claim.verdict for claim in judge(trials(*told, **more))}
+    return {claim.number: claim.verdict for claim in detection_claims(trials(*told, **more))}
 
 
 def evidence(number, *told, **more):
-    return next(claim.evidence for claim in judge(trials(*told, **more)) if claim.number == number)
+    return next(claim.evidence for claim in detection_claims(trials(*told, **more)) if claim.number == number)
 
 
 def test_the_published_figures_hold():
@@ -86,10 +86,10 @@ def test_padding_is_judged_where_it_was_tried():
 
 
 def test_what_is_missing_is_left_out_or_undecided():
-    assert judge([]) == ()
+    assert detection_claims([]) == ()
     assert set(verdicts({"type1": PUBLISHED["type1"]})) == {5, 8}
     without_four = [trial for trial in trials() if trial.count != 4]
-    claims = {claim.number: claim for claim in judge(without_four)}
+    claims = {claim.number: claim for claim in detection_claims(without_four)}
     assert {claims[number].verdict for number in (5, 6, 7, 8)} == {"undecided"}
     assert "2 to 4: not measured" in claims[5].evidence
 

@@ -2,7 +2,7 @@
 
 import math
 
-from headless.detection.detector import Detector, Experience
+from headless.detection.detector import Detector, TrainingRecord
 from headless.detection.pillars import grid_over
 from headless.detection.settings import NetworkSettings
 
@@ -19,7 +19,7 @@ GRID = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), NETWORK.pillar)
 @pytest.fixture
 def stored(tmp_path):
     path = tmp_path / "detector.pt"
-    Detector(NETWORK, GRID, seed=1, experience=Experience(("type1",), ("Junction",))).save(path)
+    Detector(NETWORK, GRID, seed=1, training_record=TrainingRecord(("type1",), ("Junction",))).save(path)
     return path
 
 

@@ -5,7 +5,7 @@ import math
 from headless.detection import anchor_head, centre_head
 from headless.detection.anchor_head import NOTHING, SIZES, UNCLEAR, AnchorHead, anchor_boxes, assignment
 from headless.detection.centre_head import CentreHead
-from headless.detection.heads import Targets
+from headless.detection.heads import TrainingTargets
 from headless.detection.losses import focal_loss, heat_map_loss
 from headless.detection.pillars import PillarGrid
 from headless.detection.rotated_boxes import in_plan, paired_iou
@@ -22,11 +22,11 @@ CAR, TRUCK, CYCLE, PEDESTRIAN = range(4)
 
 
 def targets(*rows, learnt=None):
-    """Targets from rows of class and box."""
+    """TrainingTargets from rows of class and box."""
     boxes = torch.tensor([row[1:] for row in rows], dtype=torch.float32).reshape(-1, 7)
     category = torch.tensor([row[0] for row in rows], dtype=torch.int64)
     kept = torch.ones(len(rows), dtype=torch.bool) if learnt is None else torch.tensor(learnt)
-    return Targets(boxes, category, kept)
+    return TrainingTargets(boxes, category, kept)
 
 
 def random_targets(seed, count=4):
@@ -194,7 +194,7 @@ def test_losses_are_finite_and_lead_downhill(make):
 def test_gradients_of_the_losses_are_their_slopes(make):
     torch.manual_seed(2)
     head = make().double().eval()
-    wanted = Targets(
+    wanted = TrainingTargets(
         *(part.double() if part.is_floating_point() else part for part in vars(random_targets(3)).values())
     )
     output = head(torch.randn(1, 3, 16, 20, dtype=torch.float64)).detach().requires_grad_()

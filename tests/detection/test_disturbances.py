@@ -10,17 +10,17 @@ from headless.lab.detector.disturbances import (
     DIAGONAL,
     DROP_INTENSITY,
     NEAR,
-    Capped,
-    ClockOff,
+    CappedPillars,
+    ClockOffset,
     Disturbance,
     DropOff,
-    Lost,
-    Misplaced,
-    Mistilted,
-    Misturned,
+    PositionError,
     Rain,
     RangeNoise,
+    SensorFailure,
     Thinned,
+    TiltError,
+    YawError,
     range_in,
 )
 
@@ -32,7 +32,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.scans import ScanSettings, prepare
 from seip_addon.core.traffic.bodies import fitted_body
 
-ALL = (RangeNoise, DropOff, Rain, Misplaced, Misturned, Mistilted, ClockOff, Thinned)
+ALL = (RangeNoise, DropOff, Rain, PositionError, YawError, TiltError, ClockOffset, Thinned)
 TIME = 1.0
 
 
@@ -65,7 +65,7 @@ def test_size_0_changes_nothing_bit_for_bit(kind, plain):
 
 def test_no_cap_leaves_the_detector_alone():
     detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4))
-    assert Capped(0.0).looked_at(detector) is detector
+    assert CappedPillars(0.0).looked_at(detector) is detector
 
 
 def test_noise_has_the_spread_that_is_asked_for():
@@ -116,7 +116,7 @@ def test_rain_puts_drops_near_the_sensor_and_takes_more_from_afar(plain):
 
 
 def test_points_of_a_misplaced_sensor_are_moved_and_no_others(plain):
-    moved = frame_under(Misplaced(0.5, sensor=1))
+    moved = frame_under(PositionError(0.5, sensor=1))
     own = plain.sensor == 1
     np.testing.assert_array_equal(moved.points[~own], plain.points[~own])
     by = moved.points[own] - plain.points[own] - np.array([0.5, 0.5, 0.0]) / math.sqrt(2)
@@ -125,7 +125,7 @@ def test_points_of_a_misplaced_sensor_are_moved_and_no_others(plain):
 
 def test_points_of_a_misturned_sensor_are_turned_about_its_own_place(plain):
     place, angle = sensors()[1].xyz, math.radians(2.0)
-    turned, own = frame_under(Misturned(2.0, sensor=1)), plain.sensor == 1
+    turned, own = frame_under(YawError(2.0, sensor=1)), plain.sensor == 1
     way, other = plain.points[own] - place, turned.points[own] - place
     np.testing.assert_allclose(other[:, 2], way[:, 2], atol=1e-5)
     after = (way[:, 0] + 1j * way[:, 1]) * complex(math.cos(angle), math.sin(angle))
@@ -135,7 +135,7 @@ def test_points_of_a_misturned_sensor_are_turned_about_its_own_place(plain):
 
 def test_points_of_a_tilted_sensor_keep_their_distance_and_what_lies_on_the_axis(plain):
     place = sensors()[0].xyz
-    tilted, own = frame_under(Mistilted(1.0, sensor=0)), plain.sensor == 0
+    tilted, own = frame_under(TiltError(1.0, sensor=0)), plain.sensor == 0
     way, other = plain.points[own] - place, tilted.points[own] - place
     np.testing.assert_allclose(np.linalg.norm(other, axis=1), np.linalg.norm(way, axis=1), rtol=1e-5)
     np.testing.assert_allclose(other @ DIAGONAL, way @ DIAGONAL, atol=1e-4)
@@ -145,7 +145,7 @@ def test_points_of_a_tilted_sensor_keep_their_distance_and_what_lies_on_the_axis
 
 
 def test_a_lost_sensor_has_no_points_and_nobody_returns_to_it(plain):
-    left = frame_under(Lost.each(1))
+    left = frame_under(SensorFailure.each(1))
     assert set(left.sensor.tolist()) == {0}
     np.testing.assert_array_equal(left.points, plain.points[plain.sensor == 0])
     assert (left.labels.points[:, 1] == 0).all()
@@ -153,7 +153,7 @@ def test_a_lost_sensor_has_no_points_and_nobody_returns_to_it(plain):
 
 
 def test_a_late_clock_shows_the_street_of_before(plain):
-    late = frame_under(ClockOff(0.4, sensor=0))
+    late = frame_under(ClockOffset(0.4, sensor=0))
     of_other = [frame.points[frame.sensor == 1] for frame in (plain, late)]
     np.testing.assert_array_equal(*of_other)
     before = frame_under(Disturbance(), time=TIME - 0.4)
@@ -182,7 +182,7 @@ def test_thinner_traffic_leaves_whole_road_users_out():
 
 def test_a_capped_detector_has_the_same_weights():
     detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4), seed=5)
-    capped = Capped(2.0).looked_at(detector)
+    capped = CappedPillars(2.0).looked_at(detector)
     assert capped.settings == replace(detector.settings, most_points=2)
     for name, value in keeping_at_most(detector, 2).state_dict().items():
         assert (value == detector.state_dict()[name]).all()

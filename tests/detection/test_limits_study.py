@@ -5,23 +5,30 @@ from types import SimpleNamespace
 
 from headless.detection.detector import Detector
 from headless.detection.pillars import grid_over
-from headless.detection.recordings import Studio, TrafficRun
+from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.lab.detector import study as study_module
 from headless.lab.detector import trials as trials_module
 from headless.lab.detector.charts import save_foreign_chart, save_limits_chart
-from headless.lab.detector.disturbances import Disturbance, DropOff, Lost, Misturned
+from headless.lab.detector.disturbances import Disturbance, DropOff, SensorFailure, YawError
 from headless.lab.detector.rows import limit_rows, points_in_words
-from headless.lab.detector.study import Candidates, Curve, Elsewhere, Point, course, limits_study
-from headless.lab.detector.trials import Entrant, Ground, trials
+from headless.lab.detector.study import (
+    DisturbanceCurve,
+    DisturbanceEffect,
+    EvaluatedDetectors,
+    OtherSite,
+    limits_study,
+    training_plan,
+)
+from headless.lab.detector.trials import EvaluatedDetector, TrialSite, trials
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 from square_by_hand import road, sensors
 
+from seip_addon.core.estimates import Estimate
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.estimates import Estimate
 from seip_addon.core.scans import ScanSettings
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
@@ -38,12 +45,12 @@ class Hung:
 
 def ground(name="home", seed=3):
     static, trajectories = road()
-    run = TrafficRun("run", trajectories, np.array([1.0, 1.5]))
-    return Ground(name, Studio(static, ScanSettings(seed=seed), "Square"), (run,))
+    run = SampledRun("run", trajectories, np.array([1.0, 1.5]))
+    return TrialSite(name, Simulator(static, ScanSettings(seed=seed), "Square"), (run,))
 
 
-def entrant(seed, network=NETWORK):
-    return Entrant(f"detector-{seed}", Detector(network, GRID, seed))
+def one_tested(seed, network=NETWORK):
+    return EvaluatedDetector(f"detector-{seed}", Detector(network, GRID, seed))
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +60,11 @@ def store(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def asked(store):
-    two = (entrant(1), entrant(2))
-    padded = (entrant(3, replace(NETWORK, padded=True)),)
-    candidates = Candidates(two, {"type1": entrant(5), "type2": entrant(6)}, padded, two[:1])
-    away = Elsewhere(ground("away", seed=4), (Hung(),), two, two)
-    denser = Elsewhere(ground("denser", seed=5), (Hung(),), two)
+    two = (one_tested(1), one_tested(2))
+    padded = (one_tested(3, replace(NETWORK, padded=True)),)
+    candidates = EvaluatedDetectors(two, {"type1": one_tested(5), "type2": one_tested(6)}, padded, two[:1])
+    away = OtherSite(ground("away", seed=4), (Hung(),), two, two)
+    denser = OtherSite(ground("denser", seed=5), (Hung(),), two)
     return ground(), [Hung()], candidates, [away, denser], store, 0.1
 
 
@@ -71,7 +78,7 @@ def test_every_disturbance_is_tried_at_every_size(study, store):
     assert [curve.name for curve in study.curves[1:]] == [one[0].name for one in series]
     sizes = [[point.disturbance.size for point in curve.points] for curve in study.curves[1:]]
     assert sizes == [[disturbance.size for disturbance in one] for one in series]
-    assert [point.disturbance for point in study.curves[0].points] == [Lost.each(0), Lost.each(1)]
+    assert [point.disturbance for point in study.curves[0].points] == [SensorFailure.each(0), SensorFailure.each(1)]
     assert all(0 <= point.precision.value <= 1 for curve in study.curves for point in curve.points)
     assert all(-1 <= point.change.value <= 1 for curve in study.curves for point in curve.points)
     trials_at_home = 2 * (1 + 2 + sum(map(len, series))) + 2 + 1  # by two detectors; by type; padded
@@ -101,12 +108,12 @@ def test_a_trial_is_kept_by_all_that_it_follows_from(store, study, monkeypatch):
         raise InterruptedError
 
     monkeypatch.setattr(trials_module, "detect", noted)
-    finish(trials(ground(), Hung(), DropOff(0.25), [entrant(1)], store))
+    finish(trials(ground(), Hung(), DropOff(0.25), [one_tested(1)], store))
     others = [
-        (ground(seed=9), Hung(), DropOff(0.25), [entrant(1)]),
-        (ground(), Hung(), DropOff(0.26), [entrant(1)]),
-        (ground(), Hung(), DropOff(0.25), [entrant(7)]),
-        (ground(), Hung(), Misturned(0.1, 1 - study.worst["2 × type1"]), [entrant(1)]),
+        (ground(seed=9), Hung(), DropOff(0.25), [one_tested(1)]),
+        (ground(), Hung(), DropOff(0.26), [one_tested(1)]),
+        (ground(), Hung(), DropOff(0.25), [one_tested(7)]),
+        (ground(), Hung(), YawError(0.1, 1 - study.worst["2 × type1"]), [one_tested(1)]),
     ]
     for other in others:
         with pytest.raises(InterruptedError):
@@ -115,7 +122,7 @@ def test_a_trial_is_kept_by_all_that_it_follows_from(store, study, monkeypatch):
 
 
 def test_what_is_kept_is_what_was_found(store, tmp_path):
-    kept, made = (finish(trials(ground(), Hung(), Disturbance(), [entrant(1)], at))[0] for at in (store, tmp_path))
+    kept, made = (finish(trials(ground(), Hung(), Disturbance(), [one_tested(1)], at))[0] for at in (store, tmp_path))
     for one, other in ((kept.evaluation, made.evaluation), (kept.from_border, made.from_border)):
         assert one.average_precision == other.average_precision
         np.testing.assert_array_equal(one.wanted.distance, other.wanted.distance)
@@ -150,26 +157,28 @@ def test_a_course_trains_all_that_the_study_tries():
         for sensor in ("type1", "type2", "type3")
         for count in (1, 2)
     ]
-    whole = course(configurations, NETWORK, TrainingSettings(steps=1800), seeds=3, padding=True)
-    names = [pupil.name for pupil in whole.pupils]
+    whole = training_plan(configurations, NETWORK, TrainingSettings(steps=1800), seeds=3, padding=True)
+    names = [model.name for model in whole.models]
     by_type = [f"detector-{sensor}" for sensor in ("type1", "type2", "type3")]
     assert names == [f"detector-{seed}" for seed in (1, 2, 3)] + by_type + [
         f"detector-{seed}-padded" for seed in (1, 2, 3)
     ]
-    assert {pupil.training.steps for pupil in whole.by_type.values()} == {600}
+    assert {model.training.steps for model in whole.by_type.values()} == {600}
     assert [one.name for one in whole.by_type["type2"].configurations] == ["1 × type2", "2 × type2"]
-    candidates = whole.candidates([entrant(1).detector] * len(names))
-    assert [one.name for one in candidates.entrants] == names[:3] == [one.name for one in candidates.unpadded]
+    candidates = whole.candidates([one_tested(1).detector] * len(names))
+    assert [one.name for one in candidates.tested] == names[:3] == [one.name for one in candidates.unpadded]
     assert [one.name for one in candidates.padded] == names[6:]
-    assert not course(configurations, NETWORK, TrainingSettings(), seeds=1, padding=False).padded
+    assert not training_plan(configurations, NETWORK, TrainingSettings(), seeds=1, padding=False).padded
 
 
 def curve(*highs, halves=None):
     points = [
-        Point(DropOff(0.1 * (number + 1)), Estimate(0.8, 0.7, 0.9), Estimate(high - 0.01, high - 0.02, high), half)
+        DisturbanceEffect(
+            DropOff(0.1 * (number + 1)), Estimate(0.8, 0.7, 0.9), Estimate(high - 0.01, high - 0.02, high), half
+        )
         for number, (high, half) in enumerate(zip(highs, halves or [Estimate(h, h, h) for h in highs], strict=True))
     ]
-    return Curve("4 × type2", Estimate(0.9, 0.88, 0.92), tuple(points))
+    return DisturbanceCurve("4 × type2", Estimate(0.9, 0.88, 0.92), tuple(points))
 
 
 def test_it_begins_at_the_first_size_that_chance_does_not_explain():

@@ -3,12 +3,13 @@
 import math
 
 from headless.detection.average_precision import evaluate
-from headless.detection.intervals import percentiles, student_quantile
 from headless.detection.matching import Rule
-from headless.lab.detector.paired_change import DRAWS, Sampled, change, level
+from headless.lab.detector.paired_change import DRAWS, ResampledPrecision, change, level
 
 import pytest
 from told_frames import box, detected, frame, traffic, truth
+
+from seip_addon.core.estimates import percentiles, student_quantile
 
 RULE = Rule()
 CARS = [box(20.0 * number) for number in range(10)]
@@ -21,11 +22,11 @@ def sampled(found, seed=0, blocks=8):
         frame(truth(CARS), detected(CARS[:count], [0.9] * count), time=10.0 * number)
         for number, count in enumerate(counts)
     ]
-    return Sampled(evaluate(frames, RULE), seed)
+    return ResampledPrecision(evaluate(frames, RULE), seed)
 
 
 def test_nothing_changes_from_a_trial_to_itself():
-    one = Sampled(evaluate(traffic(1, frames=80, seconds=1.0), RULE))
+    one = ResampledPrecision(evaluate(traffic(1, frames=80, seconds=1.0), RULE))
     same = change([one], [one])
     assert (same.value, same.low, same.high) == (0.0, 0.0, 0.0)
 

@@ -3,7 +3,7 @@
 import math
 from types import SimpleNamespace
 
-from headless.detection.recordings import Configuration
+from headless.detection.recordings import SensorConfiguration
 
 import numpy as np
 
@@ -14,5 +14,5 @@ from seip_addon.core.lidar import load_catalogue
 def test_a_tilted_sensor_records_tilted():
     turn = orientation(0.3, math.radians(20))
     sensor = SimpleNamespace(label="S1", model=load_catalogue()["type1"], xyz=np.zeros(3), orientation=turn)
-    (mounted,) = Configuration(SimpleNamespace(deployment=SimpleNamespace(sensors=(sensor,)))).sensors
+    (mounted,) = SensorConfiguration(SimpleNamespace(deployment=SimpleNamespace(sensors=(sensor,)))).sensors
     assert (mounted.orientation == turn).all()

@@ -1,7 +1,7 @@
 """A detector says what it has learnt from, and what speaks against using it beyond."""
 
-from headless.detection.detector import Detector, Experience, on_grid
-from headless.detection.frames import Recording, experience_of
+from headless.detection.detector import Detector, TrainingRecord, on_grid
+from headless.detection.frames import Recording, training_record_of
 from headless.detection.pillars import filling, grid_over
 from headless.detection.settings import NetworkSettings
 from headless.detection.suitability import MOST_OVER_FULL, suitability_warnings
@@ -14,12 +14,12 @@ from seip_addon.core.errors import SeipError
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
 GRID = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), NETWORK.pillar)
-KNOWN = Experience(("type1", "type2"), ("Junction",))
+KNOWN = TrainingRecord(("type1", "type2"), ("Junction",))
 NOTHING = np.zeros((0, 4), dtype=np.float32)
 
 
-def detector(experience=KNOWN):
-    return Detector(NETWORK, GRID, seed=1, experience=experience)
+def detector(training_record=KNOWN):
+    return Detector(NETWORK, GRID, seed=1, training_record=training_record)
 
 
 def heaps(*sizes):
@@ -57,14 +57,14 @@ def test_over_full_pillars_are_counted():
 
 
 def test_what_is_not_known_is_not_held_against_it():
-    assert suitability_warnings(detector(Experience()), ["type9"], "Nowhere", NOTHING) == ()
+    assert suitability_warnings(detector(TrainingRecord()), ["type9"], "Nowhere", NOTHING) == ()
     assert suitability_warnings(detector(), ["type1"], "", NOTHING) == ()
 
 
 def test_the_file_keeps_what_was_learnt_from(tmp_path):
     detector().save(tmp_path / "detector.pt")
-    assert Detector.load(tmp_path / "detector.pt").experience == KNOWN
-    assert on_grid(detector(), GRID).experience == KNOWN
+    assert Detector.load(tmp_path / "detector.pt").training_record == KNOWN
+    assert on_grid(detector(), GRID).training_record == KNOWN
 
 
 def test_files_from_before_can_be_read(tmp_path):
@@ -74,7 +74,7 @@ def test_files_from_before_can_be_read(tmp_path):
     del state["experience"], state["digest"]
     state["version"] = 1
     torch.save(state, tmp_path / "old.pt")
-    assert Detector.load(tmp_path / "old.pt").experience == Experience()
+    assert Detector.load(tmp_path / "old.pt").training_record == TrainingRecord()
 
 
 def test_experience_is_that_of_all_recordings():
@@ -83,8 +83,8 @@ def test_experience_is_that_of_all_recordings():
         Recording("b", "run 1", [], ("type2",), "Junction"),
         Recording("c", "run 2", [], (), ""),
     ]
-    assert experience_of(recordings) == KNOWN
-    assert experience_of(recordings[2:]) == Experience()
+    assert training_record_of(recordings) == KNOWN
+    assert training_record_of(recordings[2:]) == TrainingRecord()
 
 
 def test_a_detector_moves_to_another_grid_of_the_same_pillars():

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from headless.detection.average_precision import evaluate
 from headless.detection.detector import Detector
-from headless.detection.frames import FrameFiles, Recording, SampledRecording, require_separate, sample_of, spread
+from headless.detection.frames import LazyFrames, Recording, SampledRecording, require_separate, sample_of, spread
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import fill_pillars, grid_over
@@ -230,7 +230,7 @@ def test_frames_in_files_are_read_when_they_are_asked_for(tmp_path):
     paths = [tmp_path / f"{number}.npz" for number in range(3)]
     for number, path in enumerate(paths):
         street_frame(number, users=2, rays=500, time=float(number)).save(path)
-    files = FrameFiles(paths)
+    files = LazyFrames(3, lambda number: Frame.load(paths[number]))
     paths[0].unlink()
     assert [frame.time for frame in files[1:]] == [1.0, 2.0]
     assert isinstance(files[1], Frame)

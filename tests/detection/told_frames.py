@@ -2,7 +2,7 @@
 
 import math
 
-from headless.detection.frame_results import Detected, FrameResult, Truth
+from headless.detection.frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def box(x, y=0.0, yaw=0.0, *, size=SIZES["car"]):
 
 def truth(boxes, *, category="car", points=100, visibility=1.0, inside=True, distance=10.0):
     count = len(boxes)
-    return Truth(
+    return GroundTruth(
         boxes=np.array(boxes, dtype=float).reshape(-1, 7),
         category=np.broadcast_to(np.array(category, dtype=np.str_), count),
         points=np.broadcast_to(np.array(points, dtype=np.int64), count),
@@ -27,7 +27,7 @@ def truth(boxes, *, category="car", points=100, visibility=1.0, inside=True, dis
 
 def detected(boxes, score, *, category="car", points=100, density=20.0, inside=True, distance=10.0):
     count = len(boxes)
-    return Detected(
+    return EvaluatedBoxes(
         boxes=np.array(boxes, dtype=float).reshape(-1, 7),
         score=np.array(score, dtype=float),
         category=np.broadcast_to(np.array(category, dtype=np.str_), count),

@@ -1,23 +1,28 @@
 """The command that places in traffic, from a scene and its runs to the folder of its result."""
 
 import json
-from pathlib import Path
 
 from headless import in_traffic
 
 import numpy as np
 import pytest
+from small_junction import ORIGIN
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.scene.result_folder import FILES
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 COARSE = ["--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
 
 
-def run(folder, *options):
-    in_traffic.main([str(SCENE), "-o", str(folder), *COARSE, "--instants", "4", "--judged-at", "24", *options])
+@pytest.fixture(scope="module")
+def run(small_scene):
+    def run(folder, *options):
+        in_traffic.main(
+            [str(small_scene), "-o", str(folder), *COARSE, "--instants", "4", "--judged-at", "24", *options]
+        )
+
+    return run
 
 
 def trajectories(path, *, x=0.0, end=30.0):
@@ -27,7 +32,7 @@ def trajectories(path, *, x=0.0, end=30.0):
         origin=np.zeros(3),
         first=np.array([0, 2]),
         time=np.array([0.0, end]),
-        position=np.array([[x, 0.0, 0.0]] * 2),
+        position=np.array([[x, 0.0, 0.0]] * 2) + ORIGIN,
         yaw=np.zeros(2),
         pitch=np.zeros(2),
         speed=np.zeros(2),
@@ -36,7 +41,7 @@ def trajectories(path, *, x=0.0, end=30.0):
 
 
 @pytest.mark.parametrize("options", [[], ["--see", "height", "--weights-from-traffic"]])
-def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, options):
+def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, options, run):
     run(tmp_path, "--count", "2", *options)
     names = {path.name for path in tmp_path.iterdir()}
     assert {*FILES, *in_traffic.CHARTS, "visibility.npz"} - {"view.png"} <= names
@@ -49,7 +54,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     assert "placing on traffic sees" in said
 
 
-def test_traffic_that_is_of_no_use_is_refused(tmp_path):
+def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
     here = trajectories(tmp_path / "here.npz")
     with pytest.raises(SeipError, match="1 runs of traffic are too few"):
         run(tmp_path / "out", "--traffic", here)

@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from headless import place
+from headless import place, session
 
 import bpy
 import pytest
@@ -23,13 +23,17 @@ SCENE = ROOT / "scenes" / "junction.blend"
 QUICK = ["--sensor", "type1", "--heights", "3.5", "--grid", "4", "--spacing", "16", "--no-render"]
 
 
-def run(folder, *options):
-    place.main([str(SCENE), "-o", str(folder), *QUICK, *options])
-    return load_placement_record(folder / "placement.json")
+@pytest.fixture(scope="module")
+def run(small_scene):
+    def run(folder, *options):
+        place.main([str(small_scene), "-o", str(folder), *QUICK, *options])
+        return load_placement_record(folder / "placement.json")
+
+    return run
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory, run):
     folder = tmp_path_factory.mktemp("out") / "made for it"
     run(folder, "--count", "2")
     return folder
@@ -72,14 +76,14 @@ def test_the_saved_scene_holds_the_sensors(folder):
     assert {item["seip_sensor"] for item in empties} == {"type1"}
 
 
-def test_the_same_run_gives_the_same_bytes(folder, tmp_path):
+def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
     again = run(tmp_path / "again", "--count", "2")
     assert comparable(again) == comparable(load_placement_record(folder / "placement.json"))
     for name in ("candidates.csv", "carla_spawn.json", "plan.png"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 
-def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path):
+def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path, run):
     record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
     settings = record["settings"]
     assert "picked for a tolerance of 0.05" in settings["spacings_because"]
@@ -88,7 +92,7 @@ def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path):
     assert "spacings" in record["times"]["durations_s"]
 
 
-def test_another_goal_uses_the_stored_grid(folder, tmp_path):
+def test_another_goal_uses_the_stored_grid(folder, tmp_path, run):
     stored = tmp_path / "visibility.npz"
     stored.write_bytes((folder / "visibility.npz").read_bytes())
     before = stored.stat().st_mtime_ns
@@ -116,7 +120,7 @@ def rays(monkeypatch):
     return counts
 
 
-def test_another_goal_casts_no_ray_again(folder, tmp_path, rays):
+def test_another_goal_casts_no_ray_again(folder, tmp_path, rays, run):
     (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
     run(tmp_path, "--count", "3")
     run(tmp_path, "--budget", "20000")
@@ -127,12 +131,12 @@ def test_another_goal_casts_no_ray_again(folder, tmp_path, rays):
     assert any("in one of twenty cases" in note for note in record["notes"])
 
 
-def test_heights_come_as_a_list_or_a_range(tmp_path):
+def test_heights_come_as_a_list_or_a_range(tmp_path, run):
     record = run(tmp_path, "--count", "1", "--heights", "4:5:0.5", "8")
     assert record["settings"]["candidates"]["heights"] == [4.0, 4.5, 5.0, 8.0]
 
 
-def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(tmp_path):
+def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(tmp_path, run):
     record = run(tmp_path, "--count", "2", "--tilts", "0", "5:15:5")
     assert record["settings"]["candidates"]["tilts_deg"] == [0.0, 5.0, 10.0, 15.0]
     assert {sensor["tilt_deg"] for sensor in record["sensors"]} <= {0.0, 5.0, 10.0, 15.0}
@@ -145,7 +149,7 @@ def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(tmp_path):
     assert pitches == [-sensor["tilt_deg"] + 0.0 for sensor in record["sensors"]]
 
 
-def test_the_reverse_problem_by_command(tmp_path):
+def test_the_reverse_problem_by_command(tmp_path, run):
     record = run(tmp_path, "--coverage", "0.2")
     assert record["coverage"]["whole"] >= 0.2
     assert record["greedy"] is None
@@ -170,7 +174,7 @@ def test_the_reverse_problem_by_command(tmp_path):
         (["--spacing", "-1"], "spacing must be"),
     ],
 )
-def test_each_mistake_has_its_sentence_and_leaves_no_result(options, sentence, tmp_path):
+def test_each_mistake_has_its_sentence_and_leaves_no_result(options, sentence, tmp_path, run):
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path, *options)
     assert not (tmp_path / "placement.json").exists()
@@ -184,7 +188,7 @@ def test_a_missing_scene_is_named(tmp_path):
         place.main(["nowhere.blend", "-o", str(tmp_path)])
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path):
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, run):
     blocked = tmp_path / "file"
     blocked.touch()
     with pytest.raises(SeipError, match="cannot write"):
@@ -204,10 +208,12 @@ def start(*options):
     )
 
 
-def test_a_mistake_ends_the_process_with_one_line_and_status_1(tmp_path):
-    process = start("-o", str(tmp_path), *QUICK, "--count", "0")
-    _, complaint = process.communicate(timeout=120)
-    assert process.returncode == 1
+def test_a_mistake_ends_the_process_with_one_line_and_status_1(small_scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["place.py", str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "0"])
+    with pytest.raises(SystemExit) as end:
+        session.run(place.main)
+    assert end.value.code == 1
+    complaint = capsys.readouterr().err
     assert complaint.strip().splitlines()[-1].startswith("error: asked for 0 sensors")
     assert "Traceback" not in complaint
 
@@ -224,6 +230,7 @@ def test_control_c_leaves_nothing_half_written(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} <= {"visibility.pieces"}  # to go on from
 
 
+@pytest.mark.slow
 def test_a_terminated_run_leaves_nothing_hidden(tmp_path):
     process = start("-o", str(tmp_path), "--sensor", "type3", "--grid", "1")
     while "targets" not in process.stdout.readline():
@@ -235,7 +242,7 @@ def test_a_terminated_run_leaves_nothing_hidden(tmp_path):
     assert [path for path in tmp_path.rglob("*") if path.name.startswith(".")] == []
 
 
-def test_no_file_of_an_earlier_result_stays_beside_a_new_one(folder, tmp_path):
+def test_no_file_of_an_earlier_result_stays_beside_a_new_one(folder, tmp_path, run):
     (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
     (tmp_path / "view.png").touch()
     run(tmp_path, "--count", "1")

@@ -1,7 +1,6 @@
 """The robust command, from a scene to the folder of its result."""
 
 import json
-from pathlib import Path
 
 from headless import robust
 
@@ -10,15 +9,18 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.scene.result_folder import FILES
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--no-render"]
 
 
-def run(folder, *options):
-    robust.main([str(SCENE), "-o", str(folder), *COARSE, "--scenarios", "4", "--draws", "30", *options])
+@pytest.fixture(scope="module")
+def run(small_scene):
+    def run(folder, *options):
+        robust.main([str(small_scene), "-o", str(folder), *COARSE, "--scenarios", "3", "--draws", "20", *options])
+
+    return run
 
 
-def test_it_writes_a_result_and_says_what_it_was_chosen_for(tmp_path, capsys):
+def test_it_writes_a_result_and_says_what_it_was_chosen_for(tmp_path, capsys, run):
     run(tmp_path, "--count", "2", "--objective", "worst")
     names = {path.name for path in tmp_path.iterdir()}
     assert {*FILES, *robust.CHARTS, "visibility.npz"} - {"view.png"} <= names
@@ -27,12 +29,12 @@ def test_it_writes_a_result_and_says_what_it_was_chosen_for(tmp_path, capsys):
     assert "unseen draws" in capsys.readouterr().out
 
 
-def test_errors_that_cannot_be_meant_are_refused(tmp_path):
+def test_errors_that_cannot_be_meant_are_refused(tmp_path, run):
     with pytest.raises(SeipError, match="error of tilt must be 0 to 57°, not 90°"):
         run(tmp_path, "--tilt-error", "90")
 
 
-def test_one_sensor_cannot_be_lost_of_one(tmp_path):
+def test_one_sensor_cannot_be_lost_of_one(tmp_path, run):
     with pytest.raises(SeipError, match="at least 2 sensors"):
         run(tmp_path, "--count", "1", "--failure", "worst")
 
@@ -46,7 +48,7 @@ def test_one_sensor_cannot_be_lost_of_one(tmp_path):
         (("--draws", "0"), "asked for 0 draws"),
     ],
 )
-def test_a_slip_is_named_before_any_work(tmp_path, option, sentence):
+def test_a_slip_is_named_before_any_work(tmp_path, option, sentence, run):
     with pytest.raises(SeipError, match=sentence):
         run(tmp_path / "out", *option)
     assert not (tmp_path / "out").exists()

@@ -1,6 +1,8 @@
+import io
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -70,14 +72,44 @@ def test_control_c_ends_with_130_and_one_line() -> None:
     assert complaint == "stopped, no result written\n"
 
 
-def test_progress_reaches_the_total_and_restarts(capsys) -> None:
-    def work():
-        for total in (3, 5):
-            for done in range(total + 1):
-                yield Progress(done, total, f"part of {total}")
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
+
+def two_works():
+    for total in (3, 5):
+        for done in range(total + 1):
+            yield Progress(done, total, f"part of {total}")
+            time.sleep(0.05)
+
+
+def test_a_terminal_sees_one_bar_on_one_line(monkeypatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
     with session.progress_bar() as report:
-        finish(work(), report)
-    shown = capsys.readouterr().err
-    assert "part of 3: 100%" in shown
-    assert "part of 5: 100%" in shown
+        finish(two_works(), report)
+    shown = terminal.getvalue()
+    assert "part of 3:" in shown
+    assert "part of 5:" in shown
+    assert "\n" not in shown
+
+
+def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> None:
+    clock = iter(range(0, 100, 4))
+    monkeypatch.setattr(session.time, "monotonic", lambda: next(clock))
+    with session.progress_bar() as report:
+        for done in range(8):
+            report(Progress(done, 8, "cast"))
+        for _ in range(3):
+            report(Progress(0, 0, "search"))
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition(":")[0] for line in lines[:2]] == ["cast", "cast"]
+    assert "2/8" in lines[0]
+    assert lines[2:] == ["search [00:36]"]
+
+
+def test_what_is_logged_goes_to_the_output_and_warnings_say_so(capsys) -> None:
+    session.LOG.info("read")
+    session.warn(["the road is bare"])
+    assert capsys.readouterr().out == "read\nwarning: the road is bare\n"

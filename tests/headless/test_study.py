@@ -1,7 +1,6 @@
 """The study command, from a scene to its charts, tables and plans."""
 
 import csv
-from pathlib import Path
 
 from headless import study
 from headless.coverage_study import NUMBERS, WEIGHTS
@@ -11,17 +10,20 @@ from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 TYPES, HEIGHTS = ("type1", "type2"), (3.5, 8.0)
-COARSE = ["--sensor", *TYPES, "--heights", *map(str, HEIGHTS), "--grid", "8", "--spacing", "25"]
-
-
-def run(folder, *options):
-    study.main([str(SCENE), "-o", str(folder), *COARSE, *options])
+COARSE = ["--sensor", *TYPES, "--heights", *map(str, HEIGHTS), "--grid", "5", "--spacing", "20"]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def run(small_scene):
+    def run(folder, *options):
+        study.main([str(small_scene), "-o", str(folder), *COARSE, *options])
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, run):
     folder = tmp_path_factory.mktemp("study")
     run(folder)
     return folder
@@ -51,14 +53,15 @@ def test_the_verdicts_stand_in_the_claims(folder):
     assert all(line.count("**") == 2 for line in lines[4:])
 
 
-def test_the_same_study_gives_the_same_bytes(folder, tmp_path):
+@pytest.mark.slow
+def test_the_same_study_gives_the_same_bytes(folder, tmp_path, run):
     (tmp_path / "visibility.npz").write_bytes((folder / "visibility.npz").read_bytes())
     run(tmp_path)
     for path in folder.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
 
-def test_a_mistake_has_its_sentence(tmp_path):
+def test_a_mistake_has_its_sentence(tmp_path, run):
     with pytest.raises(SeipError, match="type1"):
         run(tmp_path, "--sensor", "typ1")
     assert list(tmp_path.iterdir()) == []

@@ -38,17 +38,13 @@ def routes(folder):
     return path
 
 
-@pytest.mark.parametrize("form", [["-m", "headless.traffic"], ["headless/traffic.py"]])
-def test_the_command_runs_as_a_module_and_as_a_file(tmp_path, form):
+def test_floating_car_data_is_put_on_the_road(tmp_path, capsys):
     output = tmp_path / "traffic.npz"
-    done = subprocess.run(  # noqa: S603  # our own interpreter and command
-        [sys.executable, *form, str(JUNCTION), "--fcd", str(fcd(tmp_path)), "--routes", str(routes(tmp_path)),
-         "-o", str(output)],
-        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "1 road users (1 car) from 0 to 5.8 s, 30 samples" in done.stdout
-    assert "warning" not in done.stdout
+    sources = ["--fcd", str(fcd(tmp_path)), "--routes", str(routes(tmp_path))]
+    traffic.main([str(JUNCTION), *sources, "-o", str(output)])
+    said = capsys.readouterr().out
+    assert "1 road users (1 car) from 0 to 5.8 s, 30 samples" in said
+    assert "warning" not in said
     got = Trajectories.load(output)
     np.testing.assert_allclose(got.position[0, :2], [-102.0, -5.25])
     assert got.position[0, 2] == pytest.approx(0.015 * (102.0 - 35.0), abs=0.01)  # West Street climbs by 1.5 %
@@ -72,13 +68,9 @@ def test_another_map_leaves_no_file(tmp_path):
     assert not output.exists()
 
 
-def test_a_mistake_ends_with_one_line(tmp_path):
-    done = subprocess.run(  # noqa: S603  # our own interpreter and command
-        [sys.executable, "-m", "headless.traffic", str(JUNCTION), "--fcd", "none.xml", "-o", str(tmp_path / "t.npz")],
-        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-    assert done.returncode == 1
-    assert done.stderr.strip().splitlines()[-1] == "error: no such file: none.xml; check its path"
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SeipError, match=r"no such file: none\.xml; check its path"):
+        traffic.main([str(JUNCTION), "--fcd", "none.xml", "-o", str(tmp_path / "t.npz")])
 
 
 @pytest.mark.parametrize(("option", "value"), [("--duration", "0"), ("--warm-up", "-1"), ("--duration", "nan")])
@@ -100,6 +92,7 @@ def test_simulated_twice_it_is_the_same_file(tmp_path, capsys):
     assert "FCD" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @needs_sumo
 @pytest.mark.skipif(not (TOWN.is_file() and PAPERS.is_dir()), reason="Town05 or its traffic is not there")
 def test_the_paper_s_traffic_runs_on_the_road_of_town05(tmp_path, capsys):

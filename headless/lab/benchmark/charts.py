@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from headless.lab.benchmark.pareto_front import Way
+from headless.lab.benchmark.pareto_front import Method
 from headless.lab.benchmark.pictures import save_growth_chart, save_trade_off_chart
-from headless.lab.benchmark.placement import Run
+from headless.lab.benchmark.placement import SolverRun
 from headless.lab.benchmark.report import Findings
-from headless.lab.benchmark.visibility import ENGINES, Cost, Harm
+from headless.lab.benchmark.visibility import ENGINES, Cost, Degradation
 
 DEFAULT_WAY = "lazy embree"
 ENGINE_NAMES = {"bvh": "BVHTree", "embree": "Embree"}
@@ -55,26 +55,26 @@ def save_charts(pictures: Path, findings: Findings) -> None:
     )
 
 
-def _way(name: str, cost: Cost, error: float) -> Way:
+def _way(name: str, cost: Cost, error: float) -> Method:
     scan, _, what = name.partition(" ")
     family = f"{'exact' if what in ENGINES else 'simplified, Embree'}, {scan}"
-    return Way(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_WAY)
+    return Method(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_WAY)
 
 
-def _harm(harm: Mapping[str, Harm], way: str) -> Harm:
+def _harm(harm: Mapping[str, Degradation], way: str) -> Degradation:
     what = way.partition(" ")[2]
     return harm["exact"] if what in ENGINES else harm[what]
 
 
-def _proof(run: Run) -> str:
+def _proof(run: SolverRun) -> str:
     if run.proven:
         return "proves by itself that nothing is better"
     return "has a bound of its own" if math.isfinite(run.bound) else "has no bound of its own"
 
 
-def _ways_to_place(runs: Sequence[Run], instance: str) -> list[Way]:
+def _ways_to_place(runs: Sequence[SolverRun], instance: str) -> list[Method]:
     return [
-        Way(run.way, _proof(run), run.expense.cpu, run.gap, default=run.way == "ours")
+        Method(run.way, _proof(run), run.expense.cpu, run.gap, default=run.way == "ours")
         for run in runs
         if run.instance == instance and run.objective > 0
     ]

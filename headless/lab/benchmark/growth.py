@@ -11,7 +11,7 @@ from headless.lab.benchmark.alone import alone
 from headless.lab.benchmark.expense import Expense, peak_memory
 from headless.lab.benchmark.pareto_front import growth_exponent
 from headless.lab.benchmark.rivals import ours
-from headless.street_visibility import street_problem
+from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
 

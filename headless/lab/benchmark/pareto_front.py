@@ -9,7 +9,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Way:
+class Method:
     """One way to an answer.
 
     Parameters
@@ -31,9 +31,9 @@ class Way:
     default: bool = False
 
 
-def front(ways: Sequence[Way]) -> list[Way]:
+def front(ways: Sequence[Method]) -> list[Method]:
     """Return the ways than which none is both as quick and as exact (Pareto front), the quickest first."""
-    best: list[Way] = []
+    best: list[Method] = []
     for way in sorted(ways, key=lambda w: (w.seconds, w.error)):
         if not best or way.error < best[-1].error:
             best.append(way)

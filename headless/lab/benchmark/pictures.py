@@ -7,6 +7,8 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from headless.charts.style import DASHED, new_figure, save_chart, set_title, style_axes
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,10 +16,10 @@ from matplotlib.ticker import FuncFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.pictures.callouts import place_callouts
+from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
-from seip_addon.core.storage.files import whole_file
 
-from .pareto_front import Way, front, growth_exponent
+from .pareto_front import Method, front, growth_exponent
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
 """Told apart by colour-blind people (Okabe and Ito 2008), and by their marks on grey paper."""
@@ -27,13 +29,13 @@ MARKS = ("D", "o", "s", "^", "v", "P", "*", "X")
 
 
 def save_trade_off_chart(
-    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Way]], title: str, subtitle: str, nought: float
+    path: str | os.PathLike[str], panels: Mapping[str, Sequence[Method]], title: str, subtitle: str, nought: float
 ) -> None:
     """Draw processor time against error, with the front and the default, as PNG.
 
     Parameters
     ----------
-    panels : mapping of str to sequence of Way
+    panels : mapping of str to sequence of Method
         What the error is, over each panel; the same families in all.
     nought : float
         Errors up to this are drawn apart from those above, on a linear piece of the axis.
@@ -53,17 +55,15 @@ def save_trade_off_chart(
         panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
         panel.set_xlim(-0.35 * nought, 2.5 * max(nought, *(way.error for way in ways)))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
-        panel.set_xlabel(what, color=INK)
-        _dress(panel)
-        panel.set_ylabel("processor time (s)", color=INK)
+        style_axes(panel, what, "processor time (s)")
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=6)
-    figure.suptitle(f"{title}\n{subtitle}", color=INK, fontsize=11)
+    set_title(figure, f"{title}\n{subtitle}")
     figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
     figure.set_layout_engine("none")
     for panel, ways in zip(axes, panels.values(), strict=True):
         _name(panel, ways)
-    _save(figure, path)
+    save_png(path, figure)
 
 
 def save_growth_chart(
@@ -78,8 +78,8 @@ def save_growth_chart(
     panels : mapping of str to sequence of (name, sizes, costs)
         By what is measured. Sizes are drawn as multiples of the smallest.
     """
-    figure = Figure((12.5, 6.4), dpi=150, facecolor=PAPER, layout="constrained")
-    for panel, (what, lines) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+    figure, axes = new_figure(12.5, 6.4, len(panels), dpi=150)
+    for panel, (what, lines) in zip(axes, panels.items(), strict=True):
         for row, (name, size, cost) in enumerate(lines):
             label = f"{name}: exponent {growth_exponent(size, cost):.2f}"
             times = [value / size[0] for value in size]
@@ -87,15 +87,12 @@ def save_growth_chart(
         panel.set_xscale("log", base=2)
         panel.set_yscale("log")
         panel.xaxis.set_major_formatter(FuncFormatter(lambda times, _: f"× {times:g}"))
-        panel.set_xlabel("size, in multiples of the smallest", color=INK)
-        panel.set_ylabel(what, color=INK)
         panel.legend(frameon=False, fontsize=8.5, loc="upper center", bbox_to_anchor=(0.5, -0.12))
-        _dress(panel)
-    figure.suptitle(title, color=INK, fontsize=11)
-    _save(figure, path)
+        style_axes(panel, "size, in multiples of the smallest", what)
+    save_chart(path, figure, title)
 
 
-def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
+def _draw_front(panel: Axes, ways: Sequence[Method]) -> None:
     best = front(ways)
     panel.step(
         [way.error for way in best],
@@ -103,12 +100,12 @@ def _draw_front(panel: Axes, ways: Sequence[Way]) -> None:
         where="pre",  # what costs no more and errs no more is at hand everywhere above the front
         color=SOFT_INK,
         linewidth=1.2,
-        linestyle=(0, (4, 2)),
+        linestyle=DASHED,
         label="front: nothing is both quicker and nearer",
     )
 
 
-def _along_front(panel: Axes, ways: Sequence[Way]) -> Float:
+def _along_front(panel: Axes, ways: Sequence[Method]) -> Float:
     """Return points along the drawn front in pixels, (n, 2) float64."""
     corners = panel.transData.transform([(way.error, way.seconds) for way in front(ways)])
     bends = np.column_stack([corners[:-1, 0], corners[1:, 1]])
@@ -117,7 +114,7 @@ def _along_front(panel: Axes, ways: Sequence[Way]) -> Float:
     return along
 
 
-def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
+def _mark_default(panel: Axes, ways: Sequence[Method]) -> None:
     own = [way for way in ways if way.default]
     panel.plot(
         [way.error for way in own],
@@ -132,7 +129,7 @@ def _mark_default(panel: Axes, ways: Sequence[Way]) -> None:
     )
 
 
-def _name(panel: Axes, ways: Sequence[Way]) -> None:
+def _name(panel: Axes, ways: Sequence[Method]) -> None:
     """Write each way's name beside it, no name on another or on a mark, and off the front where there is room."""
     style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
     box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
@@ -146,16 +143,3 @@ def _name(panel: Axes, ways: Sequence[Way]) -> None:
     for text, point, centre in zip(texts, points, panel.transData.inverted().transform(centres), strict=True):
         text.set_position(centre)
         panel.plot(*zip(point, centre, strict=True), color="#c3c9ce", linewidth=0.7, zorder=1)
-
-
-def _dress(panel: Axes) -> None:
-    panel.grid(color="#e3e6e8", linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.tick_params(which="both", colors=SOFT_INK)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
-
-
-def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})

@@ -14,7 +14,7 @@ from seip_addon.core.placement import PlacementProblem
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class SolverRun:
     """What one way did with one instance.
 
     Parameters
@@ -53,7 +53,7 @@ class Run:
         return self.own_gap < 1e-6
 
 
-def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float) -> list[Run]:
+def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float) -> list[SolverRun]:
     """Solve an instance in several ways in turn, each with the same time limit.
 
     Parameters
@@ -65,7 +65,7 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
 
     Returns
     -------
-    list of Run
+    list of SolverRun
     """
     rows = []
     for way in ways:
@@ -77,6 +77,6 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
     least = min((found.bound for *_, found in rows), default=math.inf)
     best = least if math.isfinite(least) else float(problem.weights.sum())
     return [
-        Run(name, way, expense, memory, objective, found.bound, best, found.note)
+        SolverRun(name, way, expense, memory, objective, found.bound, best, found.note)
         for way, expense, memory, objective, found in rows
     ]

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import importlib.metadata
+import logging
 import os
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from headless import session
 from headless.lab.benchmark.alone import alone
 from headless.lab.benchmark.approximations import approximations
 from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
-from headless.lab.benchmark.placement import Run, compare
+from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.rivals import RIVALS, can_run
 from headless.lab.benchmark.scans import scan_costs
+from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
-from headless.street_visibility import street_problem
 
 import numpy as np
 
@@ -31,9 +31,11 @@ from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.settings import VisibilitySettings
 
+LOG = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
-class Scope:
+class BenchmarkScope:
     """What is measured: how the scene is laid out, how large synthetic instances and the steps of growth are.
 
     Parameters
@@ -71,24 +73,24 @@ class Scope:
 
 
 def measure(
-    geometry: SceneGeometry, samples: int, time_limit: float, scope: Scope
+    geometry: SceneGeometry, samples: int, time_limit: float, scope: BenchmarkScope
 ) -> tuple[Findings, tuple[str, str, str]]:
     """Measure everything; return the findings and the names of the synthetic instances."""
     layout, settings = scope.layout, VisibilitySettings()
     site = make_site(geometry, layout)
     models = find_models(load_catalogue(), layout.sensors)
     simpler = approximations(geometry, site, models, layout)
-    session.say(f"{site.name}: full scans and lazy ones from {samples} places")
+    LOG.info(f"{site.name}: full scans and lazy ones from {samples} places")
     costs = visibility_costs(site, models, settings, samples, simpler)
     for way, cost in costs.items():
-        session.say(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
-    session.say("whole grids, exact and simplified, and a placement by each")
+        LOG.info(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
+    LOG.info("whole grids, exact and simplified, and a placement by each")
     harm = harms(site, models, settings, simpler, time_limit)
     rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
     runs, names = placements(site, models, settings, time_limit, scope)
     growths = growth(geometry, settings, time_limit, scope)
-    session.say("scans of traffic")
+    LOG.info("scans of traffic")
     scans = scan_costs(site, static_scene(geometry), load_catalogue()[scope.scanned_by], scope.frames)
     setting = {
         "scene": site.name,
@@ -107,8 +109,8 @@ def measure(
 
 
 def placements(
-    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, time_limit: float, scope: Scope
-) -> tuple[list[Run], tuple[str, str, str]]:
+    site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
+) -> tuple[list[SolverRun], tuple[str, str, str]]:
     """Compare ways to place sensors at the scene's site and in synthetic streets."""
     own = site.candidates.sensor == site.candidates.sensor[0]
     visible = finish(compute_visibility(site, models, settings)).visible
@@ -126,7 +128,7 @@ def placements(
     )
     ways = [way for way in RIVALS if can_run(way)]
     for way in set(RIVALS).difference(ways):
-        session.say(f"{way} is left out: the group 'benchmark' of pyproject.toml is not installed")
+        LOG.info(f"{way} is left out: the group 'benchmark' of pyproject.toml is not installed")
     runs = _told(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {COUNT}", problem, ways, time_limit))
     names = []
     for count in scope.counts:
@@ -143,9 +145,11 @@ def placements(
     return runs, (names[0], names[1], names[2])
 
 
-def growth(geometry: SceneGeometry, settings: VisibilitySettings, time_limit: float, scope: Scope) -> list[Growth]:
+def growth(
+    geometry: SceneGeometry, settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
+) -> list[Growth]:
     """Let one thing grow at a time, then all together: the scene set side by side to a corridor."""
-    session.say("growth, each size in a process of its own")
+    LOG.info("growth, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout)
     rows = {copies: repeated(site, copies) for copies in scope.copies}
@@ -184,13 +188,13 @@ def growth(geometry: SceneGeometry, settings: VisibilitySettings, time_limit: fl
         placement_growth("targets", points, [(positions, n, blocks) for n in points], time_limit),
     ]
     for one in found:
-        session.say(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")
+        LOG.info(f"{one.what} against {one.size_of}: exponent {one.time_exponent:.2f}")
     return found
 
 
-def _told(runs: list[Run]) -> list[Run]:
+def _told(runs: list[SolverRun]) -> list[SolverRun]:
     for run in runs:
-        session.say(
+        LOG.info(
             f"{run.instance}: {run.way:<13}{run.objective:>10.0f} ≤ {run.bound:<10.1f}{run.expense.cpu:>8.2f} s of CPU"
             f"  {run.note}"
         )

@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from headless.lab.benchmark.growth import Growth
-from headless.lab.benchmark.placement import Run
+from headless.lab.benchmark.placement import SolverRun
 from headless.lab.benchmark.scans import ROAD_USERS, SENSORS, ScanCost
-from headless.lab.benchmark.visibility import ENGINES, Cost, Harm
+from headless.lab.benchmark.visibility import ENGINES, Cost, Degradation
 
 from seip_addon.core.storage.files import whole_file
 
@@ -41,15 +41,15 @@ class Findings:
 
     setting: dict[str, Any]
     costs: Mapping[str, Cost]
-    harms: Mapping[str, Harm]
+    harms: Mapping[str, Degradation]
     limits: Mapping[str, float]
-    runs: Sequence[Run]
+    runs: Sequence[SolverRun]
     growths: Sequence[Growth]
     scans: Mapping[str, ScanCost]
 
 
 def bars(
-    costs: Mapping[str, Cost], runs: Sequence[Run], names: Sequence[str], scans: Mapping[str, ScanCost]
+    costs: Mapping[str, Cost], runs: Sequence[SolverRun], names: Sequence[str], scans: Mapping[str, ScanCost]
 ) -> list[Bar]:
     """Hold the measurements against what was asked for.
 
@@ -198,7 +198,7 @@ def _ratio(what: str, ratio: float, asked: float, *, holds: bool = True, note: s
     return Bar(what, f"{asked:g}×", measured, holds and ratio >= asked)
 
 
-def _small_gap(run: Run, gap: float, seconds: float, memory: float | None) -> Bar:
+def _small_gap(run: SolverRun, gap: float, seconds: float, memory: float | None) -> Bar:
     asked = f"proven, or a gap under {gap:.1%} in {seconds:g} s" + (f" and {memory / 1024:g} GB" if memory else "")
     wall = run.expense.wall
     measured = f"{'proven' if run.proven else f'gap {run.own_gap:.2%}'} in {wall:.0f} s"
@@ -220,7 +220,7 @@ def _cost_row(way: str, cost: Cost, plain: Cost) -> tuple[str, ...]:
     )
 
 
-def _harm_row(name: str, harm: Harm, exact: Harm) -> tuple[str, ...]:
+def _harm_row(name: str, harm: Degradation, exact: Degradation) -> tuple[str, ...]:
     return (
         name,
         f"{harm.wrong:.2%}",
@@ -232,7 +232,7 @@ def _harm_row(name: str, harm: Harm, exact: Harm) -> tuple[str, ...]:
     )
 
 
-def _run_rows(runs: Sequence[Run]) -> list[tuple[str, ...]]:
+def _run_rows(runs: Sequence[SolverRun]) -> list[tuple[str, ...]]:
     us = {run.instance: run.expense.cpu for run in runs if run.way == "ours"}
     return [
         (

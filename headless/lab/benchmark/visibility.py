@@ -55,7 +55,7 @@ class Cost:
 
 
 @dataclass(frozen=True, eq=False)
-class Harm:
+class Degradation:
     """What a simplification does to the answer.
 
     Parameters
@@ -158,24 +158,24 @@ def harms(
     settings: VisibilitySettings,
     simpler: Sequence[Approximation],
     time_limit: float,
-) -> dict[str, Harm]:
+) -> dict[str, Degradation]:
     """Tell what each simplification does to the whole grid, and to the placement of four sensors of the first type.
 
     The grids are computed lazily: they are the full scans', as `visibility_costs` checks on a sample.
 
     Returns
     -------
-    dict of str to Harm
+    dict of str to Degradation
         By name; the first is ``exact``.
     """
     exact = finish(compute_visibility(site, models, settings)).visible
     best = placed(site, models, exact, time_limit)
     own = best.objective / len(site.targets)
-    found = {"exact": Harm(0.0, own, own, len(best.chosen), best.gap < PROVEN)}
+    found = {"exact": Degradation(0.0, own, own, len(best.chosen), best.gap < PROVEN)}
     for one in simpler:
         visible = finish(compute_visibility(one.site, one.models, settings)).visible
         placement = placed(one.site, models, visible, time_limit)
-        found[one.name] = Harm(
+        found[one.name] = Degradation(
             wrong=float((one.spread(visible) != exact).sum() / exact.sum()),
             claimed=placement.objective / len(one.site.targets),
             coverage=float(exact[placement.chosen].any(axis=0).mean()),

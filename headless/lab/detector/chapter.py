@@ -11,13 +11,12 @@ from headless.detection import case_study
 from headless.detection.average_precision import balanced_score
 from headless.detection.detector import on_grid
 from headless.detection.pillars import grid_of
-from headless.detection.recordings import Configuration, Studio, TrafficRun
+from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.detection.training import Trained
+from headless.detection.training import TrainedDetector
 from headless.lab.detector.disturbances import Disturbance
-from headless.lab.detector.study import Course, Elsewhere, LimitsStudy, course, limits_study
-from headless.lab.detector.trials import Entrant, Ground, trials
-from headless.traffic_runs import runs_beside
+from headless.lab.detector.study import LimitsStudy, OtherSite, TrainingPlan, limits_study, training_plan
+from headless.lab.detector.trials import EvaluatedDetector, TrialSite, trials
 
 import bpy
 
@@ -67,23 +66,23 @@ def detector_limits(
     """
     layout, network = surveyed.layout, NetworkSettings()
     origin = layout.geometry.origin
-    traffic = case_study.read_traffic(runs_beside(scene), origin, EVERY)
+    traffic = case_study.read_traffic(survey.runs_beside(scene), origin, EVERY)
     configurations = yield from _placed(surveyed)
-    studio = _studio(layout)
-    asked = course(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
-    trained = yield from _trained(asked, studio, configurations, traffic, layout, folder)
+    simulator = _studio(layout)
+    asked = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
+    trained = yield from _trained(asked, simulator, configurations, traffic, layout, folder)
     candidates = asked.candidates([one.detector for one in trained])
 
     main = _most(configurations)
-    home = Ground(studio.site, studio, _thinned(traffic.test))
-    practice = Ground(studio.site, studio, _thinned(traffic.validation))
-    (tried,) = yield from trials(practice, main, Disturbance(), candidates.entrants[:1], folder)
+    home = TrialSite(simulator.site, simulator, _thinned(traffic.test))
+    practice = TrialSite(simulator.site, simulator, _thinned(traffic.validation))
+    (tried,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
     elsewhere = []
-    dense = case_study.read_runs(runs_beside(scene, "_dense"), origin, EVERY)
+    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, EVERY)
     if dense:
-        elsewhere.append(Elsewhere(Ground("denser traffic", studio, _thinned(dense)), (main,), candidates.entrants))
+        elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, _thinned(dense)), (main,), candidates.tested))
     for other in others:
-        there = yield from _on_other_scene(other, surveyed, main, candidates.entrants, folder)
+        there = yield from _on_other_scene(other, surveyed, main, candidates.tested, folder)
         elsewhere.append(there)
     return (
         yield from limits_study(home, [main], candidates, elsewhere, folder, score=balanced_score(tried.evaluation))
@@ -91,22 +90,24 @@ def detector_limits(
 
 
 def _trained(
-    asked: Course,
-    studio: Studio,
-    configurations: Sequence[Configuration],
+    asked: TrainingPlan,
+    simulator: Simulator,
+    configurations: Sequence[SensorConfiguration],
     traffic: case_study.Traffic,
     layout: Layout,
     folder: Path,
-) -> Generator[Progress, None, list[Trained]]:
+) -> Generator[Progress, None, list[TrainedDetector]]:
     network = NetworkSettings()
     grid = grid_of(layout.geometry, network.pillar)
-    lessons = yield from case_study.simulate_lessons(studio, configurations, traffic, grid, network.most_points)
-    return (yield from case_study.train_all(asked.pupils, lessons, folder, device="cpu"))
+    training_set = yield from case_study.simulate_training_set(
+        simulator, configurations, traffic, grid, network.most_points
+    )
+    return (yield from case_study.train_all(asked.models, training_set, folder, device="cpu"))
 
 
 def _on_other_scene(
-    scene: Path, surveyed: survey.Survey, main: Configuration, entrants: Sequence[Entrant], folder: Path
-) -> Generator[Progress, None, Elsewhere]:
+    scene: Path, surveyed: survey.Survey, main: SensorConfiguration, tested: Sequence[EvaluatedDetector], folder: Path
+) -> Generator[Progress, None, OtherSite]:
     """Place as many sensors of the same type there, and bring the detectors."""
     settings = surveyed.layout.settings
     session.open_scene(scene)
@@ -115,35 +116,33 @@ def _on_other_scene(
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     grid = yield from see(layout, folder / f"visibility_{scene.stem}.npz")
     there = yield from _placed(survey.Survey(layout, grid, surveyed.stopwatch))
-    runs = case_study.read_runs(runs_beside(scene), layout.geometry.origin, EVERY)
-    pillars = grid_of(layout.geometry, entrants[0].detector.grid.pillar)
-    moved = tuple(Entrant(one.name, on_grid(one.detector, pillars)) for one in entrants)
-    return Elsewhere(Ground(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
+    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, EVERY)
+    pillars = grid_of(layout.geometry, tested[0].detector.grid.pillar)
+    moved = tuple(EvaluatedDetector(one.name, on_grid(one.detector, pillars)) for one in tested)
+    return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
 
 
-def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[Configuration, ...]]:
+def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
     layout = surveyed.layout
     settings = layout.settings
     return case_study.place_all(
         layout.site,
         layout.models,
         surveyed.grid,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
+        **settings.limits,
     )
 
 
-def _studio(layout: Layout) -> Studio:
-    return Studio(static_scene(layout.geometry), ScanSettings(engine=layout.settings.engine), layout.site.name)
+def _studio(layout: Layout) -> Simulator:
+    return Simulator(static_scene(layout.geometry), ScanSettings(engine=layout.settings.engine), layout.site.name)
 
 
-def _most(configurations: Sequence[Configuration]) -> Configuration:
+def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:
     """Return the most sensors of the type in the middle: those that have something to lose, and to be lost."""
     types = list(dict.fromkeys(one.case.sensor for one in configurations))
     own = [one for one in configurations if one.case.sensor == types[len(types) // 2]]
     return max(own, key=lambda one: one.case.count)
 
 
-def _thinned(runs: Sequence[TrafficRun]) -> tuple[TrafficRun, ...]:
+def _thinned(runs: Sequence[SampledRun]) -> tuple[SampledRun, ...]:
     return tuple(replace(run, times=run.times[::TRIED]) for run in runs)

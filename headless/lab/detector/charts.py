@@ -5,18 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from headless.coverage_study.charts import MARKS, SERIES
+from headless.charts.style import DASHED, MARKS, SERIES, colour, mark, new_figure, save_chart, style_axes
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-from .disturbances import Capped, Lost
-from .study import Curve, Foreign, LimitsStudy
+from .disturbances import CappedPillars, SensorFailure
+from .study import DisturbanceCurve, LimitsStudy, TransferResult
 
 ACROSS = 4
 """Panels in a row."""
@@ -32,22 +31,15 @@ def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
     rows = -(-len(names) // ACROSS)
     size = (PANEL[0] * min(ACROSS, len(names)), PANEL[1] * rows + 0.7)
     figure = Figure(size, dpi=150, facecolor=PAPER, layout="constrained")
-    panels = figure.subplots(rows, min(ACROSS, len(names)), squeeze=False).ravel()
+    panels = figure.subplots(rows, min(ACROSS, len(names)), squeeze=False).ravel().tolist()
     configurations = list(dict.fromkeys(curve.configuration for curve in study.curves))
     for panel, name in zip(panels, names, strict=False):
         own = [curve for curve in study.curves if curve.name == name]
         _draw(panel, own, [configurations.index(curve.configuration) for curve in own])
     for panel in panels[len(names) :]:
         panel.set_axis_off()
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
-    figure.suptitle(
-        f"{study.name}: average precision under disturbances (dashed: from here on it is lower than by chance)",
-        color=INK,
-        fontsize=12,
-        parse_math=False,
-    )
-    save_png(path, figure)
+    title = f"{study.name}: average precision under disturbances (dashed: from here on it is lower than by chance)"
+    save_chart(path, figure, title, panels[:1])
 
 
 def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
@@ -55,28 +47,25 @@ def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None
     changes = (*study.foreign, *study.padding)
     if not changes:
         raise SeipError("there is nothing foreign to draw: try detectors elsewhere first")
-    figure = Figure((9.0, 1.2 + 0.42 * len(changes)), dpi=150, facecolor=PAPER, layout="constrained")
-    panel = figure.subplots()
+    figure, (panel,) = new_figure(9.0, 1.2 + 0.42 * len(changes), dpi=150)
     for row, one in enumerate(changes):
         low, high = one.change.low * 100, one.change.high * 100
         panel.plot((low, high), (row, row), color=SERIES[0], linewidth=1.2, marker="|")
         panel.plot(one.change.value * 100, row, color=SERIES[0], marker=MARKS[0], mec=PAPER)
-    panel.axvline(0.0, color=SOFT_INK, linewidth=1.0, linestyle=(0, (4, 2)))
+    panel.axvline(0.0, color=SOFT_INK, linewidth=1.0, linestyle=DASHED)
     panel.set_yticks(range(len(changes)), [_in_words(one) for one in changes], fontsize=8.5, parse_math=False)
     panel.invert_yaxis()
-    panel.set_xlabel("change of average precision (points)", color=INK)
-    _dress(panel)
-    figure.suptitle(f"{study.name}: beyond what was learnt", color=INK, fontsize=12, parse_math=False)
-    save_png(path, figure)
+    style_axes(panel, "change of average precision (points)")
+    save_chart(path, figure, f"{study.name}: beyond what was learnt")
 
 
-def _in_words(one: Foreign) -> str:
+def _in_words(one: TransferResult) -> str:
     return f"{one.learnt}, on {one.tried}, against {one.against}"
 
 
-def _draw(panel: Axes, curves: Sequence[Curve], rows: Sequence[int]) -> None:
+def _draw(panel: Axes, curves: Sequence[DisturbanceCurve], rows: Sequence[int]) -> None:
     """Draw the lines of one disturbance; sizes stand as far from each other whatever they are."""
-    falling = isinstance(curves[0].points[0].disturbance, Capped)  # the fewer points, the worse
+    falling = isinstance(curves[0].points[0].disturbance, CappedPillars)  # the fewer points, the worse
     sizes = sorted({point.disturbance.size for curve in curves for point in curve.points}, reverse=falling)
     for curve, row in zip(curves, rows, strict=True):
         at = [0, *(1 + sizes.index(point.disturbance.size) for point in curve.points)]
@@ -84,24 +73,17 @@ def _draw(panel: Axes, curves: Sequence[Curve], rows: Sequence[int]) -> None:
         value = np.array([one.value for one in estimates])
         ends = np.array([(one.low, one.high) for one in estimates]).T
         reach = np.nan_to_num(np.abs(ends - value), posinf=0.0)
-        each = isinstance(curve.points[0].disturbance, Lost)  # sensors in turn, none of which is more than another
-        style = {"color": SERIES[row % len(SERIES)], "marker": MARKS[row % len(MARKS)], "markersize": 5}
+        each = isinstance(
+            curve.points[0].disturbance, SensorFailure
+        )  # sensors in turn, none of which is more than another
+        style = {"color": colour(row), "marker": mark(row), "markersize": 5}
         style["linestyle"] = "none" if each else "-"
         panel.errorbar(at, value, reach, label=curve.configuration, capsize=2.5, linewidth=1.2, **style)  # type: ignore[arg-type]  # colours and marks are text, sizes are not
         begins = curve.begins
         if begins is not None and not each:
             place = 1 + sizes.index(begins.disturbance.size) + 0.06 * (row - 1)
-            panel.axvline(place, color=SERIES[row % len(SERIES)], linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+            panel.axvline(place, color=colour(row), linewidth=0.9, linestyle=DASHED, zorder=1)
     panel.set_xticks(range(len(sizes) + 1), ["none", *(f"{size:g}" for size in sizes)], fontsize=8)
     panel.set_title(curves[0].name, fontsize=10, color=INK)
-    panel.set_xlabel(curves[0].unit, color=INK, fontsize=9)
     panel.set_ylim(0, 1.02)
-    _dress(panel)
-
-
-def _dress(panel: Axes) -> None:
-    panel.grid(color="#e3e6e8", linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.tick_params(which="both", colors=SOFT_INK)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
+    style_axes(panel, curves[0].unit, fontsize=9)

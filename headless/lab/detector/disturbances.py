@@ -182,7 +182,7 @@ class OfOneSensor(Disturbance):
 
 
 @dataclass(frozen=True)
-class Misplaced(OfOneSensor):
+class PositionError(OfOneSensor):
     """A sensor is not where it is believed to be: its points lie beside what they are of, along `DIAGONAL`."""
 
     name: ClassVar[str] = "sensor misplaced"
@@ -194,7 +194,7 @@ class Misplaced(OfOneSensor):
 
 
 @dataclass(frozen=True)
-class Misturned(OfOneSensor):
+class YawError(OfOneSensor):
     """A sensor's yaw is not what it is believed to be, in degrees."""
 
     name: ClassVar[str] = "yaw wrong"
@@ -206,7 +206,7 @@ class Misturned(OfOneSensor):
 
 
 @dataclass(frozen=True)
-class Mistilted(OfOneSensor):
+class TiltError(OfOneSensor):
     """A sensor leans where it is believed to be upright, in degrees about `DIAGONAL`."""
 
     name: ClassVar[str] = "tilt wrong"
@@ -218,7 +218,7 @@ class Mistilted(OfOneSensor):
 
 
 @dataclass(frozen=True)
-class ClockOff(OfOneSensor):
+class ClockOffset(OfOneSensor):
     """A sensor's clock is late: its points are of the street so many seconds ago."""
 
     name: ClassVar[str] = "clock late"
@@ -231,14 +231,14 @@ class ClockOff(OfOneSensor):
 
 
 @dataclass(frozen=True)
-class Lost(OfOneSensor):
+class SensorFailure(OfOneSensor):
     """A sensor is silent. Its number is the size, so that each in turn makes a series; they count from 1."""
 
     name: ClassVar[str] = "sensor lost"
     unit: ClassVar[str] = "number of the sensor"
 
     @classmethod
-    def each(cls, sensor: int) -> Lost:
+    def each(cls, sensor: int) -> SensorFailure:
         """Return the loss of a sensor by its number from 0."""
         return cls(sensor + 1.0, sensor)
 
@@ -269,7 +269,7 @@ class Thinned(Disturbance):
 
 
 @dataclass(frozen=True)
-class Capped(Disturbance):
+class CappedPillars(Disturbance):
     """Pillars keep fewer points than they were learnt with; the size is how many they keep, 0 for no other cap."""
 
     name: ClassVar[str] = "fuller pillars cut"

@@ -6,18 +6,17 @@ import math
 from collections.abc import Sequence
 
 from headless.detection.average_precision import FEWEST_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
-from headless.detection.intervals import percentiles, student_quantile
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.estimates import Estimate, percentiles, student_reach
 
 DRAWS = 2 * RESAMPLES
 """Resamples of the blocks of traffic; what the first half of them says must be what all say."""
 
 
-class Sampled:
+class ResampledPrecision:
     """One detector's average precision on some frames, with resamples of their traffic.
 
     Parameters
@@ -32,12 +31,12 @@ class Sampled:
         self.draws = resampled_average_precisions(evaluation, seed, DRAWS)
 
 
-def level(those: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+def level(those: Sequence[ResampledPrecision], draws: int = DRAWS) -> Estimate:
     """Return the mean average precision of detectors that differ in their seeds alone."""
     return _estimate([one.value for one in those], [one.draws[:draws] for one in those], those[0].blocks)
 
 
-def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+def change(to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], draws: int = DRAWS) -> Estimate:
     """Return by how much the mean average precision changes from one trial to another of the same detectors.
 
     Differences are taken detector by detector and, where both had the same
@@ -47,7 +46,7 @@ def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> 
 
     Parameters
     ----------
-    to, of : sequence of Sampled
+    to, of : sequence of ResampledPrecision
         In the same order of detectors.
     draws : int
         Resamples that count.
@@ -72,6 +71,5 @@ def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> E
     if blocks < FEWEST_BLOCKS:
         return Estimate(value, -math.inf, math.inf)
     low, high = percentiles(np.mean(draws, axis=0))
-    count = len(values)
-    reach = student_quantile(count - 1) * float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
+    reach = student_reach(values) if len(values) > 1 else 0.0
     return Estimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))

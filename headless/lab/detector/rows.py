@@ -10,22 +10,30 @@ from headless.lab.stability.rows import Row
 
 import numpy as np
 
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.estimates import Estimate
 
 from .disturbances import (
-    Capped,
-    ClockOff,
+    CappedPillars,
+    ClockOffset,
     DropOff,
-    Lost,
-    Misplaced,
-    Mistilted,
-    Misturned,
     OfOneSensor,
+    PositionError,
     Rain,
     RangeNoise,
+    SensorFailure,
     Thinned,
+    TiltError,
+    YawError,
 )
-from .study import Borders, Curve, Foreign, LimitsStudy, Pillarwise, Point, Spread
+from .study import (
+    BorderResults,
+    DisturbanceCurve,
+    DisturbanceEffect,
+    LimitsStudy,
+    PillarFilling,
+    SeedSpread,
+    TransferResult,
+)
 
 METHOD = "detector"
 
@@ -39,13 +47,13 @@ ANSWERS: Mapping[str, str] = {
     RangeNoise.name: _CATALOGUE.format("range_noise_std_m"),
     DropOff.name: _CATALOGUE.format("dropoff_general_rate"),
     Rain.name: _RAIN,
-    Misplaced.name: _CALIBRATION,
-    Misturned.name: _CALIBRATION,
-    Mistilted.name: _CALIBRATION,
-    ClockOff.name: "one cloud does not tell: synchronise the sensors' clocks to better than that",
-    Lost.name: "headless.robust --failure places sensors for the loss of any one of them",
+    PositionError.name: _CALIBRATION,
+    YawError.name: _CALIBRATION,
+    TiltError.name: _CALIBRATION,
+    ClockOffset.name: "one cloud does not tell: synchronise the sensors' clocks to better than that",
+    SensorFailure.name: "headless.robust --failure places sensors for the loss of any one of them",
     Thinned.name: "nothing: thinner traffic hides less",
-    Capped.name: f"a warning where more than {MOST_OVER_FULL:.0%} of the pillars with points are over-full",
+    CappedPillars.name: f"a warning where more than {MOST_OVER_FULL:.0%} of the pillars with points are over-full",
 }
 
 
@@ -67,7 +75,7 @@ def points_in_words(change: Estimate) -> str:
     return f"{value:+.1f} points [{low:+.1f}, {high:+.1f}]"
 
 
-def _of_spreads(spreads: Sequence[Spread]) -> Row:
+def _of_spreads(spreads: Sequence[SeedSpread]) -> Row:
     each = (
         f"{one.configuration}: {one.precision.in_words(1)}, seeds from {min(one.values):.1%} to {max(one.values):.1%}"
         for one in spreads
@@ -81,16 +89,16 @@ def _of_spreads(spreads: Sequence[Spread]) -> Row:
     )
 
 
-def _of_curve(curve: Curve, study: LimitsStudy) -> Row:
+def _of_curve(curve: DisturbanceCurve, study: LimitsStudy) -> Row:
     wrong = curve.points[0].disturbance
     whose = ""
-    if isinstance(wrong, OfOneSensor) and not isinstance(wrong, Lost):
+    if isinstance(wrong, OfOneSensor) and not isinstance(wrong, SensorFailure):
         whose = f" (S{wrong.sensor + 1}, whose loss costs most)"
     detectors = len(study.spreads[0].values)
     return Row(
         METHOD,
         f"{curve.name}{whose} with {curve.configuration}",
-        _each_loss(curve) if isinstance(wrong, Lost) else _begins(curve),
+        _each_loss(curve) if isinstance(wrong, SensorFailure) else _begins(curve),
         f"{detectors} detectors on the same {study.frames} frames with and without; 95 % interval of the paired "
         "difference, over blocks of traffic (bootstrap) and trainings (Student); half the resamples "
         + ("say the same" if curve.steady else "say something else: test on more traffic"),
@@ -98,7 +106,7 @@ def _of_curve(curve: Curve, study: LimitsStudy) -> Row:
     )
 
 
-def _begins(curve: Curve) -> str:
+def _begins(curve: DisturbanceCurve) -> str:
     begins, last = curve.begins, curve.points[-1]
     if begins is None:
         return f"not up to {_size(last)}: {points_in_words(last.change)} on {curve.undisturbed.value:.1%}"
@@ -111,18 +119,18 @@ def _begins(curve: Curve) -> str:
     return words
 
 
-def _size(point: Point) -> str:
+def _size(point: DisturbanceEffect) -> str:
     disturbance = point.disturbance
     space = "" if disturbance.unit == "°" else " "
     return f"{disturbance.size:g}{space}{disturbance.unit}"
 
 
-def _each_loss(curve: Curve) -> str:
+def _each_loss(curve: DisturbanceCurve) -> str:
     each = (f"S{point.disturbance.size:g} {points_in_words(point.change)}" for point in curve.points)
     return f"lost: {', '.join(each)} on {curve.undisturbed.value:.1%}"
 
 
-def _of_foreign(one: Foreign) -> Row:
+def _of_foreign(one: TransferResult) -> Row:
     return Row(
         METHOD,
         f"learnt from {one.learnt}, used on {one.tried}",
@@ -132,7 +140,7 @@ def _of_foreign(one: Foreign) -> Row:
     )
 
 
-def _of_borders(borders: Borders) -> Iterator[Row]:
+def _of_borders(borders: BorderResults) -> Iterator[Row]:
     how = f"the first detector with {borders.configuration}, detections with a score of {borders.score:.2f} or more"
     recall = borders.recall
     yield Row(
@@ -170,7 +178,7 @@ def _bins(bins: Sequence[Bin], in_words: Callable[[float], str], like: Sequence[
     )
 
 
-def _of_pillars(pillars: Sequence[Pillarwise]) -> Row:
+def _of_pillars(pillars: Sequence[PillarFilling]) -> Row:
     own = [(one.configuration, next(iter(one.filling.items()))) for one in pillars]
     each = (
         f"{name}: {full.empty:.0%} empty, {full.over_full:.1%} of the others over-full, {full.left_out:.0%} of the "
@@ -182,11 +190,11 @@ def _of_pillars(pillars: Sequence[Pillarwise]) -> Row:
         f"empty and over-full pillars ({own[0][1][0]} points kept)",
         "; ".join(each),
         "counted in undisturbed test frames",
-        "empty pillars cost nothing, as points alone are looked at; " + ANSWERS[Capped.name],
+        "empty pillars cost nothing, as points alone are looked at; " + ANSWERS[CappedPillars.name],
     )
 
 
-def _of_padding(one: Foreign) -> Row:
+def _of_padding(one: TransferResult) -> Row:
     return Row(
         METHOD,
         f"pillars padded with zeros, {one.tried}",

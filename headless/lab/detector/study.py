@@ -14,32 +14,32 @@ from pathlib import Path
 
 from headless.detection.average_precision import Evaluation
 from headless.detection.breakdown import ALONG_DISTANCE, ALONG_POINTS, Bin, false_by, recall_by
-from headless.detection.case_study import Pupil, padded, pupils
+from headless.detection.case_study import ModelConfiguration, model_configurations, padded
 from headless.detection.detector import Detector
 from headless.detection.pillars import Filling, filling
-from headless.detection.recordings import Configuration
+from headless.detection.recordings import SensorConfiguration
 from headless.detection.settings import NetworkSettings, TrainingSettings
 
 import numpy as np
 
+from seip_addon.core.estimates import Estimate
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.robustness.estimates import Estimate
 
 from .disturbances import (
-    Capped,
-    ClockOff,
+    CappedPillars,
+    ClockOffset,
     Disturbance,
     DropOff,
-    Lost,
-    Misplaced,
-    Mistilted,
-    Misturned,
+    PositionError,
     Rain,
     RangeNoise,
+    SensorFailure,
     Thinned,
+    TiltError,
+    YawError,
 )
-from .paired_change import DRAWS, Sampled, change, level
-from .trials import Entrant, Ground, Trial, trials
+from .paired_change import DRAWS, ResampledPrecision, change, level
+from .trials import DisturbedTrial, EvaluatedDetector, TrialSite, trials
 
 Series = tuple[Disturbance, ...]
 """Disturbances of one kind, the mildest first."""
@@ -57,12 +57,12 @@ def full_series(sensor: int) -> tuple[Series, ...]:
         tuple(RangeNoise(size) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
         tuple(DropOff(size) for size in (0.1, 0.25, 0.5, 0.75, 0.9)),
         tuple(Rain(size) for size in (2.0, 5.0, 10.0, 20.0, 40.0)),
-        tuple(Misplaced(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.5)),
-        tuple(Misturned(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
-        tuple(Mistilted(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
-        tuple(ClockOff(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
+        tuple(PositionError(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.5)),
+        tuple(YawError(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
+        tuple(TiltError(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
+        tuple(ClockOffset(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
         tuple(Thinned(size) for size in (0.25, 0.5, 0.75)),
-        tuple(Capped(size) for size in (8.0, 4.0, 2.0, 1.0)),
+        tuple(CappedPillars(size) for size in (8.0, 4.0, 2.0, 1.0)),
     )
 
 
@@ -72,13 +72,13 @@ def brief_series(sensor: int) -> tuple[Series, ...]:
         tuple(RangeNoise(size) for size in (0.05, 0.1, 0.2)),
         tuple(DropOff(size) for size in (0.25, 0.5, 0.75)),
         tuple(Rain(size) for size in (5.0, 20.0)),
-        tuple(Misturned(size, sensor) for size in (0.2, 0.5, 1.0)),
-        tuple(ClockOff(size, sensor) for size in (0.05, 0.2)),
+        tuple(YawError(size, sensor) for size in (0.2, 0.5, 1.0)),
+        tuple(ClockOffset(size, sensor) for size in (0.05, 0.2)),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class DisturbanceEffect:
     """What a disturbance of one size does.
 
     Parameters
@@ -96,18 +96,18 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class DisturbanceCurve:
     """Average precision against the size of one disturbance.
 
     Parameters
     ----------
-    points : tuple of Point
+    points : tuple of DisturbanceEffect
         The mildest first.
     """
 
     configuration: str
     undisturbed: Estimate
-    points: tuple[Point, ...]
+    points: tuple[DisturbanceEffect, ...]
 
     @property
     def name(self) -> str:
@@ -120,7 +120,7 @@ class Curve:
         return self.points[0].disturbance.unit
 
     @property
-    def begins(self) -> Point | None:
+    def begins(self) -> DisturbanceEffect | None:
         """The mildest that lowers average precision by more than chance, or None."""
         return next((point for point in self.points if point.change.high < 0), None)
 
@@ -131,7 +131,7 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class SeedSpread:
     """What trainings with other seeds make of the same placement.
 
     Parameters
@@ -146,7 +146,7 @@ class Spread:
 
 
 @dataclass(frozen=True, eq=False)
-class Foreign:
+class TransferResult:
     """What detectors are worth where they have not learnt.
 
     Parameters
@@ -169,7 +169,7 @@ class Foreign:
 
 
 @dataclass(frozen=True, eq=False)
-class Borders:
+class BorderResults:
     """Where in the region the undisturbed detectors fail, of one placement and the first detector.
 
     Parameters
@@ -188,7 +188,7 @@ class Borders:
 
 
 @dataclass(frozen=True, eq=False)
-class Pillarwise:
+class PillarFilling:
     """How full pillars are with a placement.
 
     Parameters
@@ -202,105 +202,106 @@ class Pillarwise:
 
 
 @dataclass(frozen=True, eq=False)
-class Elsewhere:
+class OtherSite:
     """Another ground, on which detectors from home are tried.
 
     Parameters
     ----------
-    entrants : tuple of Entrant
+    tested : tuple of EvaluatedDetector
         The detectors from home, on this ground's grid.
-    natives : tuple of Entrant
+    trained_there : tuple of EvaluatedDetector
         Detectors that have learnt there, as many or none.
     """
 
-    ground: Ground
-    configurations: tuple[Configuration, ...]
-    entrants: tuple[Entrant, ...]
-    natives: tuple[Entrant, ...] = ()
+    ground: TrialSite
+    configurations: tuple[SensorConfiguration, ...]
+    tested: tuple[EvaluatedDetector, ...]
+    trained_there: tuple[EvaluatedDetector, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class EvaluatedDetectors:
     """Detectors to be tried at home.
 
     Parameters
     ----------
-    entrants : tuple of Entrant
+    tested : tuple of EvaluatedDetector
         Alike but for their seeds.
-    by_type : mapping of str to Entrant
+    by_type : mapping of str to EvaluatedDetector
         Those that have learnt from one sensor type alone.
-    padded : tuple of Entrant
+    padded : tuple of EvaluatedDetector
         With pillars padded with zeros, and ``unpadded``, trained as long, to compare them with.
     """
 
-    entrants: tuple[Entrant, ...]
-    by_type: Mapping[str, Entrant]
-    padded: tuple[Entrant, ...] = ()
-    unpadded: tuple[Entrant, ...] = ()
+    tested: tuple[EvaluatedDetector, ...]
+    by_type: Mapping[str, EvaluatedDetector]
+    padded: tuple[EvaluatedDetector, ...] = ()
+    unpadded: tuple[EvaluatedDetector, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TrainingPlan:
     """Who has to be trained before the study.
 
     Parameters
     ----------
-    alike : tuple of Pupil
+    alike : tuple of ModelConfiguration
         As an evaluation trains them: in its folder they need not be trained again.
-    by_type : dict of str to Pupil
+    by_type : dict of str to ModelConfiguration
         Those who learn from one sensor type alone.
-    padded : tuple of Pupil
+    padded : tuple of ModelConfiguration
         Those with padded pillars; none where padding is not to be tried.
     """
 
-    alike: tuple[Pupil, ...]
-    by_type: dict[str, Pupil]
-    padded: tuple[Pupil, ...]
+    alike: tuple[ModelConfiguration, ...]
+    by_type: dict[str, ModelConfiguration]
+    padded: tuple[ModelConfiguration, ...]
 
     @property
-    def pupils(self) -> tuple[Pupil, ...]:
+    def models(self) -> tuple[ModelConfiguration, ...]:
         """All, as `case_study.train_all` takes them."""
         return (*self.alike, *self.by_type.values(), *self.padded)
 
-    def candidates(self, detectors: Sequence[Detector]) -> Candidates:
-        """Return what the study tries, from the detectors of all pupils in their order."""
+    def candidates(self, detectors: Sequence[Detector]) -> EvaluatedDetectors:
+        """Return what the study tries, from the detectors of all models in their order."""
         trained = {
-            pupil.name: Entrant(pupil.name, detector) for pupil, detector in zip(self.pupils, detectors, strict=True)
+            model.name: EvaluatedDetector(model.name, detector)
+            for model, detector in zip(self.models, detectors, strict=True)
         }
-        return Candidates(
-            entrants=tuple(trained[pupil.name] for pupil in self.alike),
-            by_type={sensor: trained[pupil.name] for sensor, pupil in self.by_type.items()},
-            padded=tuple(trained[pupil.name] for pupil in self.padded),
-            unpadded=tuple(trained[pupil.name] for pupil in self.alike[: len(self.padded)]),
+        return EvaluatedDetectors(
+            tested=tuple(trained[model.name] for model in self.alike),
+            by_type={sensor: trained[model.name] for sensor, model in self.by_type.items()},
+            padded=tuple(trained[model.name] for model in self.padded),
+            unpadded=tuple(trained[model.name] for model in self.alike[: len(self.padded)]),
         )
 
 
-def course(
-    configurations: Sequence[Configuration],
+def training_plan(
+    configurations: Sequence[SensorConfiguration],
     network: NetworkSettings,
     training: TrainingSettings,
     *,
     seeds: int,
     padding: bool,
-) -> Course:
+) -> TrainingPlan:
     """Return who has to be trained; from one type's clouds for as large a part of the steps as they are of all clouds.
 
     Parameters
     ----------
-    configurations : sequence of Configuration
+    configurations : sequence of SensorConfiguration
         All that an evaluation looks at.
     training : TrainingSettings
         Of those who learn from all types.
     padding : bool
-        Whether the ablation is wanted: each pupil again, with padded pillars.
+        Whether the ablation is wanted: each model again, with padded pillars.
     """
-    alike = pupils(configurations, network, training, seeds=seeds, separate=False)
+    alike = model_configurations(configurations, network, training, seeds=seeds, separate=False)
     by_type = {}
     for sensor in dict.fromkeys(one.case.sensor for one in configurations):
         own = tuple(one for one in configurations if one.case.sensor == sensor)
         steps = max(1, training.steps * len(own) // len(configurations))
-        by_type[sensor] = Pupil(f"detector-{sensor}", own, network, replace(training, steps=steps))
-    return Course(tuple(alike), by_type, tuple(padded(alike)) if padding else ())
+        by_type[sensor] = ModelConfiguration(f"detector-{sensor}", own, network, replace(training, steps=steps))
+    return TrainingPlan(tuple(alike), by_type, tuple(padded(alike)) if padding else ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,28 +317,28 @@ class LimitsStudy:
     worst : mapping of str to int
         For each configuration the sensor, by its number from 0, whose loss costs most: it is the one to be
         misplaced, misturned and late.
-    foreign : tuple of Foreign
+    foreign : tuple of TransferResult
         Other types, other traffic, other sites.
-    padding : tuple of Foreign
+    padding : tuple of TransferResult
         What padding with zeros does to each configuration; none where it was not trained.
     """
 
     name: str
     frames: int
-    spreads: tuple[Spread, ...]
-    curves: tuple[Curve, ...]
+    spreads: tuple[SeedSpread, ...]
+    curves: tuple[DisturbanceCurve, ...]
     worst: Mapping[str, int]
-    foreign: tuple[Foreign, ...]
-    borders: tuple[Borders, ...]
-    pillars: tuple[Pillarwise, ...]
-    padding: tuple[Foreign, ...]
+    foreign: tuple[TransferResult, ...]
+    borders: tuple[BorderResults, ...]
+    pillars: tuple[PillarFilling, ...]
+    padding: tuple[TransferResult, ...]
 
 
 def limits_study(
-    home: Ground,
-    configurations: Sequence[Configuration],
-    candidates: Candidates,
-    elsewhere: Sequence[Elsewhere],
+    home: TrialSite,
+    configurations: Sequence[SensorConfiguration],
+    candidates: EvaluatedDetectors,
+    elsewhere: Sequence[OtherSite],
     store: Path,
     score: float,
 ) -> Generator[Progress, None, LimitsStudy]:
@@ -345,9 +346,9 @@ def limits_study(
 
     Parameters
     ----------
-    home : Ground
+    home : TrialSite
         Where they have learnt, with traffic that they have not seen.
-    configurations : sequence of Configuration
+    configurations : sequence of SensorConfiguration
         The first is driven through everything, the others through the brief series.
     store : path
         Folder in which every trial is kept: a study that was stopped goes on.
@@ -362,24 +363,24 @@ def limits_study(
     desk = _Desk(home, store, _length(configurations, candidates, elsewhere))
     spreads, curves, borders, pillars, worst = [], [], [], [], {}
     for number, configuration in enumerate(configurations):
-        tried = yield from desk.tried(configuration, Disturbance(), candidates.entrants)
-        own = [Sampled(trial.evaluation) for trial in tried]
-        spreads.append(Spread(configuration.name, tuple(one.value for one in own), level(own)))
+        tried = yield from desk.tried(configuration, Disturbance(), candidates.tested)
+        own = [ResampledPrecision(trial.evaluation) for trial in tried]
+        spreads.append(SeedSpread(configuration.name, tuple(one.value for one in own), level(own)))
         borders.append(_borders(configuration.name, tried[0], score))
-        pillars.append(_pillars(home, configuration, candidates.entrants[0].detector))
-        loss = tuple(Lost.each(sensor) for sensor in range(len(configuration.sensors)))
-        lost = yield from desk.curve(configuration, loss, candidates.entrants, own)
+        pillars.append(_pillars(home, configuration, candidates.tested[0].detector))
+        loss = tuple(SensorFailure.each(sensor) for sensor in range(len(configuration.sensors)))
+        lost = yield from desk.curve(configuration, loss, candidates.tested, own)
         worst[configuration.name] = int(np.argmin([point.change.value for point in lost.points]))
         curves.append(lost)
         series = full_series if number == 0 else brief_series
         for one in series(worst[configuration.name]):
-            curve = yield from desk.curve(configuration, one, candidates.entrants, own)
+            curve = yield from desk.curve(configuration, one, candidates.tested, own)
             curves.append(curve)
     foreign = yield from desk.foreign(configurations, candidates, elsewhere)
     padding = yield from desk.padding(configurations, candidates)
     yield desk.progress("tried")
     return LimitsStudy(
-        home.studio.site,
+        home.simulator.site,
         sum(len(run.times) for run in home.runs),
         tuple(spreads),
         tuple(curves),
@@ -394,7 +395,7 @@ def limits_study(
 class _Desk:
     """Hands out trials and counts them."""
 
-    def __init__(self, home: Ground, store: Path, total: int) -> None:
+    def __init__(self, home: TrialSite, store: Path, total: int) -> None:
         self._home, self._store, self._total, self._done = home, store, total, 0
 
     def progress(self, what: str) -> Progress:
@@ -402,42 +403,51 @@ class _Desk:
 
     def tried(
         self,
-        configuration: Configuration,
+        configuration: SensorConfiguration,
         disturbance: Disturbance,
-        entrants: Sequence[Entrant],
-        ground: Ground | None = None,
-    ) -> Generator[Progress, None, list[Trial]]:
+        tested: Sequence[EvaluatedDetector],
+        ground: TrialSite | None = None,
+    ) -> Generator[Progress, None, list[DisturbedTrial]]:
         there = self._home if ground is None else ground
-        steps = trials(there, configuration, disturbance, entrants, self._store)
+        steps = trials(there, configuration, disturbance, tested, self._store)
         made = yield from within(self.progress(f"{configuration.name}, {disturbance.name} {disturbance.size:g}"), steps)
         self._done += 1
         return made
 
     def curve(
-        self, configuration: Configuration, series: Series, entrants: Sequence[Entrant], undisturbed: Sequence[Sampled]
-    ) -> Generator[Progress, None, Curve]:
+        self,
+        configuration: SensorConfiguration,
+        series: Series,
+        tested: Sequence[EvaluatedDetector],
+        undisturbed: Sequence[ResampledPrecision],
+    ) -> Generator[Progress, None, DisturbanceCurve]:
         points = []
         for disturbance in series:
-            tried = yield from self.tried(configuration, disturbance, entrants)
-            own = [Sampled(trial.evaluation) for trial in tried]
+            tried = yield from self.tried(configuration, disturbance, tested)
+            own = [ResampledPrecision(trial.evaluation) for trial in tried]
             by_all, by_half = (change(own, undisturbed, draws) for draws in (DRAWS, DRAWS // 2))
-            points.append(Point(disturbance, level(own), by_all, by_half))
-        return Curve(configuration.name, level(undisturbed), tuple(points))
+            points.append(DisturbanceEffect(disturbance, level(own), by_all, by_half))
+        return DisturbanceCurve(configuration.name, level(undisturbed), tuple(points))
 
     def foreign(
-        self, configurations: Sequence[Configuration], candidates: Candidates, elsewhere: Sequence[Elsewhere]
-    ) -> Generator[Progress, None, list[Foreign]]:
+        self,
+        configurations: Sequence[SensorConfiguration],
+        candidates: EvaluatedDetectors,
+        elsewhere: Sequence[OtherSite],
+    ) -> Generator[Progress, None, list[TransferResult]]:
         """Try detectors of one type with the others, and all detectors on other grounds."""
         found = []
         for configuration in configurations:
             tried = {}
-            for sensor, entrant in candidates.by_type.items():
-                made = yield from self.tried(configuration, Disturbance(), [entrant])
-                tried[sensor] = [Sampled(made[0].evaluation)]
+            for sensor, one_tested in candidates.by_type.items():
+                made = yield from self.tried(configuration, Disturbance(), [one_tested])
+                tried[sensor] = [ResampledPrecision(made[0].evaluation)]
             native = tried.pop(configuration.case.sensor, None)
             for sensor, those in tried.items() if native else ():
                 against = f"learnt from {configuration.case.sensor}"
-                found.append(Foreign(sensor, configuration.name, level(those), change(those, native or those), against))
+                found.append(
+                    TransferResult(sensor, configuration.name, level(those), change(those, native or those), against)
+                )
         for other in elsewhere:
             for configuration in other.configurations:
                 there = yield from self._elsewhere(other, configuration, candidates, configurations)
@@ -446,36 +456,36 @@ class _Desk:
 
     def _elsewhere(
         self,
-        other: Elsewhere,
-        configuration: Configuration,
-        candidates: Candidates,
-        configurations: Sequence[Configuration],
-    ) -> Generator[Progress, None, Foreign]:
-        """Compare with natives on the same frames; without any, with the same detectors at home, on other frames."""
-        made = yield from self.tried(configuration, Disturbance(), other.entrants, other.ground)
-        there = [Sampled(trial.evaluation) for trial in made]
-        if other.natives:
-            own = yield from self.tried(configuration, Disturbance(), other.natives, other.ground)
+        other: OtherSite,
+        configuration: SensorConfiguration,
+        candidates: EvaluatedDetectors,
+        configurations: Sequence[SensorConfiguration],
+    ) -> Generator[Progress, None, TransferResult]:
+        """Compare with detectors trained there on the same frames, or else with these at home, on other frames."""
+        made = yield from self.tried(configuration, Disturbance(), other.tested, other.ground)
+        there = [ResampledPrecision(trial.evaluation) for trial in made]
+        if other.trained_there:
+            own = yield from self.tried(configuration, Disturbance(), other.trained_there, other.ground)
             against = "learnt there"
         else:
             twin = next(one for one in configurations if one.name == configuration.name)
-            own = yield from self.tried(twin, Disturbance(), candidates.entrants)
+            own = yield from self.tried(twin, Disturbance(), candidates.tested)
             against = "at home"
-        seed = 0 if other.natives else 1  # other frames: nothing is paired but the detectors
-        before = [Sampled(trial.evaluation, seed) for trial in own]
+        seed = 0 if other.trained_there else 1  # other frames: nothing is paired but the detectors
+        before = [ResampledPrecision(trial.evaluation, seed) for trial in own]
         tried = f"{configuration.name}, {other.ground.name}"
-        return Foreign(self._home.studio.site, tried, level(there), change(there, before), against)
+        return TransferResult(self._home.simulator.site, tried, level(there), change(there, before), against)
 
     def padding(
-        self, configurations: Sequence[Configuration], candidates: Candidates
-    ) -> Generator[Progress, None, list[Foreign]]:
+        self, configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors
+    ) -> Generator[Progress, None, list[TransferResult]]:
         found = []
         for configuration in configurations if candidates.padded else ():
             made = yield from self.tried(configuration, Disturbance(), (*candidates.padded, *candidates.unpadded))
-            own = [Sampled(trial.evaluation) for trial in made]
+            own = [ResampledPrecision(trial.evaluation) for trial in made]
             with_zeros, without = own[: len(candidates.padded)], own[len(candidates.padded) :]
             found.append(
-                Foreign(
+                TransferResult(
                     "pillars padded with zeros",
                     configuration.name,
                     level(with_zeros),
@@ -486,7 +496,9 @@ class _Desk:
         return found
 
 
-def _length(configurations: Sequence[Configuration], candidates: Candidates, elsewhere: Sequence[Elsewhere]) -> int:
+def _length(
+    configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors, elsewhere: Sequence[OtherSite]
+) -> int:
     """Return how many trials there are."""
     full, brief = (sum(map(len, series(0))) for series in (full_series, brief_series))
     each = 1 + len(candidates.by_type) + bool(candidates.padded)
@@ -494,13 +506,13 @@ def _length(configurations: Sequence[Configuration], candidates: Candidates, els
     return at_home + sum(2 * len(other.configurations) for other in elsewhere)
 
 
-def _borders(name: str, trial: Trial, score: float) -> Borders:
+def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
     by_sensor, by_border = trial.evaluation, trial.from_border
 
     def recall(evaluation: Evaluation, quantity: str, edges: Sequence[float]) -> tuple[Bin, ...]:
         return recall_by(evaluation, quantity, edges, score)
 
-    return Borders(
+    return BorderResults(
         name,
         score,
         {
@@ -515,11 +527,11 @@ def _borders(name: str, trial: Trial, score: float) -> Borders:
     )
 
 
-def _pillars(ground: Ground, configuration: Configuration, detector: Detector) -> Pillarwise:
+def _pillars(ground: TrialSite, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
     """Count how full pillars are in some frames, with the detector's own cap and smaller ones."""
     caps = (detector.settings.most_points, 8, 4, 2, 1)
     frames = [
-        ground.studio.frame(configuration, ground.runs[0], number)
+        ground.simulator.frame(configuration, ground.runs[0], number)
         for number in range(min(LOOKED_AT, len(ground.runs[0].times)))
     ]
     counted = {}
@@ -528,4 +540,4 @@ def _pillars(ground: Ground, configuration: Configuration, detector: Detector) -
         counted[cap] = Filling(
             *(float(np.mean([getattr(one, part) for one in each])) for part in ("empty", "over_full", "left_out"))
         )
-    return Pillarwise(configuration.name, counted)
+    return PillarFilling(configuration.name, counted)

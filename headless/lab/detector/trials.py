@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
-from headless.detection.average_precision import Evaluation, Judged, Wanted, evaluate
+from headless.detection.average_precision import CountedTruth, EvaluatedDetections, Evaluation, evaluate
 from headless.detection.cloud_in_plan import CloudInPlan
 from headless.detection.detector import Detector
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
-from headless.detection.recordings import Configuration, Studio, TrafficRun
+from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
 from headless.detection.settings import GROUPS
 from headless.detection.training import deterministic
 
@@ -60,35 +60,35 @@ FILE = ArrayFile(
 RULE = Rule()
 """How average precision is taken: the evaluation's own."""
 
-TABLES = {"detections": Judged, "wanted": Wanted}
+TABLES = {"detections": EvaluatedDetections, "wanted": CountedTruth}
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TrialSite:
     """Where detectors are tried.
 
     Parameters
     ----------
-    runs : tuple of TrafficRun
+    runs : tuple of SampledRun
         That no detector has seen.
     """
 
     name: str
-    studio: Studio
-    runs: tuple[TrafficRun, ...]
+    simulator: Simulator
+    runs: tuple[SampledRun, ...]
 
-    def key(self, configuration: Configuration) -> str:
+    def key(self, configuration: SensorConfiguration) -> str:
         """Return a digest of all that undisturbed frames follow from."""
-        studio = self.studio
+        simulator = self.simulator
         runs = (
             Run(
-                static=studio.static,
+                static=simulator.static,
                 origin=run.trajectories.origin,
                 sensors=configuration.sensors,
                 trajectories=run.trajectories,
                 bodies=[fitted_body(user) for user in run.trajectories.users],
                 times=run.times,
-                settings=studio.settings,
+                settings=simulator.settings,
                 versions=versions(),
             )
             for run in self.runs
@@ -97,7 +97,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Entrant:
+class EvaluatedDetector:
     """A detector that is tried."""
 
     name: str
@@ -111,7 +111,7 @@ class Entrant:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class DisturbedTrial:
     """What one detector made of the test frames.
 
     Parameters
@@ -127,35 +127,39 @@ class Trial:
 
 
 def trials(
-    ground: Ground, configuration: Configuration, disturbance: Disturbance, entrants: Sequence[Entrant], store: Path
-) -> Generator[Progress, None, list[Trial]]:
+    ground: TrialSite,
+    configuration: SensorConfiguration,
+    disturbance: Disturbance,
+    tested: Sequence[EvaluatedDetector],
+    store: Path,
+) -> Generator[Progress, None, list[DisturbedTrial]]:
     """Try detectors with a placement under a disturbance; a frame is simulated once for all of them.
 
     Parameters
     ----------
-    entrants : sequence of Entrant
+    tested : sequence of EvaluatedDetector
         With pillars on the ground's own grid.
     store : path
         Folder of what was tried before.
 
     Returns
     -------
-    list of Trial
+    list of DisturbedTrial
         One for each detector.
     """
     setting = digest(source_digest(__name__), ground.key(configuration), repr(RULE), repr(disturbance))
-    paths = [store / f"{digest(setting, entrant.key)[:32]}.npz" for entrant in entrants]
-    missing = [(entrant, path) for entrant, path in zip(entrants, paths, strict=True) if not path.exists()]
+    paths = [store / f"{digest(setting, one_tested.key)[:32]}.npz" for one_tested in tested]
+    missing = [(one_tested, path) for one_tested, path in zip(tested, paths, strict=True) if not path.exists()]
     if missing:
-        detectors = [disturbance.looked_at(entrant.detector) for entrant, _ in missing]
+        detectors = [disturbance.looked_at(one_tested.detector) for one_tested, _ in missing]
         results = yield from _results(ground, configuration, disturbance, detectors)
-        for (entrant, path), frames in zip(missing, results, strict=True):
-            header = {"ground": ground.name, "configuration": configuration.name, "detector": entrant.name}
-            _save(path, header | {"disturbance": repr(disturbance)}, trial_of(frames, ground.studio.static.region))
+        for (one_tested, path), frames in zip(missing, results, strict=True):
+            header = {"ground": ground.name, "configuration": configuration.name, "detector": one_tested.name}
+            _save(path, header | {"disturbance": repr(disturbance)}, trial_of(frames, ground.simulator.static.region))
     return [_load(path) for path in paths]
 
 
-def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> Trial:
+def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTrial:
     """Judge what a detector made of some frames."""
 
     def from_border(boxes: Float) -> Float:
@@ -170,26 +174,26 @@ def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> Trial:
         )
         for frame in frames
     ]
-    return Trial(evaluate(frames, RULE), evaluate(measured, RULE))
+    return DisturbedTrial(evaluate(frames, RULE), evaluate(measured, RULE))
 
 
 def disturbed_frames(
-    ground: Ground, configuration: Configuration, disturbance: Disturbance
-) -> Generator[tuple[TrafficRun, Frame], None, None]:
+    ground: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance
+) -> Generator[tuple[SampledRun, Frame], None, None]:
     """Simulate the test frames as they are under a disturbance."""
-    studio = ground.studio
+    simulator = ground.simulator
     sensors = disturbance.hung(configuration.sensors)
     for run in ground.runs:
         trajectories = disturbance.on_the_road(run.trajectories)
         bodies = [fitted_body(user) for user in trajectories.users]
-        simulation = finish(prepare(studio.static, sensors, trajectories, bodies, studio.settings))
+        simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
         for number, time in enumerate(run.times.tolist()):
-            random = np.random.default_rng([studio.settings.seed, int(run.key, 16), number])
+            random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
             yield run, disturbance.shown(disturbance.taken(simulation, number, time), sensors, random)
 
 
 def _results(
-    ground: Ground, configuration: Configuration, disturbance: Disturbance, detectors: Sequence[Detector]
+    ground: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance, detectors: Sequence[Detector]
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
     results: list[list[FrameResult]] = [[] for _ in detectors]
     total = sum(len(run.times) for run in ground.runs)
@@ -205,7 +209,7 @@ def _results(
                     cloud,
                     found,
                     classes=tuple(GROUPS.values()),
-                    region=ground.studio.static.region,
+                    region=ground.simulator.static.region,
                     sensors=configuration.places,
                     run=run.name,
                 )
@@ -213,7 +217,7 @@ def _results(
     return results
 
 
-def _save(path: Path, header: dict[str, str], trial: Trial) -> None:
+def _save(path: Path, header: dict[str, str], trial: DisturbedTrial) -> None:
     evaluation, beside = trial.evaluation, trial.from_border
     arrays = {
         f"{table}.{part.name}": getattr(getattr(evaluation, table), part.name)
@@ -224,7 +228,7 @@ def _save(path: Path, header: dict[str, str], trial: Trial) -> None:
     FILE.save(path, header, arrays | border | {"block": evaluation.block})
 
 
-def _load(path: Path) -> Trial:
+def _load(path: Path) -> DisturbedTrial:
     with FILE.reading(path) as (_, arrays):
         tables = {
             table: kind(**{part.name: arrays[f"{table}.{part.name}"] for part in fields(kind)})
@@ -238,4 +242,4 @@ def _load(path: Path) -> Trial:
             table: replace(rows, distance=arrays[f"{table}.border"])  # type: ignore[type-var]  # each is a dataclass
             for table, rows in tables.items()
         }
-        return Trial(evaluation, replace(evaluation, **beside))
+        return DisturbedTrial(evaluation, replace(evaluation, **beside))

@@ -6,15 +6,16 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
+from headless.charts.style import DASHED, MARKS, new_figure, save_chart, style_axes
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+from seip_addon.core.pictures.palette import INK, SOFT_INK
 from seip_addon.core.placement.near_optimal import FlatTop
 from seip_addon.core.placement.problem import TIE
-from seip_addon.core.storage.files import whole_file
 from seip_addon.core.visibility.rounding import NOTICEABLE, STEP
 
 from .arithmetic import ArithmeticStudy
@@ -24,14 +25,13 @@ from .solver_limits import SolverStudy
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Told apart by colour-blind people (Okabe and Ito 2008)."""
 
-MARKS = ("o", "s", "^", "D", "v", "P", "X")
-LIMIT: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
+LIMIT: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": DASHED}
 
 
 def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
     """Draw, for each sensor type, from where rings are more than 2δ apart, against δ; what lies above is beams."""
     sensors = list(dict.fromkeys(border.sensor for border in study.borders))
-    figure, panels = _figure(len(sensors), title)
+    figure, panels = _figure(len(sensors))
     for panel, sensor in zip(panels, sensors, strict=True):
         own = [border for border in study.borders if border.sensor == sensor]
         top = max(border.radius for border in study.borders)
@@ -45,14 +45,14 @@ def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, 
         _delta_axis(panel, study)
         panel.set_ylim(0, top)
         panel.set_title(f"{sensor}: above the line, coverage counts beams", fontsize=10, color=INK)
-        _name(panel, "δ (m); dashed: asked for", "distance on a level road (m)")
+        style_axes(panel, "δ (m); dashed: asked for", "distance on a level road (m)")
         panel.legend(frameon=False, fontsize=8.5, loc="upper left")
-    _save(figure, path)
+    save_chart(path, figure, title)
 
 
 def save_border_check_chart(path: str | os.PathLike[str], study: CriterionStudy, title: str) -> None:
     """Draw the share of targets in view that count as seen against their distance in multiples of the border."""
-    figure, (panel,) = _figure(1, title)
+    figure, (panel,) = _figure(1)
     for number, own in enumerate(study.by_ratio):
         points = [
             (float(np.mean(own.ratios[row : row + 2])), share.value, *share.interval)
@@ -66,14 +66,14 @@ def save_border_check_chart(path: str | os.PathLike[str], study: CriterionStudy,
     panel.axvline(1.0, **LIMIT)
     panel.set_ylim(0, 1.03)
     _share_axis(panel)
-    _name(panel, "distance in multiples of the border", "of the targets in view, share that counts as seen")
+    style_axes(panel, "distance in multiples of the border", "of the targets in view, share that counts as seen")
     panel.legend(frameon=False, fontsize=9)
-    _save(figure, path)
+    save_chart(path, figure, title)
 
 
 def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
     """Draw coverage and what is in view against δ, and what the placement for each δ covers under the one asked for."""
-    figure, panels = _figure(2, title)
+    figure, panels = _figure(2)
     for number, sensor in enumerate(dict.fromkeys(answer.sensor for answer in study.by_delta)):
         own = [answer for answer in study.by_delta if answer.sensor == sensor]
         style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
@@ -92,14 +92,14 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
         _delta_axis(panel, study)
         panel.set_ylim(0, 1.03)
         _share_axis(panel)
-        _name(panel, "δ (m) that the placement was made for", what)
+        style_axes(panel, "δ (m) that the placement was made for", what)
         panel.legend(frameon=False, fontsize=8.5)
-    _save(figure, path)
+    save_chart(path, figure, title)
 
 
 def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, title: str) -> None:
     """Draw coverage against the spacing of targets and of candidates, with what the tolerance picks."""
-    figure, panels = _figure(2, title)
+    figure, panels = _figure(2)
     picked = study.convergence.settings
     for panel, answers, what, at in (
         (panels[0], study.by_grid, "spacing of the targets (m)", picked.grid_spacing),
@@ -115,14 +115,14 @@ def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, 
         panel.invert_xaxis()
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         _share_axis(panel)
-        _name(panel, f"{what}; dashed: picked", "coverage of the best placement")
+        style_axes(panel, f"{what}; dashed: picked", "coverage of the best placement")
         panel.legend(frameon=False, fontsize=8.5)
-    _save(figure, path)
+    save_chart(path, figure, title)
 
 
 def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, title: str) -> None:
     """Draw by how far hits are off against how far away a street, or a stray mesh, lies."""
-    figure, (panel,) = _figure(1, title)
+    figure, (panel,) = _figure(1)
     for number, (name, checks) in enumerate(
         (
             ("street moved, computed in float64", study.moved),
@@ -143,14 +143,14 @@ def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, ti
     panel.axvline(NOTICEABLE / STEP, **LIMIT)
     panel.set_xscale("log")
     panel.set_yscale("log")
-    _name(panel, "distance (m); dashed: where the tool warns", "hits off at most, across the surface (m)")
+    style_axes(panel, "distance (m); dashed: where the tool warns", "hits off at most, across the surface (m)")
     panel.legend(frameon=False, fontsize=8.5)
-    _save(figure, path)
+    save_chart(path, figure, title)
 
 
 def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: str) -> None:
     """Draw what is lost where weights and prices lie far apart, when near-ties move the choice, and greedy's worst."""
-    figure, panels = _figure(3, title)
+    figure, panels = _figure(3)
     for number, (what, method) in enumerate(dict.fromkeys((c.what, c.method) for c in study.spans)):
         own = [c for c in study.spans if (c.what, c.method) == (what, method)]
         style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
@@ -159,7 +159,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     panels[0].set_yscale("symlog", linthresh=1e-13)
     panels[0].set_ylim(0, 10 * TIE)
     panels[0].set_xticks(sorted({check.decades for check in study.spans}))
-    _name(panels[0], "powers of ten that they span", "largest loss; dashed: counts as equal")
+    style_axes(panels[0], "powers of ten that they span", "largest loss; dashed: counts as equal")
     by = [check.by for check in study.ties]
     shares = np.array([(c.changed.value, *c.changed.interval) for c in study.ties]).T
     panels[1].errorbar(
@@ -168,7 +168,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     panels[1].axvline(TIE, **LIMIT)
     panels[1].set_xscale("log")
     _share_axis(panels[1])
-    _name(panels[1], "share by which equal weights are disturbed", "choices that change")
+    style_axes(panels[1], "share by which equal weights are disturbed", "choices that change")
     counts = [check.count for check in study.greedy]
     for number, (name, values) in enumerate(
         (
@@ -181,27 +181,25 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
         panels[2].plot(counts, values, color=COLOURS[number], marker=MARKS[number], linestyle=dash, label=name)
     panels[2].set_ylim(0.5, 1.03)
     _share_axis(panels[2])
-    _name(panels[2], "sensors", "coverage on the worst instance")
+    style_axes(panels[2], "sensors", "coverage on the worst instance")
     for panel in (panels[0], panels[2]):
         panel.legend(frameon=False, fontsize=8)
-    _save(figure, path)
+    save_chart(path, figure, title)
 
 
 def save_flat_top_chart(path: str | os.PathLike[str], tops: Sequence[tuple[str, FlatTop]], title: str) -> None:
     """Draw how many placements near the best share how many positions with it."""
-    figure, panels = _figure(len(tops), title)
+    figure, panels = _figure(len(tops))
     for panel, (name, top) in zip(panels, tops, strict=True):
         panel.bar_label(panel.bar(range(len(top.in_common)), top.in_common, color=COLOURS[0]), fontsize=9)
         panel.set_xticks(range(len(top.in_common)))
         panel.set_title(f"{name}: {len(top):,}{'' if top.complete else ' and more'}", fontsize=10, color=INK)
-        _name(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")
-    _save(figure, path)
+        style_axes(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")
+    save_chart(path, figure, title)
 
 
-def _figure(panels: int, title: str) -> tuple[Figure, Sequence[Axes]]:
-    figure = Figure((max(6.5, 4.8 * panels), 4.6), dpi=150, facecolor=PAPER, layout="constrained")
-    figure.suptitle(title, color=INK, fontsize=11)
-    return figure, list(figure.subplots(1, panels, squeeze=False)[0])
+def _figure(panels: int) -> tuple[Figure, Sequence[Axes]]:
+    return new_figure(max(6.5, 4.8 * panels), 4.6, panels, dpi=150)
 
 
 def _delta_axis(panel: Axes, study: CriterionStudy) -> None:
@@ -213,18 +211,3 @@ def _delta_axis(panel: Axes, study: CriterionStudy) -> None:
 
 def _share_axis(panel: Axes) -> None:
     panel.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))
-
-
-def _name(panel: Axes, x: str, y: str) -> None:
-    panel.set_xlabel(x, color=INK)
-    panel.set_ylabel(y, color=INK)
-    panel.grid(color="#e3e6e8", linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.tick_params(which="both", colors=SOFT_INK)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)
-
-
-def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})

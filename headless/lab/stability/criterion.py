@@ -14,12 +14,12 @@ import numpy as np
 import shapely
 
 from seip_addon.core.arrays import Boolean, Float
+from seip_addon.core.estimates import NORMAL, Estimate
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Deployment
 from seip_addon.core.placement.goal import Goal, Plan
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.robustness.estimates import Estimate
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site, Targets, make_site
@@ -39,7 +39,7 @@ from seip_addon.core.workflows.convergence import (
 from seip_addon.core.workflows.survey import SurveySettings
 
 from .rows import Row
-from .shares import NORMAL, Share
+from .shares import Share
 
 DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Metres."""

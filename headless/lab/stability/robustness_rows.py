@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seip_addon.core.robustness.estimates import mean_of
+from seip_addon.core.estimates import mean_of
 from seip_addon.core.robustness.pose_study import PoseStudy
 from seip_addon.core.robustness.robust_study import RobustStudy
 from seip_addon.core.robustness.traffic_study import MOSTLY, NOTABLE, WHAT, TrafficStudy

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-NORMAL = 1.959963984540054
-"""The value that a standard normal variable exceeds with a probability of 2.5 %."""
+from seip_addon.core.estimates import NORMAL
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import SeipError
 from ..lidar import LidarModel
 from ..progress import Progress
+from ..settings import setting
 from ..site.site import Candidates, Site
 from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
 from .deployment import Deployment, deploy
@@ -48,13 +49,19 @@ class Goal:
         Names of positions that must not, and that must, carry a sensor.
     """
 
-    count: int | None = None
-    budget: float | None = None
-    coverage: float | None = None
-    central_weight: float | Literal["scene"] | None = None
-    min_distance: float = 0.0
-    forbidden: tuple[str, ...] = ()
-    mandatory: tuple[str, ...] = ()
+    count: int | None = setting(
+        None, f"largest number of sensors ({DEFAULT_COUNT} if no goal is given)", minimum=1, metavar="N"
+    )
+    budget: float | None = setting(None, "largest total price", unit="USD", minimum=0.0, metavar="USD")
+    coverage: float | None = setting(
+        None, "reach this share (0 to 1) at the least price", minimum=0.0, maximum=1.0, metavar="SHARE"
+    )
+    central_weight: float | Literal["scene"] | None = setting(
+        None, "one weight for all weighted regions", minimum=0.0, metavar="W"
+    )
+    min_distance: float = setting(0.0, "between two sensors", unit="m", minimum=0.0, metavar="M")
+    forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
+    mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
 
     def __post_init__(self) -> None:
         for name in ("budget", "min_distance"):

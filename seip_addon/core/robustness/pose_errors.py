@@ -22,6 +22,7 @@ import numpy as np
 from ..arrays import Boolean, Float
 from ..errors import SeipError
 from ..geometry.orientation import orientations
+from ..settings import setting
 from ..site.obstruction import inside_any
 from ..site.scene_geometry import Mesh
 
@@ -47,10 +48,21 @@ class PoseErrors:
         Of pitch and of roll.
     """
 
-    position: float = 0.3
-    height: float = 0.3
-    yaw: float = math.radians(2.0)
-    tilt: float = math.radians(2.0)
+    position: float = setting(0.3, "of x and y", unit="m", maximum=WIDEST, option="position-error", metavar="M")
+    height: float = setting(
+        0.3, "as of the position if not given", unit="m", maximum=WIDEST, option="height-error", metavar="M"
+    )
+    yaw: float = setting(
+        math.radians(2.0),
+        "as of the tilt if not given",
+        unit="rad",
+        maximum=math.pi,
+        option="yaw-error",
+        metavar="DEG",
+    )
+    tilt: float = setting(
+        math.radians(2.0), "of pitch and roll", unit="rad", maximum=STEEPEST, option="tilt-error", metavar="DEG"
+    )
 
     def __post_init__(self) -> None:
         for name in ("position", "height"):

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays import Boolean, Float
+from ..estimates import Estimate, mean_of, quantile_of
 from ..placement.deployment import Deployment
 from ..progress import Progress
 from ..site.site import Site
 from .disturbed_views import Surroundings, disturbed_views, draws_for
-from .estimates import Estimate, mean_of, quantile_of
 from .pose_errors import KINDS, PoseErrors
 from .views import Views
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import Float
+from ..estimates import Estimate, mean_of, quantile_gain, quantile_of
 from ..placement import Placement, PlacementProblem, solve
 from ..progress import Progress, within
 from .disturbed_views import Surroundings, disturbed_views, draws_for
-from .estimates import Estimate, mean_of, quantile_gain, quantile_of
 from .pose_errors import PoseErrors
 from .risk import Risk
 from .robust_placement import RobustPlacement, at_least, foresee, outcomes_of, solve_robust

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
+from ..estimates import Estimate, mean_over_time
 from ..placement import Placement, PlacementProblem, solve
 from ..progress import Progress
 from .disturbed_views import Surroundings
-from .estimates import Estimate, mean_over_time
 from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .traffic_instants import NOBODY, Instants, Standing

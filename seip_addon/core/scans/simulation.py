@@ -14,6 +14,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import measured_returns
 from ..progress import Progress
+from ..settings import setting
 from ..traffic import Snapshot, Trajectories
 from ..visibility.ray_casting import Engine, make_ray_caster
 from .frame import Frame, Labels
@@ -39,10 +40,10 @@ class ScanSettings:
     engine : {"auto", "bvh", "embree"}
     """
 
-    seed: int = 0
+    seed: int = setting(0, "of noise and lost returns", minimum=0)
     noise: bool = True
-    rolling_shutter: bool = False
-    engine: Engine = "auto"
+    rolling_shutter: bool = setting(default=False, help="traffic moves while a sensor turns")
+    engine: Engine = setting("auto", "ray caster")
 
 
 class Simulation:

@@ -14,6 +14,7 @@ from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 from ..geometry.orientation import orientation
 from ..geometry.plan import outline, surface_height
+from ..settings import setting
 from .obstruction import inside_any, post_blocked
 from .pavement_sampling import spread
 from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
@@ -56,14 +57,32 @@ class CandidateSettings:
         Whether poles that are assumed, and stand in no map, may carry sensors.
     """
 
-    sensors: tuple[str, ...] = ("type1", "type2", "type3")
-    heights: tuple[float, ...] = (3.5, 5.4, 8.0)
-    tilts: tuple[float, ...] = (0.0,)
-    spacing: float = 4.0
-    setback: float = 0.5
-    clearance: float = 0.3
-    bracket: float = 0.4
-    assumed_poles: bool = False
+    sensors: tuple[str, ...] = setting(
+        ("type1", "type2", "type3"), "types to choose from", option="sensor", metavar="KEY"
+    )
+    heights: tuple[float, ...] = setting(
+        (3.5, 5.4, 8.0),
+        "metres, or FROM:TO:STEP",
+        unit="m",
+        maximum=HIGHEST,
+        metavar="M",
+        read=lambda texts: heights_of(texts),  # noqa: PLW0108 -- defined below
+    )
+    tilts: tuple[float, ...] = setting(
+        (0.0,),
+        "degrees nose down towards the region, or FROM:TO:STEP; up where negative; upright if not given",
+        unit="rad",
+        metavar="DEG",
+        read=lambda texts: tilts_of(texts),  # noqa: PLW0108 -- as above
+    )
+    spacing: float = setting(4.0, "between posts on the pavement", unit="m", minimum=0.1, maximum=1000.0)
+    setback: float = setting(0.5, "of posts from the kerb", unit="m", minimum=0.0, maximum=100.0)
+    clearance: float = setting(0.3, "of posts from walls", unit="m", minimum=0.0, maximum=100.0)
+    bracket: float = setting(0.4, "of sensors from the axis of a pole", unit="m", minimum=0.0, maximum=100.0)
+    assumed_poles: bool = setting(
+        default=False,
+        help="let poles carry sensors that are assumed, since the map has none for its traffic lights",
+    )
 
     def __post_init__(self) -> None:
         if not self.sensors:

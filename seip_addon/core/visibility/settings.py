@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import SeipError
+from ..settings import setting
 
 WIDEST_DELTA = 100.0
 """Metres: a wider one is a slip of the keyboard."""
@@ -22,8 +23,8 @@ class VisibilitySettings:
         Least intensity of such a return, for surfaces of reflectivity 1. At 0 every return counts.
     """
 
-    delta: float = 1.0
-    min_intensity: float = 0.0
+    delta: float = setting(1.0, "a return closer than this sees a target", unit="m", maximum=WIDEST_DELTA)
+    min_intensity: float = setting(0.0, "least intensity of a return that sees", minimum=0.0, maximum=1.0)
 
     def __post_init__(self) -> None:
         if not 0 < self.delta <= WIDEST_DELTA:

@@ -15,6 +15,7 @@ from ..datasets import FORMATS, SPLITS, SensorPose, TrafficRun, write_dataset
 from ..progress import Progress
 from ..scans import MountedSensor, ScanSettings, Simulation, frame_times, prepare, static_scene
 from ..scans.run_folder import Record, Run, load_frames, write_run
+from ..settings import setting
 from ..site.scene_geometry import SceneGeometry
 from ..traffic import Trajectories
 from ..traffic.bodies import fitted_body
@@ -41,11 +42,11 @@ class RecordingSettings:
     """
 
     scan: ScanSettings = field(default_factory=ScanSettings)
-    start: float | None = None
-    duration: float | None = None
-    rate: float | None = None
+    start: float | None = setting(None, "time of the first frame (the traffic's first)", unit="s", metavar="S")
+    duration: float | None = setting(None, "to the last frame (to the traffic's last)", unit="s", metavar="S")
+    rate: float | None = setting(None, "frames a second (the slowest sensor's turns)", unit="Hz", metavar="HZ")
     formats: tuple[str, ...] = ()
-    dataset: Path | None = None
+    dataset: Path | None = setting(None, "folder of datasets (that of the run)", metavar="DIR")
     split: str = SPLITS[0]
 
 

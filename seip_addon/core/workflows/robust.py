@@ -13,6 +13,7 @@ from ..robustness.pose_errors import PoseErrors, require_draws
 from ..robustness.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
 from ..robustness.risk import Risk
 from ..robustness.robust_study import RobustSettings, RobustStudy, robust_study
+from ..settings import setting
 from ..visibility.grid import VisibilityGrid
 from .survey import Layout, surroundings
 
@@ -21,7 +22,7 @@ DRAWS_OF_KIND = 100
 
 
 @dataclass(frozen=True)
-class Precaution:
+class RobustnessSettings:
     """What a placement is to stand, and how that is tried.
 
     Parameters
@@ -45,9 +46,9 @@ class Precaution:
 
     risk: Risk
     errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = 20
-    draws: int = 500
-    seed: int = 0
+    scenarios: int = setting(20, "draws to choose on", minimum=1)
+    draws: int = setting(500, "unseen draws to judge by", minimum=1)
+    seed: int = setting(0, "of the scenarios; unseen draws have the next")
 
     def __post_init__(self) -> None:
         require_draws(self.scenarios)
@@ -61,7 +62,7 @@ class RobustPlan:
     Parameters
     ----------
     plan : Plan
-        Objective, bound and gap are of what the precaution asks for; its notes say so.
+        Objective, bound and gap are of what the robustness asks for; its notes say so.
     study : RobustStudy
         It beside the plan that trusts the map.
     judged : PoseStudy
@@ -73,8 +74,8 @@ class RobustPlan:
     judged: PoseStudy
 
 
-def check_precaution(goal: Goal) -> None:
-    """Raise SeipError where a goal allows no precaution."""
+def check_robust_goal(goal: Goal) -> None:
+    """Raise SeipError where a goal allows no robustness."""
     if goal.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
@@ -83,7 +84,7 @@ def check_precaution(goal: Goal) -> None:
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, goal: Goal, precaution: Precaution
+    layout: Layout, grid: VisibilityGrid, goal: Goal, robustness: RobustnessSettings
 ) -> Generator[Progress, None, RobustPlan]:
     """Answer a goal on a survey for what may go wrong.
 
@@ -97,28 +98,26 @@ def place_robustly(
     Raises
     ------
     SeipError
-        As for `check_precaution`, `placement_problem` and `solve_robust`.
+        As for `check_robust_goal`, `placement_problem` and `solve_robust`.
     """
-    check_precaution(goal)
+    check_robust_goal(goal)
     site, models, around = layout.site, layout.models, surroundings(layout)
     settings = RobustSettings(
-        errors=precaution.errors,
-        scenarios=precaution.scenarios,
-        unseen=precaution.draws,
-        seed=precaution.seed,
-        solver=layout.settings.solver,
-        time_limit=layout.settings.time_limit,
-        effort=layout.settings.effort,
+        errors=robustness.errors,
+        scenarios=robustness.scenarios,
+        unseen=robustness.draws,
+        seed=robustness.seed,
+        **layout.settings.limits,
     )
     problem = placement_problem(site, grid.visible, models, goal)
-    study = yield from robust_study(around, problem, settings, [precaution.risk])
+    study = yield from robust_study(around, problem, settings, [robustness.risk])
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
     tried = StudySettings(
-        precaution.errors, precaution.draws, min(DRAWS_OF_KIND, precaution.draws), precaution.seed + 1
+        robustness.errors, robustness.draws, min(DRAWS_OF_KIND, robustness.draws), robustness.seed + 1
     )
     judged = yield from pose_study(around, deployment, tried)
-    note = f"chosen for {chosen.name} over {precaution.scenarios} scenarios: objective, bound and gap are of that"
+    note = f"chosen for {chosen.name} over {robustness.scenarios} scenarios: objective, bound and gap are of that"
     notes = (note, *chosen.placement.notes, robust_sentence(study), *pose_warnings(judged))
     plan = Plan(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
     return RobustPlan(plan, study, judged)

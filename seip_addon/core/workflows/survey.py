@@ -24,6 +24,7 @@ from ..results.headings import tilt_degrees
 from ..results.placement_record import Record, Run, placement_record
 from ..robustness.disturbed_views import Surroundings
 from ..robustness.pose_study import StudySettings, pose_sentence, pose_study
+from ..settings import setting
 from ..site.candidates import CandidateSettings, assumed_pole_warnings
 from ..site.far_objects import without_far_objects
 from ..site.obstruction import bareness_warnings
@@ -66,13 +67,22 @@ class SurveySettings:
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
-    grid_spacing: float = 1.0
-    catalogue: tuple[Path, ...] = ()
-    engine: Engine = "auto"
-    solver: str = "auto"
+    grid_spacing: float = setting(1.0, "spacing of the targets", unit="m", option="grid")
+    catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="TOML")
+    engine: Engine = setting("auto", "ray caster")
+    solver: str = setting("auto", "auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi")
     time_limit: float = 60.0
-    effort: float = math.inf
+    effort: float = setting(
+        math.inf,
+        "for each answer, in units of counted work, each about a second of one core: the same answer every time",
+        metavar="UNITS",
+    )
     spacings_because: str = ""
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """The solver and its limits, as `placement.solve` takes them."""
+        return {"solver": self.solver, "time_limit": self.time_limit, "effort": self.effort}
 
     def models(self) -> dict[str, LidarModel]:
         """Return the sensor types to choose from, by catalogue key.
@@ -212,16 +222,7 @@ def place(
     else.
     """
     site, models, settings = layout.site, layout.models, layout.settings
-    steps = make_plan(
-        site,
-        grid.visible,
-        models,
-        goal,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
-    )
-    plan = yield from steps
+    plan = yield from make_plan(site, grid.visible, models, goal, **settings.limits)
     notes = [*plan.placement.notes]
     if plan.placement.status == "optimal" and not goal.cheapest:
         top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
@@ -239,7 +240,7 @@ def surroundings(layout: Layout) -> Surroundings:
 
 
 @dataclass(frozen=True)
-class Circumstances:
+class Provenance:
     """What is no part of an answer, and stands in its record all the same.
 
     Parameters
@@ -261,7 +262,7 @@ def record_of(  # what was asked for stands in the record
     layout: Layout,
     grid: VisibilityGrid,
     plan: Plan,
-    circumstances: Circumstances,
+    circumstances: Provenance,
     *,
     render: bool,
     pose_errors: bool = False,

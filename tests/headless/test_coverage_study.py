@@ -3,9 +3,10 @@
 import csv
 from dataclasses import replace
 
-from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_study, judge
+from headless.claims import save_claims
+from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_claims, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
-from headless.coverage_study.tables import save_claims, save_study_table
+from headless.coverage_study.tables import save_study_table
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ def test_the_objective_counts_targets(example, study):
 
 
 def test_greedy_keeps_its_promise(study):
-    claim = next(claim for claim in judge(study) if claim.number == 10)
+    claim = next(claim for claim in coverage_claims(study) if claim.number == 10)
     assert claim.verdict == "holds"
 
 
@@ -91,7 +92,7 @@ def test_more_sensors_than_positions_leave_those_cells_empty_and_the_rest_solved
         "asked for 4 sensors, but there are 3 positions; ask for at most 3",
     }
     assert {case.count for case in study.cases} == {1, 2}
-    verdicts = {claim.number: claim.verdict for claim in judge(study)}
+    verdicts = {claim.number: claim.verdict for claim in coverage_claims(study)}
     assert verdicts[2] == verdicts[4] == "undecided"
     write_all(tmp_path, study)
     rows = read_table(tmp_path / "coverage.csv")
@@ -108,7 +109,7 @@ def test_a_type_that_is_blind_from_one_height_leaves_that_height_empty(example, 
     assert study.find("type1", 1, 5.4) is None
     assert study.find("type1", 1) is not None
     assert study.possible("type1", 1, 5.4) is None
-    heights = next(claim for claim in judge(study) if claim.number == 3)
+    heights = next(claim for claim in coverage_claims(study) if claim.number == 3)
     assert heights.verdict != "holds"
     write_all(tmp_path, study)
 
@@ -150,7 +151,7 @@ def write_all(folder, study):
     save_height_chart(folder / "heights.png", study, "Small junction")
     save_weight_chart(folder / "weights.png", study, "Small junction")
     save_study_table(folder / "coverage.csv", study)
-    save_claims(folder / "claims.md", judge(study), "Small junction")
+    save_claims(folder / "claims.md", coverage_claims(study), "Small junction")
 
 
 def read_table(path):
@@ -175,7 +176,7 @@ def test_the_table_gives_each_sensors_height(study, tmp_path):
 
 
 def test_a_name_with_a_bar_stays_in_its_markdown_cell(tmp_path, study):
-    claims = [replace(claim, text="a | b") for claim in judge(study)]
+    claims = [replace(claim, text="a | b") for claim in coverage_claims(study)]
     save_claims(tmp_path / "claims.md", claims, "Small junction")
     assert "| a \\| b |" in (tmp_path / "claims.md").read_text(encoding="utf-8")
 

@@ -52,7 +52,7 @@ def folder(tmp_path_factory):
     save_blend(folder / "placed.blend")
     for name, start in (("first", -20.0), ("second", -5.0), ("third", 8.0)):
         make_traffic(f"simulated, {name}", start).save(folder / f"{name}.npz")
-        arguments = [str(folder / "placed.blend"), "--traffic", str(folder / f"{name}.npz"), "--engine", "bvh"]
+        arguments = [str(folder / "placed.blend"), "--traffic", str(folder / f"{name}.npz")]
         simulate.main([*arguments, "--duration", "0.2", "-o", str(folder / name)])
     return folder
 
@@ -78,7 +78,7 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
 
 def test_clouds_of_other_sensor_types_are_warned_of(folder, capsys):
     train.main(arguments(folder, "at-home"))
-    learnt = Detector.load(folder / "at-home" / "detector.pt").experience
+    learnt = Detector.load(folder / "at-home" / "detector.pt").training_record
     assert "warning" not in capsys.readouterr().out
     shutil.copytree(folder / "third", folder / "foreign")
     manifest = folder / "foreign" / "manifest.json"

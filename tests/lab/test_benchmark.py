@@ -11,13 +11,13 @@ from headless.lab.benchmark.alone import alone
 from headless.lab.benchmark.approximations import bounding_box, decimated, every_other_channel, thinner
 from headless.lab.benchmark.expense import Expense, peak_memory
 from headless.lab.benchmark.growth import repeated
-from headless.lab.benchmark.placement import Run, compare
-from headless.lab.benchmark.programme import Scope
+from headless.lab.benchmark.placement import SolverRun, compare
+from headless.lab.benchmark.programme import BenchmarkScope
 from headless.lab.benchmark.report import bars
 from headless.lab.benchmark.rivals import RIVALS, can_run
 from headless.lab.benchmark.scans import ScanCost
+from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import Cost
-from headless.street_visibility import street_problem
 
 import bpy
 import numpy as np
@@ -30,8 +30,7 @@ from seip_addon.core.site.scene_geometry import Mesh
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_junction import box_triangles, make_example
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-SMALL = Scope(
+SMALL = BenchmarkScope(
     layout=CandidateSettings(sensors=("type1",), heights=(3.5,), spacing=24.0),
     street=(20, 200, 2),
     counts=(2, 3),
@@ -46,13 +45,14 @@ SMALL = Scope(
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(small_scene, tmp_path_factory):
     pytest.importorskip("embreex", reason="embreex is not installed")
     folder = tmp_path_factory.mktemp("benchmark")
-    benchmark.main([str(SCENE), "-o", str(folder), "--places", "1", "--time-limit", "5"], SMALL)
+    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--time-limit", "5"], SMALL)
     return folder
 
 
+@pytest.mark.slow
 def test_the_page_shows_charts_that_are_there(folder):
     page = (folder / "benchmark.md").read_text(encoding="utf-8")
     for chart in ("visibility", "placement", "growth"):
@@ -60,6 +60,7 @@ def test_the_page_shows_charts_that_are_there(folder):
         assert (folder / "benchmark" / f"{chart}.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_figures_hold_every_way(folder):
     record = json.loads((folder / "benchmark" / "benchmark.json").read_text(encoding="utf-8"))
     assert {"full bvh", "lazy bvh", "full embree", "lazy embree"} <= set(record["visibility"])
@@ -86,7 +87,7 @@ def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():
 
 
 def run_of(instance, way, seconds, objective, bound):
-    return Run(instance, way, Expense(seconds, seconds), 100.0, objective, bound, min(bound, 1000.0), "")
+    return SolverRun(instance, way, Expense(seconds, seconds), 100.0, objective, bound, min(bound, 1000.0), "")
 
 
 def test_bars_are_met_by_what_meets_them_alone():

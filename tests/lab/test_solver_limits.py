@@ -174,7 +174,8 @@ def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: 
 
 def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     tie, time = TieCheck(1e-6, Share(0, 5), 0.0), TimeCheck("plane", 1.0, 1.1, 0.05, proven=False)
-    study = finish(solver_study(1))
+    with patch("headless.lab.stability.solver_limits.ORDERS", (2, 3, 5)):
+        study = finish(solver_study(1, limit=0.2))
     (greedy,) = (check for check in study.greedy if check.count == 4)
     rows = solver_rows(SolverStudy((), (tie,), (greedy,), (time,)))
     assert "68.4%" in rows[1].begins

@@ -5,6 +5,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from headless import stability
+from headless.lab.stability import chapters as stability_chapters
 
 import pytest
 
@@ -27,7 +28,7 @@ COARSE = [
     "--time-limit",
     "2",
 ]
-LITTLE = stability.Scope(
+LITTLE = stability_chapters.StabilityScope(
     grids=8,
     rays=200,
     instances=2,
@@ -41,7 +42,7 @@ def run(folder):
     criterion = "headless.lab.stability.criterion"
     spacings = {"GRID_SPACINGS": (8.0, 6.0), "CANDIDATE_SPACINGS": (30.0, 25.0)}
     with (
-        patch.object(stability, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
+        patch.object(stability_chapters, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
         patch.multiple("seip_addon.core.workflows.convergence", COARSE_CANDIDATES=25.0, JUDGED_ON=4.0, **spacings),
     ):
@@ -78,7 +79,7 @@ def test_the_page_has_all_chapters_and_a_rerun_goes_on(tmp_path, capsys):
 
 @pytest.mark.parametrize(("name", "sentence"), [("none.blend", "no file"), ("alone.blend", "no traffic beside")])
 def test_another_scene_that_is_of_no_use_is_named_before_any_work(tmp_path, name, sentence):
-    (tmp_path / "alone.blend").write_bytes(SCENE.read_bytes())
+    (tmp_path / "alone.blend").write_bytes(b"a scene")
     with pytest.raises(SeipError, match=sentence):
         stability.main([str(SCENE), "-o", str(tmp_path / "docs"), "--other", str(tmp_path / name)])
     assert not (tmp_path / "docs").exists()

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -12,16 +11,14 @@ from headless import compare_detectors
 
 from matplotlib.image import imread
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes"
-RUNS = [str(SCENES / "junction_traffic" / f"run-{number}.npz") for number in (1, 2, 3, 4)]
-COARSE = ["--sensor", "type1", "--heights", "8", "--grid", "8", "--spacing", "25", "--every", "74", "--steps", "2"]
+COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "20", "--every", "29", "--steps", "2"]
 
 
-def test_each_setting_gets_its_price_and_its_precision(tmp_path, monkeypatch):
+def test_each_setting_gets_its_price_and_its_precision(small_scene, tmp_path, monkeypatch):
     default = compare_detectors.DEFAULT
     small = {("default", "default"): default, ("pillars", "0.5 m"): replace(default, pillar=0.5)}
     monkeypatch.setattr(compare_detectors, "SETTINGS", small)
-    compare_detectors.main([str(SCENES / "junction.blend"), "-o", str(tmp_path), *COARSE, "--traffic", *RUNS])
+    compare_detectors.main([str(small_scene), "-o", str(tmp_path), *COARSE])
     first, second = json.loads((tmp_path / "settings.json").read_text(encoding="utf-8"))
     assert (first["name"], first["default"], second["name"], second["default"]) == ("default", True, "0.5 m", False)
     for setting in (first, second):

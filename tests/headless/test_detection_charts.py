@@ -3,12 +3,12 @@
 import math
 
 from headless.charts import detection as detection_charts
-from headless.charts import error_view
+from headless.charts import error_view, style
 from headless.charts.detection import (
-    Cell,
-    Curve,
-    Parts,
-    Setting,
+    BinnedFigure,
+    DetectorSetting,
+    PrecisionCell,
+    PrecisionRecallLine,
     save_count_chart,
     save_coverage_chart,
     save_parts_chart,
@@ -28,10 +28,10 @@ from PIL import Image
 from seip_addon.core.errors import SeipError
 
 CELLS = (
-    Cell("type1", 1, 6_000, 0.2, (0.55, 0.57, 0.59), (0.52, 0.62)),
-    Cell("type1", 2, 12_000, 0.3, (0.70, 0.72, 0.74), (0.67, 0.77)),
-    Cell("type2", 1, 15_000, 0.4, (0.65, 0.66, 0.67), None),
-    Cell("type2", 2, 30_000, 0.6, (0.80, 0.80, 0.80), (0.80, 0.80)),
+    PrecisionCell("type1", 1, 6_000, 0.2, (0.55, 0.57, 0.59), (0.52, 0.62)),
+    PrecisionCell("type1", 2, 12_000, 0.3, (0.70, 0.72, 0.74), (0.67, 0.77)),
+    PrecisionCell("type2", 1, 15_000, 0.4, (0.65, 0.66, 0.67), None),
+    PrecisionCell("type2", 2, 30_000, 0.6, (0.80, 0.80, 0.80), (0.80, 0.80)),
 )
 
 
@@ -45,7 +45,7 @@ def figures(monkeypatch):
         saved.append(figure)
         save(path, figure)
 
-    for module in (detection_charts, error_view):
+    for module in (detection_charts, style):
         monkeypatch.setattr(module, "save_png", keep)
     return saved
 
@@ -111,7 +111,9 @@ def test_coverage_chart_tells_the_correlation(tmp_path, figures):
 
 def test_precision_recall_chart(tmp_path, figures):
     recall, precision = np.array([0.2, 0.5, 0.7]), np.array([1.0, 0.9, 0.6])
-    curves = [Curve(sensor, count, recall, precision, 0.63) for sensor in ("type1", "type2") for count in (1, 2)]
+    curves = [
+        PrecisionRecallLine(sensor, count, recall, precision, 0.63) for sensor in ("type1", "type2") for count in (1, 2)
+    ]
     save_precision_recall_chart(tmp_path / "pr.png", curves, "Junction")
     assert is_drawn(tmp_path / "pr.png")
     (panel,) = figures[0].axes
@@ -123,8 +125,10 @@ def test_precision_recall_chart(tmp_path, figures):
 
 
 def test_parts_chart(tmp_path, figures):
-    by_distance = Parts("distance (m)", "AP", (0, 10, 50, math.inf), {"1 × type1": (0.9, 0.5, math.nan)}, (10, 40, 0))
-    by_density = Parts("returns per m²", "false per frame", (0, 1, 5), {"1 × type1": (2.0, 0.5)})
+    by_distance = BinnedFigure(
+        "distance (m)", "AP", (0, 10, 50, math.inf), {"1 × type1": (0.9, 0.5, math.nan)}, (10, 40, 0)
+    )
+    by_density = BinnedFigure("returns per m²", "false per frame", (0, 1, 5), {"1 × type1": (2.0, 0.5)})
     save_parts_chart(tmp_path / "parts.png", [by_distance, by_density], "Junction")
     assert is_drawn(tmp_path / "parts.png")
     first, second = figures[0].axes
@@ -153,9 +157,9 @@ def test_training_chart_marks_the_best(tmp_path, figures):
 
 def test_setting_chart_marks_the_default(tmp_path, figures):
     settings = [
-        Setting("centre head", "head", 300, 90, 0.82, (0.80, 0.84), default=True),
-        Setting("anchor head", "head", 400, 120, 0.79),
-        Setting("pillars 0.24 m", "pillars", 700, 200, 0.84),
+        DetectorSetting("centre head", "head", 300, 90, 0.82, (0.80, 0.84), default=True),
+        DetectorSetting("anchor head", "head", 400, 120, 0.79),
+        DetectorSetting("pillars 0.24 m", "pillars", 700, 200, 0.84),
     ]
     save_setting_chart(tmp_path / "settings.png", settings, "Junction")
     assert is_drawn(tmp_path / "settings.png")
@@ -260,7 +264,7 @@ def test_nothing_to_draw_is_said(tmp_path, draw):
 
 
 def test_names_are_not_read_as_formulas(tmp_path):
-    cells = [Cell("$a_b$ \\x", 1, 5000, 0.5, (0.5,)), Cell("type1", 1, 9000, 0.6, (0.6,))]
+    cells = [PrecisionCell("$a_b$ \\x", 1, 5000, 0.5, (0.5,)), PrecisionCell("type1", 1, 9000, 0.6, (0.6,))]
     save_count_chart(tmp_path / "count.png", cells, "$x$ _")
     save_price_chart(tmp_path / "price.png", cells, "$x$ _")
     assert is_drawn(tmp_path / "price.png")

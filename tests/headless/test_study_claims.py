@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from headless.coverage_study import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell, judge
+from headless.coverage_study import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell, coverage_claims
 
 import pytest
 
@@ -58,7 +58,7 @@ def study(tell, sensors=TYPES, heights=HEIGHTS):
 
 
 def claim(number, tell, **shape):
-    return next(claim for claim in judge(study(tell, **shape)) if claim.number == number)
+    return next(claim for claim in coverage_claims(study(tell, **shape)) if claim.number == number)
 
 
 def verdict(number, tell, **shape):
@@ -207,8 +207,8 @@ def test_claim_10_compares_greedy_with_what_the_optimum_can_be(cell, says):
 
 
 def test_claims_that_compare_are_left_out_where_there_is_nothing_to_compare():
-    one_type = judge(study(rising(), sensors=("type3",)))
-    one_height = judge(study(rising(), heights=(3.5,)))
+    one_type = coverage_claims(study(rising(), sensors=("type3",)))
+    one_height = coverage_claims(study(rising(), heights=(3.5,)))
     assert [claim.number for claim in one_type] == [2, 10]
     assert [claim.number for claim in one_height] == [1, 2, 4, 10]
-    assert [claim.number for claim in judge(study(rising()))] == [1, 2, 3, 4, 10]
+    assert [claim.number for claim in coverage_claims(study(rising()))] == [1, 2, 3, 4, 10]

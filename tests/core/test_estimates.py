@@ -2,15 +2,7 @@
 
 import math
 
-from headless.detection.intervals import (
-    judge_above,
-    judge_all,
-    judge_within,
-    mean_interval,
-    rank_correlation,
-    rank_correlation_interval,
-    student_quantile,
-)
+from headless.claims import judge_above, judge_all, judge_within
 
 import numpy as np
 import pytest
@@ -19,6 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import (
+    mean_interval,
+    rank_correlation,
+    rank_correlation_interval,
+    student_quantile,
+)
 
 
 @pytest.mark.parametrize("freedom", [*range(1, 31), 59, 60, 1000])

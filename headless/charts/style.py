@@ -1,0 +1,86 @@
+"""Style that all charts share: colours, marks, axes, legends and titles."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from seip_addon.core.estimates import Estimate
+from seip_addon.core.pictures.drawing import save_png
+from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
+
+SERIES = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+"""Colours of series, told apart by colour-blind people (Okabe and Ito 2008)."""
+
+MARKS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours: 42 series before a pair comes again
+DASHED = (0, (4, 2))
+GRID, FAINT = "#e3e6e8", "#c3c9ce"
+
+
+def colour(row: int) -> str:
+    """Return the colour of a series."""
+    return SERIES[row % len(SERIES)]
+
+
+def mark(row: int) -> str:
+    """Return the marker of a series."""
+    return MARKS[row % len(MARKS)]
+
+
+def new_figure(
+    width: float, height: float, panels: int = 1, *, dpi: int = 160, sharey: bool = False
+) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure, ``width`` by ``height`` inches, with panels side by side."""
+    figure = Figure((width, height), dpi=dpi, facecolor=PAPER, layout="constrained")
+    FigureCanvasAgg(figure)  # measures text
+    return figure, list(figure.subplots(1, panels, sharey=sharey, squeeze=False)[0])
+
+
+def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x", "y"] = "both", **font: Any) -> None:  # noqa: ANN401 -- matplotlib's own
+    """Name the axes that are given a name, and draw grid, ticks and borders as in all charts."""
+    if x:
+        panel.set_xlabel(x, color=INK, **font)
+    if y:
+        panel.set_ylabel(y, color=INK, **font)
+    panel.grid(axis=grid, color=GRID, linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.tick_params(which="both", colors=SOFT_INK)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def set_title(figure: Figure, title: str) -> None:
+    """Write the title above all panels."""
+    figure.suptitle(title, color=INK, fontsize=12, parse_math=False)
+
+
+def add_legend(figure: Figure, panels: Sequence[Axes], columns: int | None = None) -> None:
+    """Write one legend of the panels' entries below all panels, in as many columns as there is room for."""
+    handles = [handle for panel in panels for handle in panel.get_legend_handles_labels()[0]]
+    labels = [str(handle.get_label()) for handle in handles]
+    if columns is None:
+        widths, room = [0.6 + 0.07 * len(label) for label in labels], figure.get_figwidth()  # inches, about
+        columns = len(labels) if sum(widths) < room else max(1, int(room // max(widths)))
+    legend = figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=columns)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+
+
+def save_chart(path: str | os.PathLike[str], figure: Figure, title: str, panels: Sequence[Axes] = ()) -> None:
+    """Write title and, where panels are given, their legend, and save the chart as PNG."""
+    if panels:
+        add_legend(figure, panels)
+    set_title(figure, title)
+    save_png(path, figure)
+
+
+def interval_ends(estimate: Estimate) -> tuple[float, float]:
+    """Return the ends of an interval; an open end is drawn at the value."""
+    low, high = (end if math.isfinite(end) else estimate.value for end in (estimate.low, estimate.high))
+    return low, high

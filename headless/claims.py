@@ -1,0 +1,82 @@
+"""Claims of the paper, and how they are judged on one site.
+
+The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
+Evaluation of Infrastructure-based Collective Perception", section V.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from seip_addon.core.estimates import Interval
+from seip_addon.core.storage.files import whole_file
+
+HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "undecided"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper with its verdict on one site.
+
+    Parameters
+    ----------
+    number : int
+        In the paper's list of claims.
+    verdict : str
+        ``holds``, ``does not hold``, or ``undecided`` where bounds or intervals leave it open.
+    evidence : str
+        The figures behind the verdict.
+    """
+
+    number: int
+    text: str
+    verdict: str
+    evidence: str
+
+    def describe(self) -> str:
+        """Return claim, verdict and figures in one line."""
+        return f"claim {self.number} ({self.text}): {self.verdict.upper()}; {self.evidence}"
+
+
+def judge(*, holds: bool, fails: bool) -> str:
+    """Return the verdict on what is known to hold, known to fail, or neither."""
+    if holds:
+        return HOLDS
+    return FAILS if fails else UNDECIDED
+
+
+def judge_above(interval: Interval, least: float = 0.0) -> str:
+    """Return the verdict on a figure that is claimed to be above ``least``, by its 95 % interval."""
+    low, high = interval
+    return judge(holds=low > least, fails=high <= least)
+
+
+def judge_within(interval: Interval, least: float, most: float) -> str:
+    """Return the verdict on a figure that is claimed to be between two values, by its 95 % interval."""
+    low, high = interval
+    return judge(holds=least <= low and high <= most, fails=high < least or low > most)
+
+
+def judge_all(verdicts: Sequence[str]) -> str:
+    """Return the verdict on several claims at once: the worst."""
+    return next((verdict for verdict in (FAILS, UNDECIDED) if verdict in verdicts), HOLDS)
+
+
+def save_claims(path: str | os.PathLike[str], claims: Sequence[Claim], title: str) -> None:
+    """Write claims with their verdicts and figures as a Markdown table."""
+    lines = [
+        f"# {title}: claims of the study on this site",
+        "",
+        "| # | claim | verdict | figures |",
+        "|---|---|---|---|",
+    ]
+    lines += [f"| {c.number} | {_cell(c.text)} | **{c.verdict}** | {_cell(c.evidence)} |" for c in claims]
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _cell(words: str) -> str:
+    """Return text that a Markdown table takes as one cell."""
+    return words.replace("|", "\\|")

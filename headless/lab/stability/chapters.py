@@ -1,0 +1,281 @@
+"""Chapters of the stability page: each drives one method to where it begins to fail."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from headless import survey
+from headless.charts import robust as robust_charts
+from headless.charts import traffic as traffic_charts
+
+from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement.deployment import deploy
+from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, placement_problem
+from seip_addon.core.placement.near_optimal import FlatTop, near_best
+from seip_addon.core.progress import Progress
+from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.traffic_instants import spread_instants
+from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.workflows.survey import surroundings
+from seip_addon.core.workflows.traffic import split_runs
+
+from . import charts as limits_charts
+from .arithmetic import arithmetic_rows, arithmetic_study
+from .criterion import criterion_rows, criterion_study
+from .page import Chapter, Chart
+from .robustness_rows import pose_rows, robust_rows, traffic_rows
+from .solver_limits import solver_rows, solver_study
+
+FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
+"""What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
+
+DETECTOR_RUNS = 3
+"""With more runs of traffic than these a detector can learn and be tried."""
+
+
+@dataclass(frozen=True)
+class StabilityScope:
+    """How much is tried.
+
+    Parameters
+    ----------
+    grids : int
+        Grids of targets, and azimuths, that are drawn at random.
+    rays : int
+        That are held to float64 on each scene.
+    instances : int
+        Random placement problems of each kind.
+    instants : tuple of int
+        Of traffic, to choose on and to judge by.
+    detector : mapping of str to int
+        See `detector_limits`: seeds and steps of trainings.
+    """
+
+    grids: int = 40
+    rays: int = 20_000
+    instances: int = 60
+    poses: StudySettings = field(default_factory=StudySettings)
+    robust: RobustSettings = field(default_factory=RobustSettings)
+    instants: tuple[int, int] = (24, 120)
+    detector: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class StudiedScene:
+    """A scene, laid out and seen.
+
+    Parameters
+    ----------
+    runs : list of Trajectories
+        Traffic; none where there is none beside the scene.
+    scene : path or None
+        Its file; None for the one that is open.
+    others : sequence of path
+        Other scenes, to try on what was learnt on this one.
+    work, charts : path
+        Folders of what a rerun goes on from, and of the charts.
+    """
+
+    surveyed: survey.Survey
+    runs: list[Trajectories]
+    scene: Path | None
+    others: Sequence[Path]
+    work: Path
+    charts: Path
+    scope: StabilityScope
+
+    @property
+    def name(self) -> str:
+        """The scene's name, for titles."""
+        return self.surveyed.layout.site.name
+
+    @property
+    def sensor(self) -> str:
+        """The type in the middle of those that were named: it has something to lose, and something to win."""
+        sensors = list(self.surveyed.layout.models)
+        return sensors[len(sensors) // 2]
+
+    @property
+    def placed(self) -> str:
+        """What is placed, for titles."""
+        return f"{DEFAULT_COUNT} × {self.sensor}"
+
+    def problem(self, sensor: str) -> PlacementProblem:
+        """Return the placement of the usual number of sensors of one type."""
+        layout = self.surveyed.layout
+        problem = placement_problem(layout.site, self.surveyed.grid.visible, layout.models, Goal(count=DEFAULT_COUNT))
+        return replace(problem, forbidden=problem.forbidden | (layout.site.candidates.sensor != sensor))
+
+
+Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
+
+
+def chapters(stage: StudiedScene) -> Iterator[tuple[str, Work]]:
+    """Yield the chapters that a scene allows, by the names that they are kept under."""
+    yield "criterion", criterion
+    yield "arithmetic", arithmetic
+    yield "solvers", solvers
+    yield "poses", poses
+    yield "failures", failures
+    if len(stage.runs) > 1:
+        yield "traffic", traffic
+    if importlib.util.find_spec("torch") and len(stage.runs) > DETECTOR_RUNS:
+        yield "detector", detector
+
+
+def criterion(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Vary what defines visibility."""
+    layout = stage.surveyed.layout
+    delta = layout.settings.visibility.delta
+    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=stage.scope.grids)
+    limits_charts.save_ring_border_chart(stage.charts / "ring_borders.png", study, delta, f"{stage.name}: rings and δ")
+    limits_charts.save_border_check_chart(stage.charts / "beyond_border.png", study, f"{stage.name}: beyond the border")
+    limits_charts.save_delta_chart(stage.charts / "delta.png", study, delta, f"{stage.name}: coverage against δ")
+    limits_charts.save_convergence_chart(stage.charts / "convergence.png", study, f"{stage.name}: spacings")
+    return Chapter(
+        "The criterion of visibility",
+        tuple(criterion_rows(study, delta)),
+        (
+            Chart("ring_borders.png", "From which distance on rings on a level road are more than 2δ apart"),
+            Chart("beyond_border.png", "Share of the targets in view that count as seen, by distance in borders"),
+            Chart("delta.png", "Coverage of the best placement, and what its sensors have in view, against δ"),
+            Chart("convergence.png", "Coverage of the best placement against the spacings of targets and posts"),
+        ),
+    )
+
+
+def arithmetic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Hold the ray casters to float64."""
+    study = yield from arithmetic_study(stage.scope.rays)
+    limits_charts.save_rounding_chart(stage.charts / "rounding.png", study, "Hits against float64")
+    return Chapter(
+        "Arithmetic",
+        tuple(arithmetic_rows(study)),
+        (Chart("rounding.png", "How far hits are off, against distance from the origin and a stray mesh's distance"),),
+    )
+
+
+def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Drive the solvers to where they fail, and see how flat the top is."""
+    study = yield from solver_study(stage.scope.instances)
+    tops: list[tuple[str, FlatTop]] = []
+    for sensor in stage.surveyed.layout.models:
+        problem = stage.problem(sensor)
+        best = yield from solve(problem, solver=stage.surveyed.layout.settings.solver)
+        top = yield from near_best(problem, best.chosen)
+        if top is not None:
+            tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
+    limits_charts.save_solver_chart(stage.charts / "solvers.png", study, "Solvers at their limits")
+    limits_charts.save_flat_top_chart(stage.charts / "flat_top.png", tops, f"{stage.name}: how flat the top is")
+    return Chapter(
+        "Solvers",
+        tuple(solver_rows(study, tops)),
+        (
+            Chart("solvers.png", "What answers lose on random and adversarial instances"),
+            Chart("flat_top.png", "Placements within 1 % of the best, by how many positions they share with it"),
+        ),
+    )
+
+
+def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Let the poses of a placement err."""
+    layout, around = stage.surveyed.layout, surroundings(stage.surveyed.layout)
+    study = yield from robust_study(around, stage.problem(stage.sensor), _settings(stage))
+    chosen = study.nominal[0].placement.chosen
+    deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
+    judged = yield from pose_study(around, deployment, stage.scope.poses)
+    robust_charts.save_spread_chart(stage.charts / "spread.png", study, f"{stage.placed} under pose errors")
+    robust_charts.save_blame_chart(stage.charts / "blame.png", judged, f"{stage.placed}: what costs coverage")
+    robust_charts.save_frontier_chart(
+        stage.charts / "frontier.png", study, f"{stage.placed}: what robustness costs and saves"
+    )
+    return Chapter(
+        f"Poses that err: {stage.placed}",
+        (*pose_rows(judged), *robust_rows(study)),
+        (
+            Chart(
+                "spread.png", "Distribution of coverage over unseen draws: the nominal optimum and robust placements"
+            ),
+            Chart("blame.png", "Mean loss when one sensor alone errs, and when one kind of error alone occurs"),
+            Chart("frontier.png", "What robustness costs in planned coverage, and what it saves in the 5 % quantile"),
+        ),
+    )
+
+
+def failures(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Let a sensor fail, and ask for more than one look."""
+    around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
+    study = yield from robust_study(around, problem, _settings(stage), FAILURES)
+    robust_charts.save_spread_chart(stage.charts / "failures.png", study, f"{stage.placed}: failures")
+    caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
+    return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))
+
+
+def traffic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Let vehicles stand in the way of a placement."""
+    layout = stage.surveyed.layout
+    around, problem, settings = surroundings(layout), stage.problem(stage.sensor), layout.settings
+    to_choose_on, to_judge_in = split_runs(stage.runs)
+    choose, judge = stage.scope.instants
+    scenarios = yield from look_at_traffic(around, problem, spread_instants(to_choose_on, choose, seed=0))
+    judged = spread_instants(to_judge_in, judge, seed=1)
+    steps = traffic_study(
+        around,
+        problem,
+        scenarios,
+        judged,
+        **settings.limits,
+    )
+    study = yield from steps
+    chosen = study.traffic.placement.chosen
+    deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
+    title = f"{stage.placed} in traffic"
+    traffic_charts.save_time_map(
+        stage.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
+    )
+    traffic_charts.save_promise_chart(stage.charts / "promise.png", [(stage.placed, study)], title)
+    return Chapter(
+        f"Traffic that hides things: {stage.placed}",
+        traffic_rows(study),
+        (
+            Chart("time_seen.png", "Share of time for which each target, and the point above it, is seen in traffic"),
+            Chart("promise.png", "What placements see on the empty road and, on average over time, in traffic"),
+        ),
+    )
+
+
+def detector(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Train detectors, and try them until they fail."""
+    from headless.lab.detector import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
+    from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
+    from headless.lab.detector.chapter import detector_limits  # noqa: PLC0415 -- as above
+
+    study = yield from detector_limits(stage.surveyed, stage.scene, stage.others, stage.work, **stage.scope.detector)
+    limit_charts.save_limits_chart(stage.charts / "detector.png", study)
+    charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
+    if study.foreign:
+        limit_charts.save_foreign_chart(stage.charts / "detector_away.png", study)
+        charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
+    return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
+
+
+def _settings(stage: StudiedScene) -> RobustSettings:
+    return replace(stage.scope.robust, **stage.surveyed.layout.settings.limits)
+
+
+def introduction(stage: StudiedScene) -> str:
+    """Return what the page begins with."""
+    site = stage.surveyed.layout.site
+    return (
+        "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
+        f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "
+        "Brackets hold 95 % intervals. Warnings about a scene and a placement stand in the panel, in the batch output "
+        "and in `placement.json`, what traffic leaves of one as soon as it is tried there; those about detectors come "
+        "from the commands that use them."
+    )

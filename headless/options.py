@@ -1,0 +1,95 @@
+"""Command-line options, made from the settings that they set."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from types import NoneType
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.goal import Goal
+from seip_addon.core.settings import Setting, settings_of
+
+Options = TypeVar("Options")
+
+
+class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
+    """Help that names the default of each option that has one."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, [], math.inf) else super()._get_help_string(action)
+
+
+def new_parser(prog: str, description: str) -> argparse.ArgumentParser:
+    """Return a parser whose help names defaults."""
+    return argparse.ArgumentParser(prog=prog, description=description, formatter_class=HelpWithDefaults)
+
+
+def add_settings(group: argparse._ActionsContainer, kind: type, *names: str) -> None:
+    """Add an option for each of the named fields of a settings class, with their types, defaults and help."""
+    hints, known = get_type_hints(kind), settings_of(kind)
+    for name in names:
+        about, default = known[name]
+        group.add_argument(_option(name, about), help=about.help, **_arguments(hints[name], default, about))
+
+
+def read_settings(kind: type[Options], options: argparse.Namespace, **values: Any) -> Options:  # noqa: ANN401 -- of fields of any type
+    """Return the settings that options name; ``values`` are of fields that have no option of their own."""
+    for name, (about, _) in settings_of(kind).items():
+        dest = _option(name, about).lstrip("-").replace("-", "_")
+        if name not in values and hasattr(options, dest):
+            value = getattr(options, dest)
+            values[name] = tuple(value) if isinstance(value, list) else value
+    return kind(**values)
+
+
+def add_goal(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """Add what a goal is made of to a command, but for a coverage to reach, and return the group."""
+    goal = parser.add_argument_group("goal")
+    add_settings(goal, Goal, "count", "budget")
+    goal.add_argument("--weighted", action="store_true", help="count targets by the weights of their regions")
+    add_settings(goal, Goal, "central_weight", "min_distance", "forbidden", "mandatory")
+    return goal
+
+
+def read_goal(options: argparse.Namespace) -> Goal:
+    """Return the goal that options of `add_goal` name."""
+    weight = "scene" if options.weighted and options.central_weight is None else options.central_weight
+    return read_settings(Goal, options, central_weight=weight)
+
+
+def _option(name: str, about: Setting) -> str:
+    return f"--{about.option or name.replace('_', '-')}"
+
+
+def _arguments(hint: Any, default: Any, about: Setting) -> dict[str, Any]:  # noqa: ANN401 -- any type, any value
+    """Return what argparse is to know of an option: flags, choices, numbers, or several of them."""
+    if hint is bool:
+        return {"action": "store_true"}
+    arguments: dict[str, Any] = {"default": default, "metavar": about.metavar}
+    if about.read is not None:
+        return arguments | {"nargs": "+", "action": _reading(about.read)}
+    parts = [part for part in get_args(hint) if part is not NoneType]
+    if get_origin(hint) is Literal:
+        return {"default": default, "choices": tuple(parts)}
+    if get_origin(hint) is tuple:
+        several = "+" if Ellipsis in parts else len(parts)
+        return arguments | {"nargs": several, "type": parts[0], "default": list(default) if default == () else default}
+    return arguments | {"type": parts[0] if parts else hint}
+
+
+def _reading(read: Callable[[Sequence[str]], Any]) -> type[argparse.Action]:
+    """Return what stores the value that several texts name."""
+
+    class Reading(argparse.Action):
+        def __call__(
+            self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object, *_: object
+        ) -> None:
+            try:
+                setattr(namespace, self.dest, read(values if isinstance(values, list) else []))
+            except SeipError as error:
+                parser.error(f"argument {'/'.join(self.option_strings)}: {error}")
+
+    return Reading

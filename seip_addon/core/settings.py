@@ -1,0 +1,52 @@
+"""Fields of settings that carry what commands and panel say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any
+
+_KEY = "setting"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a user is told of a setting.
+
+    Parameters
+    ----------
+    help : str
+        What it is, as the options of commands say it.
+    unit : str
+        ``m``, ``°``, ``s``, ``USD`` …; empty for what has none.
+    minimum, maximum : float, optional
+        Least and largest value that is accepted.
+    option : str
+        Name of the command-line option, that of the field if empty.
+    metavar : str
+        What stands for the value in the help of a command.
+    read : callable, optional
+        From the texts that were typed to the value, for settings that are more than plain numbers.
+    """
+
+    help: str
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    option: str = ""
+    metavar: str | None = None
+    read: Callable[[Sequence[str]], Any] | None = None
+
+
+def setting(default: Any, help: str, **about: Any) -> Any:  # noqa: A002, ANN401 -- a field of any type, and the word of argparse
+    """Return a dataclass field with a default and a `Setting`, whose other parameters are given by name."""
+    return field(default=default, metadata={_KEY: Setting(help, **about)})
+
+
+def settings_of(kind: type) -> dict[str, tuple[Setting, Any]]:
+    """Return the settings of a dataclass with their defaults, by the names of their fields."""
+    return {
+        each.name: (each.metadata[_KEY], None if each.default is MISSING else each.default)
+        for each in fields(kind)
+        if _KEY in each.metadata
+    }

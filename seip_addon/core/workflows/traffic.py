@@ -1,0 +1,144 @@
+"""Placement for the road in traffic as one job, from recorded runs to deployment."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import TypeVar
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..placement.deployment import deploy
+from ..placement.goal import Goal, Plan, placement_problem, with_count
+from ..progress import Progress
+from ..robustness.traffic_instants import check_runs, spread_instants
+from ..robustness.traffic_presence import road_user_seconds
+from ..robustness.traffic_study import WHAT, TrafficStudy, look_at_traffic, traffic_study, traffic_warnings
+from ..robustness.traffic_views import Layer
+from ..settings import setting
+from ..site.site import Site
+from ..traffic import Trajectories
+from ..traffic.run_overlap import require_independent, vehicle_positions
+from ..visibility.grid import VisibilityGrid
+from .survey import Layout, surroundings
+
+_Run = TypeVar("_Run")
+
+EVALUATION_SHARE = 1 / 3
+"""Share of the runs, the last ones, that placements are evaluated in and not chosen on."""
+
+
+@dataclass(frozen=True)
+class TrafficSettings:
+    """What a placement for traffic is chosen on, and evaluated by.
+
+    Parameters
+    ----------
+    layer : {"road", "height"}
+        The targets on the road, or the points above them.
+    weights_from_traffic : bool
+        Whether targets weigh as many seconds as road users are there.
+
+    Raises
+    ------
+    SeipError
+        There is no instant to choose on, or none to evaluate by.
+    """
+
+    layer: Layer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
+    weights_from_traffic: bool = setting(default=False, help="weigh targets by the time that road users are there")
+    instants: int = setting(24, "of traffic to choose on", minimum=1)
+    judged_at: int = setting(120, "of traffic to judge by", minimum=1, metavar="INSTANTS")
+    seed: int = setting(0, "of the instants; those to judge by have the next")
+
+    def __post_init__(self) -> None:
+        for number in (self.instants, self.judged_at):
+            if number < 1:
+                raise SeipError(f"ask for one instant of traffic or more, not {number}")
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficRuns:
+    """Runs of traffic by what they are for.
+
+    Parameters
+    ----------
+    optimisation, evaluation : list of Trajectories
+        To choose a placement on, and to evaluate it in.
+    overlap : str
+        How much the two overlap, as a sentence.
+    """
+
+    optimisation: list[Trajectories]
+    evaluation: list[Trajectories]
+    overlap: str
+
+
+@dataclass(frozen=True, eq=False)
+class TrafficPlan:
+    """A plan for traffic with the study that it comes from: objective, bound and gap are of coverage in traffic."""
+
+    plan: Plan
+    study: TrafficStudy
+
+
+def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
+    """Return the runs to choose on, and those to evaluate in."""
+    last = max(1, round(EVALUATION_SHARE * len(runs)))
+    return list(runs[:-last]), list(runs[-last:])
+
+
+def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
+    """Read runs, in the local axes of an origin."""
+    return [Trajectories.load(path).moved_to(origin) for path in paths]
+
+
+def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRuns:
+    """Split runs, given by name in the axes of the site, and check that both parts show traffic of their own there.
+
+    Raises
+    ------
+    SeipError
+        There are fewer than two, one is of another place, or two are nearly the same.
+    """
+    if len(runs) < 2:
+        raise SeipError(
+            f"{len(runs)} runs of traffic are too few: name two or more with --traffic, made by headless/traffic.py "
+            "with a seed each; the last third of them judges what is chosen on the others"
+        )
+    check_runs(list(runs.values()), site.region)
+    positions = [vehicle_positions(name, run) for name, run in runs.items()]
+    overlap = require_independent(product(*split_runs(positions)))
+    return TrafficRuns(*split_runs(list(runs.values())), overlap)
+
+
+def place_in_traffic(
+    layout: Layout, grid: VisibilityGrid, goal: Goal, runs: TrafficRuns, settings: TrafficSettings
+) -> Generator[Progress, None, TrafficPlan]:
+    """Answer a goal on a survey for the road in traffic, whose vehicles block the view.
+
+    Parameters
+    ----------
+    grid : VisibilityGrid
+        Of the empty road.
+    """
+    problem = placement_problem(layout.site, grid.visible, layout.models, goal)
+    if settings.weights_from_traffic:
+        seconds = yield from road_user_seconds(layout.site.targets, runs.optimisation)
+        problem = replace(problem, weights=problem.weights * seconds)
+    around = surroundings(layout)
+    chosen_at = spread_instants(runs.optimisation, settings.instants, settings.seed)
+    scenarios = yield from look_at_traffic(around, problem, chosen_at, settings.layer)
+    judged = spread_instants(runs.evaluation, settings.judged_at, settings.seed + 1)
+    study = yield from traffic_study(around, problem, scenarios, judged, **layout.settings.limits)
+    placement = study.traffic.placement
+    note = (
+        f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "
+        "bound and gap are of that"
+    )
+    weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
+    noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
+    deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
+    return TrafficPlan(Plan(with_count(goal, layout.site), noted, None, deployment), study)
