@@ -12,11 +12,13 @@ from placement_oracle import all_placements, covered, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement.bounds import lagrangian_bound
+from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_placement import allowed_sensors, solve_robust
-from seip_addon.core.robustness.robust_search import CountedCover, RobustSearch
+from seip_addon.core.robustness.robust_search import BestUnderRisk
 from seip_addon.core.robustness.views import Views
 
 RISKS = [
@@ -135,47 +137,36 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
         assert answer.status == "optimal" or any("too short" in note for note in answer.notes)
 
 
-class Branches:
-    """A clock that runs out after so many branches."""
-
-    def __init__(self, number):
-        self.number = number
-
-    @property
-    def left(self):
-        self.number -= 1
-        return self.number + 1
-
-    def spend(self, operations):
-        pass
-
-
 @pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
-@pytest.mark.parametrize("open_branches", [10_000, 3])
-def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, open_branches, monkeypatch):
-    monkeypatch.setattr("seip_addon.core.robustness.robust_search.OPEN", open_branches)
+@pytest.mark.parametrize("waiting", [10_000, 3])
+def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting, monkeypatch):
+    monkeypatch.setattr("seip_addon.core.placement.branch_and_bound.WAITING", waiting)
     problem, views = crowd(5, 5)
     instance, scale = make_instance(problem)
-    worth = risk.worth(5)
+    instance = replace(instance, cover=risk.cover(5))
     best = reached_at_most(problem, views[:1], risk)
 
-    def judge(chosen):
+    def evaluate(chosen):
         seen = views[:1, instance.original[chosen]].astype(np.uint8)
         return risk.of(risk.outcomes(seen, problem.weights, 5))
 
+    start = np.zeros(0, dtype=np.int64)
+    root = finish(lagrangian_bound(instance, 0.0, Clock(math.inf)))
+
     def searched(branches):
-        start = np.zeros(0, dtype=np.int64)
-        search = RobustSearch(CountedCover(instance, worth), scale * worth.unit, judge, start, 1e-9)
-        return finish(search.run(Branches(branches)))
+        search = BestUnderRisk(instance, scale * instance.cover.unit, evaluate, start, 1e-9, root)
+        finished = finish(search.run(Clock(math.inf), math.inf, branches))
+        return search, finished
 
     found = [searched(branches) for branches in (0, 1, 2, 4, 8, 16, 32, 64, 128, 100_000)]
-    bounds = [each.bound for each in found]
+    bounds = [search.bound for search, _ in found]
     assert bounds == sorted(bounds, reverse=True)
     assert bounds[0] > bounds[4]
-    assert all(each.value <= best * (1 + 1e-12) and each.bound >= best * (1 - 1e-12) for each in found)
-    assert found[-1].finished
-    assert found[-1].value == pytest.approx(best)
-    assert found[-1].bound == pytest.approx(best)
+    assert all(search.value <= best * (1 + 1e-12) and search.bound >= best * (1 - 1e-12) for search, _ in found)
+    last, finished = found[-1]
+    assert finished
+    assert last.value == pytest.approx(best)
+    assert last.bound == pytest.approx(best)
 
 
 @given(under_risk(risks=[Risk()]))
@@ -225,23 +216,23 @@ def test_the_order_of_candidates_does_not_matter(case, random):
 
 @given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
 def test_no_failure_leaves_a_target_worth_more(seen_by, failure, sensors):
-    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    cover = Risk(seen_by=seen_by, failure=failure).cover(sensors)
     for times in range(sensors + 1):
         for used in range(max(times, 1), sensors + 1):
             after = 1 - seen_by / used if times == seen_by else float(times > seen_by)
             left = float(times >= seen_by) if failure == "none" else after
-            assert worth.reached(np.array([times]))[0] / worth.unit >= left - 1e-12
+            assert cover.value(np.array([times]))[0] / cover.unit >= left - 1e-12
 
 
 @given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
 def test_what_is_to_come_is_bounded_by_the_least_concave_function(seen_by, failure, sensors):
-    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    cover = Risk(seen_by=seen_by, failure=failure).cover(sensors)
     for times in range(sensors + 1):
         seen = np.array([times])
-        assert worth.added(seen, 1)[0] == worth.reached(seen + 1)[0] - worth.reached(seen)[0]
+        assert cover.increment(seen, 1)[0] == cover.value(seen + 1)[0] - cover.value(seen)[0]
         for left in range(sensors + 2):
-            rises = [worth.added(seen, left, level)[0] for level in range(worth.top)]
-            reached = [worth.reached(seen + more)[0] - worth.reached(seen)[0] for more in range(left + 1)]
+            rises = [cover.increment(seen, left, level)[0] for level in range(cover.top)]
+            reached = [cover.value(seen + more)[0] - cover.value(seen)[0] for more in range(left + 1)]
             bounds = np.concatenate([[0], np.cumsum(rises), np.full(left, np.sum(rises))])[: left + 1]
             assert (np.diff(rises) <= 0).all()
             assert (bounds >= reached).all()

@@ -14,7 +14,7 @@ from ..progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .clock import Clock
 from .feasibility import starting_choice
-from .greedy import greedy, greedy_and_exchange, without_idle
+from .greedy import greedy, greedy_with_swaps, without_idle
 from .instance import Instance, common_unit, make_instance
 from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, record_choice, relative_gap
@@ -92,12 +92,12 @@ def _reaching(
 ) -> Generator[Progress, None, Integer]:
     """Return some placement that reaches the goal."""
     start = yield from starting_choice(problem, instance, solver)
-    chosen, _ = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
-    if instance.covered(chosen) >= goal - instance.slack:
+    chosen = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
+    if instance.value(chosen) >= goal - instance.slack:
         return chosen
-    first = yield from greedy_and_exchange(instance, start)
+    first = yield from greedy_with_swaps(instance, start)
     proof = yield from prove(instance, first, solver, clock)
-    covered = instance.covered(proof.chosen)
+    covered = instance.value(proof.chosen)
     if covered >= goal - instance.slack:
         return proof.chosen
     wanted = f"a coverage of {goal / whole:.2%}"
@@ -128,7 +128,7 @@ def _cheapest(
         single = float(instance.price[0])
         return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
     cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
-    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups), goal)
     keep, cheaper = keep[within], cheaper.part(within)
     if len(keep) == 0:
         return chosen, price

@@ -131,21 +131,19 @@ class _NearBest(Search):
         """Take a placement, and those that have another candidate in place of one of its own."""
         self.offer(chosen)
         for kept in (np.delete(chosen, number) for number in range(len(chosen))):
-            values = self.instance.covered(kept) + self.instance.gains(self.instance.uncovered(kept))
+            increments = self.instance.increments(self.instance.times(kept))
+            values = self.instance.value(kept) + self.instance.gains(increments)
             for other in np.setdiff1d(np.flatnonzero(values >= self.goal), kept):
                 self.offer(np.append(kept, other))
 
-    def _take(self, placement: Integer, value: float) -> float:
-        key = tuple(placement.tolist())
+    def _take(self, placement: Integer) -> float:
+        key, value = tuple(placement.tolist()), self.instance.value(placement)
         if value >= self.goal and key not in self.found and self.instance.feasible(placement):
             if len(self.found) == MOST_LISTED:
                 self.satisfied = True
             else:
                 self.found[key] = value
         return self.goal
-
-    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- coverage is all
-        return False
 
 
 def _in_rows(placements: Sequence[Integer], least: int) -> Integer:

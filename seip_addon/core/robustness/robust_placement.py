@@ -38,14 +38,17 @@ import numpy as np
 from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..placement import Placement, PlacementProblem, solve
+from ..placement.bounds import lagrangian_bound
+from ..placement.branch_and_bound import FIRST_STEPS
 from ..placement.clock import Clock
 from ..placement.feasibility import starting_choice
+from ..placement.greedy import swap_search
 from ..placement.instance import Instance, common_unit, make_instance, merge_targets
 from ..placement.problem import TIE, relative_gap
 from ..placement.solver import solve_within
 from ..progress import Progress, within
 from .risk import Risk
-from .robust_search import CountedCover, RobustSearch, exchanged, exchanged_as_judged, exchanged_from_pairs
+from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .views import Views
 
 ROUNDS = 16
@@ -275,13 +278,16 @@ def _searched(
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
     yield Progress(0, 0, "reducing the scenarios' targets")
     whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
-    game = _Game(problem, scenarios, risk, whole)
+    game = FictitiousPlay(problem, scenarios, risk, whole)
     start = yield from starting_choice(problem, whole, solver)
     chosen, share = yield from game.play(start, clock)
-    search = RobustSearch(game.cover(share), game.unit(share), game.judge, chosen, TIE * math.fsum(problem.weights))
-    found = yield from search.run(clock)
-    notes = () if found.finished else ("the time was too short to prove this placement the best: the gap says how far",)
-    return _record(problem, whole.original[found.chosen], found.value, found.bound, notes, clock.seconds)
+    instance, unit, slack = game.instance(share), game.unit(share), TIE * math.fsum(problem.weights)
+    goal = (game.evaluate(chosen) - slack) * unit
+    root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
+    search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
+    finished = yield from search.run(clock, clock.left)
+    notes = () if finished else ("the time was too short to prove this placement the best: the gap says how far",)
+    return _record(problem, whole.original[search.best], search.value, search.bound, notes, clock.seconds)
 
 
 def _record(  # what is known of a placement
@@ -303,8 +309,8 @@ def _record(  # what is known of a placement
     )
 
 
-class _Game:
-    """Placements against scenarios: who places fears the worst of them.
+class FictitiousPlay:
+    """Weights of scenarios with a small bound: placements answer the scenarios that were worst before.
 
     Parameters
     ----------
@@ -318,35 +324,35 @@ class _Game:
         self._used = problem.weights > 0
         self._unit, _ = common_unit(problem.weights[self._used])
         self._sensors = allowed_sensors(problem)
-        self._worth = risk.worth(self._sensors)
+        self._cover = risk.cover(self._sensors)
 
-    def judge(self, chosen: Integer) -> float:
+    def evaluate(self, chosen: Integer) -> float:
         """Return T of candidates of the whole instance."""
         seen = _seen(self._scenarios, self._whole.original[chosen])
         return self._risk.of(self._risk.outcomes(seen, self._weight, self._sensors))
 
-    def cover(self, share: Integer) -> CountedCover:
-        """Return F for whole shares of the scenarios."""
+    def instance(self, share: Integer) -> Instance:
+        """Return the instance whose objective value is F, for whole shares of the scenarios."""
         weight = np.rint(self._weight[self._used] / self._unit)
         scenarios = np.flatnonzero(share).tolist()
         columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
         weights = np.concatenate([share[k] * weight for k in scenarios])
         visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
-        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._worth)
+        return replace(self._whole, visible=visible, weight=merged, cover=self._cover)
 
     def unit(self, share: Integer) -> float:
         """Return by what T is to be multiplied to be compared with F."""
-        return float(share.sum()) * self._worth.unit / self._unit
+        return float(share.sum()) * self._cover.unit / self._unit
 
     def play(self, start: Integer, clock: Clock) -> Generator[Progress, None, tuple[Integer, Integer]]:
         """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
         even = np.ones(len(self._scenarios), dtype=np.int64)
-        cover = self.cover(even)
-        chosen = yield from exchanged(cover, start)
-        if not self._worth.concave:
-            chosen = yield from exchanged_from_pairs(cover, start, chosen, clock)
-            chosen = yield from exchanged_as_judged(cover, self.judge, chosen)
-        best, value = chosen, self.judge(chosen)
+        instance = self.instance(even)
+        chosen = yield from swap_search(instance, start)
+        if not self._cover.concave:
+            chosen = yield from swap_search_from_pairs(instance, start, chosen, clock)
+            chosen = yield from swap_search_by_risk(instance, self.evaluate, chosen)
+        best, value = chosen, self.evaluate(chosen)
         if self._risk.counted(len(even)) == len(even):
             return best, even
         share = np.zeros_like(even)
@@ -357,7 +363,7 @@ class _Game:
             clock.spend(2 * self._scenarios.packed.size * 8)
             seen = _seen(self._scenarios, self._whole.original[chosen])
             share[self._risk.worst(self._risk.outcomes(seen, self._weight, self._sensors))] += 1
-            chosen = yield from exchanged(self.cover(share), chosen)
-            if self.judge(chosen) > value:
-                best, value = chosen, self.judge(chosen)
+            chosen = yield from swap_search(self.instance(share), chosen)
+            if self.evaluate(chosen) > value:
+                best, value = chosen, self.evaluate(chosen)
         return best, share if share.any() else even
