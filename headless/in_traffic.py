@@ -79,9 +79,7 @@ def _studied(surveyed: survey.Survey, goal: Goal, options: argparse.Namespace) -
         problem,
         scenarios,
         judged,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
+        settings.limits,
     )
     return watch.run("placement in traffic", steps)
 

@@ -30,7 +30,7 @@ from headless.lab.stability.solver_limits import solver_rows, solver_study
 from headless.traffic_runs import load_runs, parted, runs_beside
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
 from seip_addon.core.placement.near_optimal import FlatTop, near_best
@@ -226,7 +226,7 @@ def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
     tops: list[tuple[str, FlatTop]] = []
     for sensor in stage.surveyed.layout.models:
         problem = stage.problem(sensor)
-        best = yield from solve(problem, solver=stage.surveyed.layout.settings.solver)
+        best = yield from solve(problem, SolverLimits(stage.surveyed.layout.settings.solver))
         top = yield from near_best(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
@@ -289,9 +289,7 @@ def traffic(stage: Stage) -> Generator[Progress, None, Chapter]:
         problem,
         scenarios,
         judged,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
+        settings.limits,
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
@@ -327,8 +325,7 @@ def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
 
 
 def _settings(stage: Stage) -> RobustSettings:
-    settings = stage.surveyed.layout.settings
-    return replace(stage.scope.robust, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
+    return replace(stage.scope.robust, limits=stage.surveyed.layout.settings.limits)
 
 
 def _lead(stage: Stage) -> str:

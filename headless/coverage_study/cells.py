@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
-from seip_addon.core.placement import Placement, solve, solve_greedy
+from seip_addon.core.placement import Placement, SolverLimits, solve, solve_greedy
 from seip_addon.core.placement.deployment import Deployment, deploy
 from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import Progress, within
@@ -213,6 +213,6 @@ def solve_cell(  # noqa: PLR0913 -- a problem, and the limits of its solution
         allowed &= site.candidates.height == cell.height
     goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
-    placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+    placement = yield from solve(problem, SolverLimits(solver, time_limit, effort))
     deployment = deploy(site, models, visible, placement.chosen)
     return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

@@ -11,12 +11,10 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
+from seip_addon.core.robustness.estimates import TAIL, student_quantile
 
 Interval = tuple[float, float]
 """Least and largest value that a 95 % interval holds."""
-
-TAIL = 0.025
-"""Share of probability on either side of an interval."""
 
 RESAMPLES = 2000
 
@@ -46,21 +44,6 @@ def mean_interval(values: Sequence[float]) -> Interval:
     mean, spread = float(np.mean(values)), float(np.std(values, ddof=1))
     reach = student_quantile(count - 1) * spread / math.sqrt(count)
     return mean - reach, mean + reach
-
-
-def student_quantile(freedom: int) -> float:
-    """Return the value that Student's t exceeds with a probability of 2.5 %.
-
-    Parameters
-    ----------
-    freedom : int
-        Degrees of freedom, at least 1.
-    """
-    low, high = 1.0, 13.0  # between the normal quantile, 1.96, and that of one degree, 12.706
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _beyond(middle, freedom) > TAIL else (low, middle)
-    return (low + high) / 2
 
 
 def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
@@ -109,21 +92,6 @@ def judge_within(interval: Interval, least: float, most: float) -> str:
 def judge_all(verdicts: Sequence[str]) -> str:
     """Return the verdict on several claims at once: the worst."""
     return next((verdict for verdict in (FAILS, UNDECIDED) if verdict in verdicts), HOLDS)
-
-
-def _beyond(value: float, freedom: int) -> float:
-    """Return the probability that Student's t exceeds a positive value (Abramowitz and Stegun 1964, 26.7.3, 26.7.4)."""
-    angle = math.atan(value / math.sqrt(freedom))
-    odd = freedom % 2
-    term = math.cos(angle) if odd else 1.0
-    total = 0.0
-    for step in range(freedom // 2):
-        if step:
-            term *= (2 * step - 1 + odd) / (2 * step + odd) * math.cos(angle) ** 2
-        total += term
-    total *= math.sin(angle)
-    within = 2 / math.pi * (angle + total) if odd else total
-    return (1 - within) / 2
 
 
 def _ranks(values: Float) -> Float:

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from placement_oracle import all_placements, covered, small_problems
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.bounds import lagrangian_bound
 from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_placement import allowed_sensors, solve_robust
+from seip_addon.core.robustness.robust_placement import solve_robust
 from seip_addon.core.robustness.robust_search import BestUnderRisk
 from seip_addon.core.robustness.views import Views
 
@@ -49,7 +49,7 @@ def under_risk(draw, risks=RISKS):
     flips = rng.random((draw(st.integers(1, 4)), *problem.visible.shape)) < draw(st.sampled_from([0.1, 0.3]))
     views = problem.visible ^ flips
     views[:, 0] |= problem.visible[0]
-    possible = [risk for risk in risks if risk.least_sensors <= allowed_sensors(problem)]
+    possible = [risk for risk in risks if risk.least_sensors <= problem.most_sensors]
     assume(possible and all_placements(problem))
     return problem, views, draw(st.sampled_from(possible))
 
@@ -65,8 +65,8 @@ def by_hand(problem, views, risk, choice):
     for view in views:
         whole = weight_seen(view, choice)
         left = [weight_seen(view, [i for i in choice if i != gone]) for gone in choice] or [0.0]
-        spare = allowed_sensors(problem) - len(choice)  # sensors that may fail without being missed
-        mean = (sum(left) + spare * whole) / allowed_sensors(problem) if choice else 0.0
+        spare = problem.most_sensors - len(choice)  # sensors that may fail without being missed
+        mean = (sum(left) + spare * whole) / problem.most_sensors if choice else 0.0
         outcomes.append({"none": whole, "worst": min(left), "mean": mean}[risk.failure])
     counted = max(1, math.ceil(risk.tail * len(outcomes) - 1e-9))
     return sum(sorted(outcomes)[:counted]) / counted
@@ -76,7 +76,7 @@ def by_hand(problem, views, risk, choice):
 @settings(max_examples=150, deadline=None)
 def test_no_subset_is_better(case):
     problem, views, risk = case
-    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    answer = finish(solve_robust(problem, pack(views), risk))
     best = max(by_hand(problem, views, risk, choice) for choice in all_placements(problem))
     choice = tuple(answer.chosen.tolist())
     assert sorted(choice) in [sorted(one) for one in all_placements(problem)]
@@ -119,7 +119,7 @@ def reached_at_most(problem, views, risk):
 @pytest.mark.parametrize("count", [4, 5])
 def test_no_placement_is_better_where_branches_are_many(risk, count):
     problem, views = crowd(3, count)
-    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    answer = finish(solve_robust(problem, pack(views), risk))
     assert answer.objective == pytest.approx(reached_at_most(problem, views, risk))
     assert answer.status == "optimal"
     assert answer.gap == 0
@@ -130,7 +130,7 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
     monkeypatch.setattr("seip_addon.core.robustness.robust_placement.LEAST_SECONDS", 1e-6)
     for seed in range(4):
         problem, views = crowd(seed, 4)
-        answer = finish(solve_robust(problem, pack(views), risk, time_limit=1e-6)).placement
+        answer = finish(solve_robust(problem, pack(views), risk, SolverLimits(time_limit=1e-6)))
         best = reached_at_most(problem, views, risk)
         assert answer.objective <= best + 1e-9
         assert answer.bound >= best - 1e-9
@@ -173,9 +173,7 @@ def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting,
 @settings(max_examples=40, deadline=None)
 def test_worst_is_below_tail_is_below_expectation(case):
     problem, views, _ = case
-    worst, tail, mean = (
-        finish(solve_robust(problem, pack(views), Risk(tail=share))).placement for share in (0.0, 0.5, 1.0)
-    )
+    worst, tail, mean = (finish(solve_robust(problem, pack(views), Risk(tail=share))) for share in (0.0, 0.5, 1.0))
     assert worst.objective <= tail.objective + 1e-9
     assert tail.objective <= mean.objective + 1e-9
     assert mean.objective <= mean.bound + 1e-9
@@ -186,7 +184,7 @@ def test_worst_is_below_tail_is_below_expectation(case):
 def test_without_errors_it_is_the_nominal_answer(problem, risk):
     assume(all_placements(problem))
     nominal = finish(solve(problem))
-    robust = finish(solve_robust(problem, pack(np.stack([problem.visible] * 3)), risk)).placement
+    robust = finish(solve_robust(problem, pack(np.stack([problem.visible] * 3)), risk))
     assert robust.chosen.tolist() == nominal.chosen.tolist()
     assert robust.objective == nominal.objective
     assert robust.bound == nominal.bound
@@ -208,8 +206,8 @@ def test_the_order_of_candidates_does_not_matter(case, random):
         mandatory=problem.mandatory[:, order],
         forbidden=problem.forbidden[order],
     )
-    one = finish(solve_robust(problem, pack(views), risk)).placement
-    other = finish(solve_robust(shuffled, pack(views[:, order]), risk)).placement
+    one = finish(solve_robust(problem, pack(views), risk))
+    other = finish(solve_robust(shuffled, pack(views[:, order]), risk))
     assert sorted(np.array(order)[other.chosen].tolist()) == sorted(one.chosen.tolist())
     assert one.objective == pytest.approx(other.objective, abs=1e-9)
 

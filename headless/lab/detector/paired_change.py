@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 
 from headless.detection.average_precision import FEWEST_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
-from headless.detection.intervals import percentiles, student_quantile
+from headless.detection.intervals import percentiles
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.estimates import Estimate, student_quantile
 
 DRAWS = 2 * RESAMPLES
 """Resamples of the blocks of traffic; what the first half of them says must be what all say."""

@@ -236,10 +236,6 @@ def lagrangian_bound(
     layers : (top, t) float64, optional
         As for `bound_from`.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (k,) int64

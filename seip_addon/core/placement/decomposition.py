@@ -82,10 +82,6 @@ def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float
         The search ends when the bound falls below.
     seconds : float
         Longest time to search.
-
-    Yields
-    ------
-    Progress
     """
     districts = _districts(instance)
     end = clock.elapsed + min(seconds, clock.left)

@@ -195,7 +195,6 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
     margin = TIE * float(weight.sum())
     slack = min(margin, WHOLE_SLACK) if whole else margin
-    places = len(np.unique(problem.positions[order]))
     conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
         visible=visible,
@@ -208,19 +207,10 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         clique=_cliques(conflict),
         mandatory=problem.mandatory_groups[:, order],
         original=order,
-        count=min(places if problem.count is None else problem.count, _affordable_number(problem, order)),
+        count=problem.most_sensors,
         budget=math.inf if problem.budget is None else float(problem.budget),
     )
     return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
-
-
-def _affordable_number(problem: PlacementProblem, order: Integer) -> int:
-    """Return how many sensors the budget buys at most, one at each position."""
-    if problem.budget is None:
-        return len(order)
-    cheapest = np.full(int(problem.positions.max()) + 1, math.inf)
-    np.minimum.at(cheapest, problem.positions[order], problem.prices[order])
-    return max(1, int(np.count_nonzero(np.cumsum(np.sort(cheapest)) <= problem.budget * (1 + TIE))))
 
 
 def common_unit(weights: Float) -> tuple[float, bool]:

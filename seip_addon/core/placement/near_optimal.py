@@ -83,10 +83,6 @@ def near_best(
     share : float
         0 to 1.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     FlatTop or None
@@ -102,7 +98,7 @@ def near_best(
     instance, factor = make_instance(problem)
     if not is_worthwhile(instance, np.arange(len(instance))):
         return None
-    best = math.fsum(problem.weights[problem.visible[chosen].any(axis=0)]) * factor
+    best = problem.covered(chosen) * factor
     search = _NearBest(instance, (1 - share) * best)
     finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
     if not finished:

@@ -12,14 +12,13 @@ from ..arrays import Integer
 from ..progress import Progress, finish
 from .bounds import Bound, can_reach, lagrangian_bound
 from .branch_and_bound import BestPlacements, is_worthwhile
-from .clock import Clock
+from .clock import DEFAULT_LIMITS, Clock, SolverLimits
 from .decomposition import district_bound
 from .feasibility import starting_choice
 from .greedy import greedy_bound, greedy_steps, greedy_with_swaps, orders, swap_search, tabu_search, without_idle
-from .instance import Instance, make_instance
+from .instance import Instance, common_unit, make_instance
 from .integer_program import CoverProgram, check_solver
-from .problem import Placement, PlacementProblem, record_choice
-from .scale_notes import scale_notes
+from .problem import TIE, Placement, PlacementProblem, assess
 from .ties import MANY, canonical_optimum
 
 BRANCHING = 0.15
@@ -69,9 +68,7 @@ class Proof:
     halfway: float | None = None
 
 
-def solve(
-    problem: PlacementProblem, *, solver: str = "highs", time_limit: float = 60.0, effort: float = math.inf
-) -> Generator[Progress, None, Placement]:
+def solve(problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS) -> Generator[Progress, None, Placement]:
     """Choose the placement that covers most.
 
     Among optimal placements the one with fewest sensors is returned, then the
@@ -86,32 +83,13 @@ def solve(
     districts and an integer program the bound where they can, and branch and
     bound goes on with the time that is left, its bound falling all the while.
 
-    Parameters
-    ----------
-    solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
-    time_limit : float, seconds
-        After it the best placement found is returned with its bound and gap.
-    effort : float, units of work
-        Alike, but counted: the same on every machine, about a second of one
-        processor core each. Where it ends the search before the time does, the
-        same inputs give the same result again.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Placement
-
     Raises
     ------
     SeipError
         The constraints cannot be met together, no candidate sees any target,
         or the solver is not available.
     """
-    return (yield from solve_within(problem, solver, Clock(time_limit, effort)))
+    return (yield from solve_within(problem, limits.solver, limits.clock()))
 
 
 def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Generator[Progress, None, Placement]:
@@ -139,7 +117,7 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
     if problem.count is not None and len(chosen) < problem.count:
         notes.append(_surplus(problem.count, len(chosen)))
     original = instance.original[chosen]
-    return record_choice(
+    return assess(
         problem,
         original,
         proof.bound / factor,
@@ -160,10 +138,6 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
     alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor 1999). The bound of
     the result is computed from the data and is usually far closer.
 
-    Returns
-    -------
-    Placement
-
     Raises
     ------
     SeipError
@@ -177,7 +151,7 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
     bound = min(greedy_bound(instance, steps) for steps in runs)
     optimal = instance.attained(bound) < _better(instance, chosen)
     original = instance.original[chosen]
-    return record_choice(
+    return assess(
         problem,
         original,
         bound / factor,
@@ -195,14 +169,6 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     ----------
     chosen : (k,) int64
         A placement to begin from.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Proof
     """
     keep, bound = yield from lagrangian_bound(instance, instance.value(chosen), clock)
     proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock)
@@ -348,3 +314,29 @@ def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
     if problem.budget is not None:
         return "greedy covers at least (1 - 1/e)/2 (32 %) of the optimum"
     return f"greedy covers at least {'1 - 1/e (63 %)' if single else 'one half'} of the optimum"
+
+
+def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
+    """Say which targets and prices cannot decide because others are too large.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for weights and one for prices, where there is anything to say.
+    """
+    notes = []
+    weights = problem.weights[problem.weights > 0]
+    light = int(np.count_nonzero(weights < TIE * weights.sum()))
+    if light and not common_unit(weights)[1]:
+        notes.append(
+            f"{light:,} of {len(weights):,} targets weigh less than {TIE:g} of all weight each: beside the others "
+            "they cannot decide; bring the weights closer together"
+        )
+    prices = problem.prices[problem.allowed & (problem.prices > 0)]
+    cheap = int(np.count_nonzero(prices < TIE * prices.max(initial=0.0)))
+    if cheap:
+        notes.append(
+            f"{cheap:,} candidates cost less than {TIE:g} of the dearest: beside it their prices cannot decide; "
+            "give all prices in the same currency"
+        )
+    return tuple(notes)

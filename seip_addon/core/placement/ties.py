@@ -45,10 +45,6 @@ def canonical_optimum(
     ties : tuple of (k,) int64, optional
         All optimal placements, but for those with idle sensors, where they are known.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (k,) int64

@@ -64,10 +64,6 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
     ------
     Progress
         After each place of a draw.
-
-    Returns
-    -------
-    Views
     """
     site, models = around.site, around.models
     candidates = site.candidates

@@ -11,6 +11,8 @@ import numpy as np
 from ..arrays import Float, Integer
 
 CONFIDENCE = 0.95
+TAIL = 0.025
+"""Share of probability on either side of an interval."""
 
 RESAMPLES = 2000
 """Of a bootstrap."""
@@ -80,24 +82,38 @@ def mean_over_time(values: Float, stretch: Integer) -> Estimate:
     mean, number = math.fsum(values) / len(values), len(many)
     if number < FEWEST_STRETCHES:
         return Estimate(mean, -math.inf, math.inf)
-    reach = _student(number - 1) * float(means.std(ddof=1)) / math.sqrt(number)
+    reach = student_quantile(number - 1) * float(means.std(ddof=1)) / math.sqrt(number)
     return Estimate(mean, mean - reach, mean + reach)
 
 
-def _student(freedom: int) -> float:
-    """Return what Student's distribution keeps below with that confidence on both sides.
+def student_quantile(freedom: int) -> float:
+    """Return the value that Student's t exceeds with a probability of 2.5 %.
 
-    The expansion about the normal quantile (Abramowitz and Stegun 1964, 26.7.5)
-    is off by less than 0.3 % from three degrees of freedom on.
+    Parameters
+    ----------
+    freedom : int
+        Degrees of freedom, at least 1.
     """
-    z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
-    terms = (
-        (z**3 + z) / 4,
-        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
-        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
-        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160,
-    )
-    return z + math.fsum(term / freedom**power for power, term in enumerate(terms, start=1))
+    low, high = 1.0, 13.0  # between the normal quantile, 1.96, and that of one degree, 12.706
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _student_tail(middle, freedom) > TAIL else (low, middle)
+    return (low + high) / 2
+
+
+def _student_tail(value: float, freedom: int) -> float:
+    """Return the probability that Student's t exceeds a positive value (Abramowitz and Stegun 1964, 26.7.3, 26.7.4)."""
+    angle = math.atan(value / math.sqrt(freedom))
+    odd = freedom % 2
+    term = math.cos(angle) if odd else 1.0
+    total = 0.0
+    for step in range(freedom // 2):
+        if step:
+            term *= (2 * step - 1 + odd) / (2 * step + odd) * math.cos(angle) ** 2
+        total += term
+    total *= math.sin(angle)
+    within = 2 / math.pi * (angle + total) if odd else total
+    return (1 - within) / 2
 
 
 def quantile_of(values: Float, share: float) -> Estimate:

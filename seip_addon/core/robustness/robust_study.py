@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..arrays import Float
-from ..placement import Placement, PlacementProblem, solve
+from ..placement import Placement, PlacementProblem, SolverLimits, solve
+from ..placement.clock import DEFAULT_LIMITS
 from ..progress import Progress, within
 from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .estimates import Estimate, mean_of, quantile_gain, quantile_of
 from .pose_errors import PoseErrors
 from .risk import Risk
-from .robust_placement import RobustPlacement, at_least, foresee, outcomes_of, solve_robust
+from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 
 LOW = 0.05
 """The quantile that judges."""
@@ -36,19 +36,15 @@ class RobustSettings:
         Draws to judge by.
     seed : int
         Of the scenarios; the unseen draws have the next one.
-    time_limit : float, seconds
+    limits : SolverLimits
         For each placement.
-    effort : float, units of work
-        As for `placement.solve`.
     """
 
     errors: PoseErrors = field(default_factory=PoseErrors)
     scenarios: int = 20
     unseen: int = 500
     seed: int = 0
-    solver: str = "highs"
-    time_limit: float = 60.0
-    effort: float = math.inf
+    limits: SolverLimits = DEFAULT_LIMITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,41 +130,23 @@ def robust_study(
     ----------
     problem : PlacementProblem
         Of all candidates of the site.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    RobustStudy
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
     scenarios = yield from disturbed_views(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
-    nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
+    nominal = yield from solve(problem, settings.limits)
     foreseen = None
     if any(risk.seen_by == 1 for risk in risks):
-        foreseen = yield from foresee(
-            problem, spread, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort
-        )
+        foreseen = yield from foresee(problem, spread, settings.limits.solver, settings.limits.clock())
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
     entries = [_Entry("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.in_words()}")
         yield here
-        steps = solve_robust(
-            problem,
-            spread,
-            risk,
-            solver=settings.solver,
-            time_limit=settings.time_limit,
-            effort=settings.effort,
-            foreseen=foreseen,
-        )
-        found: RobustPlacement = yield from within(here, steps)
-        placed = at_least(found.placement, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
+        steps = solve_robust(problem, spread, risk, settings.limits, foreseen)
+        found: Placement = yield from within(here, steps)
+        placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
         entries.append(_Entry(risk.in_words(), placed, risk.alone))
     contenders = yield from _judged(around, problem, settings, entries)
     return RobustStudy(

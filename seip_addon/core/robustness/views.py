@@ -37,6 +37,10 @@ class Views:
         """Return what one pose sees in each circumstance, (n, t) bool."""
         return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
 
+    def seen_by_each(self, poses: Integer) -> NDArray[np.uint8]:
+        """Return what a few poses see in each circumstance, (n, s, t) uint8."""
+        return np.unpackbits(self.packed[:, poses], axis=2, count=self.targets)
+
     def seen_by_any(self, poses: Integer) -> Boolean:
         """Return what some of a few poses sees in each circumstance, (n, t) bool."""
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)

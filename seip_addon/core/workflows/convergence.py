@@ -215,9 +215,7 @@ class Judge:
                 grid.visible,
                 self._models,
                 self._goal,
-                solver=settings.solver,
-                time_limit=settings.time_limit,
-                effort=settings.effort,
+                settings.limits,
             )
         )
 

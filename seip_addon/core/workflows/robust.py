@@ -106,9 +106,7 @@ def place_robustly(
         scenarios=precaution.scenarios,
         unseen=precaution.draws,
         seed=precaution.seed,
-        solver=layout.settings.solver,
-        time_limit=layout.settings.time_limit,
-        effort=layout.settings.effort,
+        limits=layout.settings.limits,
     )
     problem = placement_problem(site, grid.visible, models, goal)
     study = yield from robust_study(around, problem, settings, [precaution.risk])

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import SeipError
 from ..lidar import LidarModel, find_models, load_catalogue
 from ..placement import Placement
-from ..placement.clock import Clock
+from ..placement.clock import SolverLimits
 from ..placement.deployment import deploy
 from ..placement.goal import Goal, Plan, make_plan, placement_problem, target_weights
 from ..placement.integer_program import check_solver
@@ -82,8 +82,13 @@ class SurveySettings:
             The solver or a type is unknown, a limit is no positive number, or a catalogue cannot be read.
         """
         check_solver(self.solver)
-        Clock(self.time_limit, self.effort)  # refuses what is no limit before any ray is cast
+        self.limits.clock()  # refuses what is no limit before any ray is cast
         return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
+
+    @property
+    def limits(self) -> SolverLimits:
+        """The solver, and how long it searches."""
+        return SolverLimits(self.solver, self.time_limit, self.effort)
 
     def reach(self) -> float:
         """Return how far from a target a ray that sees it can begin, or be stopped, in metres."""
@@ -216,9 +221,7 @@ def place(
         grid.visible,
         models,
         goal,
-        solver=settings.solver,
-        time_limit=settings.time_limit,
-        effort=settings.effort,
+        settings.limits,
     )
     plan = yield from steps
     notes = [*plan.placement.notes]
