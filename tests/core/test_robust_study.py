@@ -59,10 +59,9 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
     around, problem = laid_out
     worst = int(np.flatnonzero(problem.allowed)[problem.visible[problem.allowed].sum(axis=1).argmin()])
 
-    def poor(problem, scenarios, risk, **_):
+    def poor(problem, *_):
         yield Progress(0, 0, "searching badly")
-        short = replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
-        return short
+        return replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
 
     monkeypatch.setattr("seip_addon.core.robustness.robust_study.solve_robust", poor)
     found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)]))
