@@ -110,7 +110,7 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
         surveyed.layout.site,
         surveyed.layout.models,
         surveyed.grid,
-        **surveyed.layout.settings.limits,
+        surveyed.layout.settings.limits,
     )
     configurations = surveyed.stopwatch.run("placements", steps)
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)

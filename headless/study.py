@@ -29,7 +29,7 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=1)))
     site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
-    steps = coverage_study(site, surveyed.layout.models, visible, **surveyed.layout.settings.limits)
+    steps = coverage_study(site, surveyed.layout.models, visible, surveyed.layout.settings.limits)
     study = surveyed.stopwatch.run("study", steps)
     claims = coverage_claims(study)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
-from seip_addon.core.placement import Placement, solve, solve_greedy
+from seip_addon.core.placement import Placement, SolverLimits, solve, solve_greedy
+from seip_addon.core.placement.clock import DEFAULT_LIMITS
 from seip_addon.core.placement.deployment import Deployment, deploy
 from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import Progress, within
@@ -140,10 +140,7 @@ def coverage_study(
     site: Site,
     models: Mapping[str, LidarModel],
     visible: NDArray[np.bool_],
-    *,
-    solver: str = "highs",
-    time_limit: float = 60.0,
-    effort: float = math.inf,
+    limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, CoverageStudy]:
     """Solve every cell: each type, each height alone and all together, N = 1, 2, 4; then a sweep of central weights.
 
@@ -156,10 +153,8 @@ def coverage_study(
         With poses of every type and height to be studied.
     visible : (c, t) bool
         The visibility grid.
-    time_limit : float, seconds
+    limits : SolverLimits
         For each cell.
-    effort : float, units of work
-        As for `placement.solve`.
 
     Returns
     -------
@@ -181,7 +176,7 @@ def coverage_study(
         progress = Progress(done, len(plan), f"{cell.sensor}, {at}, N = {cell.count}, central weight {cell.weight:g}")
         yield progress
         try:
-            steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit, effort=effort)
+            steps = solve_cell(site, models, visible, cell, limits)
             cells.append((yield from within(progress, steps)))
         except SeipError as error:
             cells.append(EmptyCell(**vars(cell), note=str(error)))
@@ -191,15 +186,8 @@ def coverage_study(
     return CoverageStudy(sensors, heights, tuple(cells), len(site.targets))
 
 
-def solve_cell(  # noqa: PLR0913 -- a problem, and the limits of its solution
-    site: Site,
-    models: Mapping[str, LidarModel],
-    visible: NDArray[np.bool_],
-    cell: Cell,
-    *,
-    solver: str,
-    time_limit: float,
-    effort: float,
+def solve_cell(
+    site: Site, models: Mapping[str, LidarModel], visible: NDArray[np.bool_], cell: Cell, limits: SolverLimits
 ) -> Generator[Progress, None, Case]:
     """Solve one cell; the arguments are those of `coverage_study`.
 
@@ -213,6 +201,6 @@ def solve_cell(  # noqa: PLR0913 -- a problem, and the limits of its solution
         allowed &= site.candidates.height == cell.height
     goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
-    placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+    placement = yield from solve(problem, limits)
     deployment = deploy(site, models, visible, placement.chosen)
     return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

@@ -23,6 +23,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
 from seip_addon.core.lidar import LidarModel
+from seip_addon.core.placement import SolverLimits
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
 from seip_addon.core.site.site import Site
@@ -222,7 +223,7 @@ def padded(some: Sequence[ModelConfiguration]) -> list[ModelConfiguration]:
 
 
 def place_all(
-    site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, *, solver: str, time_limit: float, effort: float
+    site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, limits: SolverLimits
 ) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
     """Place 1, 2 and 4 sensors of each type where they cover most.
 
@@ -237,7 +238,7 @@ def place_all(
     for done, cell in enumerate(cells):
         progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
         yield progress
-        steps = solve_cell(site, models, visible, cell, solver=solver, time_limit=time_limit, effort=effort)
+        steps = solve_cell(site, models, visible, cell, limits)
         placed.append((yield from within(progress, steps)))
     yield Progress(len(cells), len(cells), "placed")
     return tuple(SensorConfiguration(case) for case in placed)

@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
+from seip_addon.core.placement import (
+    Placement,
+    PlacementProblem,
+    SolverLimits,
+    cheapest_for_coverage,
+    solve,
+    solve_greedy,
+)
 from seip_addon.core.placement.near_optimal import near_best
 from seip_addon.core.progress import finish
 
@@ -283,7 +290,7 @@ def _of_little_effort(problem: PlacementProblem, subsets: Subsets) -> list[str]:
     """Stopped at once, an answer is still one, its bound holds, and it is the same again."""
     if not (subsets.allowed & (subsets.covered > 0)).any():
         return []
-    answers = [finish(solve(problem, time_limit=math.inf, effort=1e-6)) for _ in range(2)]
+    answers = [finish(solve(problem, SolverLimits(time_limit=math.inf, effort=1e-6))) for _ in range(2)]
     found = _of_answer(problem, subsets, answers[0])
     if not np.array_equal(answers[0].chosen, answers[1].chosen) or answers[0].bound != answers[1].bound:
         found.append("the same effort gave another answer")

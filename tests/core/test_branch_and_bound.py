@@ -60,13 +60,13 @@ def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     assume(instance is not None)
     goal = share * instance.total
     choices = [choice for choice in feasible(instance) if len(choice)]
-    best = max(map(instance.covered, choices), default=-1.0)
+    best = max(map(instance.value, choices), default=-1.0)
     search = searched(instance, goal)
     assert not search.overflowed
     if best < goal - instance.slack:
         assert search.found == []
         return
-    equal = [choice for choice in choices if instance.covered(choice) == best]
+    equal = [choice for choice in choices if instance.value(choice) == best]
     listed = {tuple(choice) for choice in search.found}
     assert listed <= {tuple(choice) for choice in equal}
     fewest = min(map(len, equal))
@@ -84,8 +84,8 @@ def test_the_first_in_order_is_found(problem):
     assume(instance is not None)
     choices = [choice for choice in feasible(instance) if len(choice)]
     assume(choices)
-    goal = max(map(instance.covered, choices))
-    equal = [choice for choice in choices if instance.covered(choice) >= goal - instance.slack]
+    goal = max(map(instance.value, choices))
+    equal = [choice for choice in choices if instance.value(choice) >= goal - instance.slack]
     first = min(equal, key=lambda choice: merit(instance, choice))
     search = FirstInOrder(replace(instance, count=len(first)), goal)
     assert finish(search.run(forever(), math.inf))
@@ -101,9 +101,9 @@ def test_an_uneven_street_is_solved_as_well_as_an_even_one():
     problem = street_problem(25, 300, seed=5, count=3)
     weights = np.random.default_rng(1).uniform(0.5, 2.0, 300)
     instance = make_instance(replace(problem, weights=weights))[0]
-    best = max(instance.covered(choice) for choice in feasible(instance))
+    best = max(instance.value(choice) for choice in feasible(instance))
     (chosen,) = searched(instance, 0.0).found
-    assert instance.covered(chosen) == best
+    assert instance.value(chosen) == best
 
 
 @settings(max_examples=100, deadline=None)
@@ -111,16 +111,16 @@ def test_an_uneven_street_is_solved_as_well_as_an_even_one():
 def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem, branches):
     instance = reduced(problem)
     assume(instance is not None)
-    best = max(map(instance.covered, (choice for choice in feasible(instance) if len(choice))), default=-1.0)
+    best = max(map(instance.value, (choice for choice in feasible(instance) if len(choice))), default=-1.0)
     assume(best > 0)
     search = BestPlacements(instance, 0.0, 10_000, instance.total)
     bounds = []
     while not finish(search.run(forever(), math.inf, branches)):
-        found = max(map(instance.covered, search.found), default=0.0)
+        found = max(map(instance.value, search.found), default=0.0)
         assert max(found, search.bound) >= best
         bounds.append(search.bound)
     assert bounds == sorted(bounds, reverse=True)
-    assert instance.covered(search.found[0]) == best
+    assert instance.value(search.found[0]) == best
 
 
 def test_the_bound_falls_while_the_search_goes_on():

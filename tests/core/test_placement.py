@@ -19,6 +19,7 @@ import pytest
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import (
     PlacementProblem,
+    SolverLimits,
     cheapest_for_coverage,
     integer_program,
     solve,
@@ -130,8 +131,8 @@ def test_weights_of_very_different_size() -> None:
 @pytest.mark.parametrize("limit", [1e-6, 0.01, 0.3])
 def test_a_short_time_limit_gives_an_incumbent_and_a_valid_bound(limit: float) -> None:
     problem = street_problem(66, 1000, blocks=3, count=5)
-    short, greedy = finish(solve(problem, time_limit=limit)), solve_greedy(problem)
-    best = finish(solve(problem, time_limit=3.0))
+    short, greedy = finish(solve(problem, SolverLimits(time_limit=limit))), solve_greedy(problem)
+    best = finish(solve(problem, SolverLimits(time_limit=3.0)))
     assert greedy.objective <= short.objective <= best.bound
     assert short.bound >= best.objective
     assert short.gap == pytest.approx((short.bound - short.objective) / short.objective)
@@ -140,15 +141,15 @@ def test_a_short_time_limit_gives_an_incumbent_and_a_valid_bound(limit: float) -
 
 
 def test_a_short_time_limit_on_the_reverse_problem() -> None:
-    placement = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=0.01))
+    placement = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, SolverLimits(time_limit=0.01)))
     assert placement.covered >= 800
-    best = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, time_limit=10.0))
+    best = finish(cheapest_for_coverage(street_problem(60, 1000, blocks=2), 0.8, SolverLimits(time_limit=10.0)))
     assert 6000 <= placement.bound <= best.price <= placement.objective == placement.price
 
 
 def test_solvers_agree_on_a_street() -> None:
     problem = street_problem(25, 400, blocks=2, count=3, min_distance=30.0)
-    by_highs, by_cbc = finish(solve(problem)), finish(solve(problem, solver="cbc"))
+    by_highs, by_cbc = finish(solve(problem)), finish(solve(problem, SolverLimits("cbc")))
     assert by_highs.status == by_cbc.status == "optimal"
     np.testing.assert_array_equal(by_highs.chosen, by_cbc.chosen)
     assert by_highs.solver.startswith("HiGHS")
@@ -160,7 +161,7 @@ def test_cbc_without_its_run_bit_is_copied(tmp_path: Path, monkeypatch: pytest.M
     shutil.copyfile(pulp.apis.coin_api.pulp_cbc_path, broken)
     broken.chmod(stat.S_IRUSR)
     monkeypatch.setattr(integer_program, "pulp_cbc_path", str(broken))
-    assert finish(solve(row_problem(halves, count=2), solver="cbc")).covered == 4
+    assert finish(solve(row_problem(halves, count=2), SolverLimits("cbc"))).covered == 4
     assert not os.access(broken, os.X_OK)
 
 
@@ -263,9 +264,9 @@ def test_a_program_out_of_time_is_not_called_infeasible(monkeypatch: pytest.Monk
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
 def test_a_time_limit_is_positive(limit: float) -> None:
     with pytest.raises(SeipError, match="give a positive number of seconds"):
-        finish(solve(row_problem(halves), time_limit=limit))
+        finish(solve(row_problem(halves), SolverLimits(time_limit=limit)))
     with pytest.raises(SeipError, match="give a positive number of seconds"):
-        finish(cheapest_for_coverage(row_problem(halves), 0.5, time_limit=limit))
+        finish(cheapest_for_coverage(row_problem(halves), 0.5, SolverLimits(time_limit=limit)))
 
 
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
@@ -273,16 +274,18 @@ def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
     monkeypatch.setattr(ties, "is_worthwhile", lambda *_: False)
     problem = street_problem(12, 100, blocks=1, count=3)
-    placement = finish(solve(problem, solver=solver, time_limit=math.inf))
+    placement = finish(solve(problem, SolverLimits(solver=solver, time_limit=math.inf)))
     assert placement.status == "optimal"
     dearer = replace(problem, count=None, prices=np.linspace(1, 2, len(problem.prices)))
-    assert finish(cheapest_for_coverage(dearer, 0.3, solver=solver, time_limit=math.inf)).status == "optimal"
+    assert (
+        finish(cheapest_for_coverage(dearer, 0.3, SolverLimits(solver=solver, time_limit=math.inf))).status == "optimal"
+    )
 
 
 def test_a_long_program_can_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
     before = set(threading.enumerate())
-    steps = solve(street_problem(60, 1000, blocks=2, count=8), time_limit=60.0)
+    steps = solve(street_problem(60, 1000, blocks=2, count=8), SolverLimits(time_limit=60.0))
     while "integer program" not in next(steps).what:
         pass
     next(steps)
@@ -352,10 +355,10 @@ def test_coverage_out_of_reach_of_the_limits() -> None:
 
 def test_unknown_and_missing_solvers_name_the_others() -> None:
     with pytest.raises(SeipError, match="unknown solver 'cplex'; choose among highs, cbc"):
-        finish(solve(row_problem(halves), solver="cplex"))
+        finish(solve(row_problem(halves), SolverLimits(solver="cplex")))
     if not integer_program.is_available("gurobi"):
         with pytest.raises(SeipError, match="gurobi is not available here; choose among highs, cbc"):
-            finish(solve(row_problem(halves), solver="gurobi"))
+            finish(solve(row_problem(halves), SolverLimits(solver="gurobi")))
 
 
 def test_greedy_states_its_guarantee() -> None:
@@ -389,7 +392,7 @@ def hard_problem() -> PlacementProblem:
 
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
 def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
-    first, again = (finish(solve(hard_problem(), solver=solver, time_limit=math.inf, effort=0.3)) for _ in range(2))
+    first, again = (finish(solve(hard_problem(), SolverLimits(solver, math.inf, 0.3))) for _ in range(2))
     assert first.status == "feasible"
     assert [(one.chosen.tolist(), one.objective, one.bound, one.notes) for one in (first, again)] == 2 * [
         (first.chosen.tolist(), first.objective, first.bound, first.notes)
@@ -397,12 +400,12 @@ def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
 
 
 def test_more_effort_proves_no_less() -> None:
-    little, more = (finish(solve(hard_problem(), time_limit=math.inf, effort=effort)) for effort in (0.1, 1.0))
+    little, more = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (0.1, 1.0))
     assert little.objective <= more.objective <= more.bound < little.bound
 
 
 def test_an_answer_that_is_not_proven_says_what_more_time_does() -> None:
-    short, longer = (finish(solve(hard_problem(), time_limit=math.inf, effort=effort)) for effort in (0.5, 1.0))
+    short, longer = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (0.5, 1.0))
     assert "hardly closed in the second half of the time" in short.notes[1]
     assert "at half the time and is" in longer.notes[1]
 
@@ -410,7 +413,7 @@ def test_an_answer_that_is_not_proven_says_what_more_time_does() -> None:
 @pytest.mark.parametrize("effort", [0.0, -1.0, math.nan])
 def test_an_effort_is_positive(effort: float) -> None:
     with pytest.raises(SeipError, match=r"the effort is .* units of work; give a positive number"):
-        finish(solve(row_problem(halves), effort=effort))
+        finish(solve(row_problem(halves), SolverLimits(effort=effort)))
 
 
 def test_breaking_ties_takes_no_longer_than_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,7 +43,7 @@ def feasible(instance):
 def test_no_placement_covers_more_than_the_districts_allow(problem, share):
     instance = reduced(problem)
     assume(instance is not None)
-    best = max(map(instance.covered, feasible(instance)), default=0.0)
+    best = max(map(instance.value, feasible(instance)), default=0.0)
     assert finish(district_bound(instance, share * best, forever(), math.inf)) >= best - instance.slack
 
 
@@ -52,14 +52,14 @@ def test_no_placement_covers_more_than_the_districts_allow(problem, share):
 def test_every_placement_that_reaches_the_goal_is_left(problem, share):
     instance = reduced(problem)
     assume(instance is not None)
-    reaching = [choice for choice in feasible(instance) if instance.covered(choice) >= share * instance.total]
+    reaching = [choice for choice in feasible(instance) if instance.value(choice) >= share * instance.total]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bounds, "REVIEW", 2)
         patch.setattr(bounds, "WORTHWHILE", 1.0)
         patch.setattr(bounds, "FEW", 1)
         keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
     assert all(np.isin(choice, keep).all() for choice in reaching)
-    assert all(instance.covered(choice) <= bound.value + instance.slack for choice in reaching)
+    assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
 
 
 @settings(max_examples=100, deadline=None)
@@ -71,15 +71,15 @@ def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
     assume(choices)
     found = finish(tabu_search(instance, choices[0], forever(), math.inf))
     assert instance.feasible(found)
-    assert instance.covered(found) >= instance.covered(choices[0])
+    assert instance.value(found) >= instance.value(choices[0])
 
 
 def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
     instance, _ = make_instance(street_problem(60, 800, blocks=2, count=7))
-    chosen, _ = greedy(instance, np.zeros(0, np.int64))
+    chosen = greedy(instance, np.zeros(0, np.int64))
     searched = finish(tabu_search(instance, chosen, forever(), math.inf))
-    _, bound = finish(lagrangian_bound(instance, instance.covered(searched), forever()))
-    by_districts = finish(district_bound(instance, instance.covered(searched), forever(), math.inf))
-    assert instance.covered(chosen) < instance.covered(searched) <= by_districts < bound.value
+    _, bound = finish(lagrangian_bound(instance, instance.value(searched), forever()))
+    by_districts = finish(district_bound(instance, instance.value(searched), forever(), math.inf))
+    assert instance.value(chosen) < instance.value(searched) <= by_districts < bound.value
     again = finish(tabu_search(instance, chosen, forever(), math.inf))
     np.testing.assert_array_equal(searched, again)

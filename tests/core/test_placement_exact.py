@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from placement_oracle import all_placements, covered, merit, small_problems
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, solve, solve_greedy, ties
+from seip_addon.core.placement import PlacementProblem, SolverLimits, cheapest_for_coverage, solve, solve_greedy, ties
 from seip_addon.core.progress import finish
 
 thorough = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
@@ -60,7 +60,10 @@ def test_reverse_equals_exhaustive_search(data: st.DataObject, coverage: float) 
 def test_highs_and_cbc_agree(data: st.DataObject) -> None:
     problem = accepted(data, small_problems())
     assume(all_placements(problem))
-    by_highs, by_cbc = finish(solve(problem, solver="highs")), finish(solve(problem, solver="cbc"))
+    by_highs, by_cbc = (
+        finish(solve(problem, SolverLimits("highs"))),
+        finish(solve(problem, SolverLimits("cbc"))),
+    )
     np.testing.assert_array_equal(by_highs.chosen, by_cbc.chosen)
 
 

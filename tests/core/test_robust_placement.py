@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 from placement_oracle import all_placements, covered, small_problems
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
+from seip_addon.core.placement.bounds import lagrangian_bound
+from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_placement import allowed_sensors, solve_robust
-from seip_addon.core.robustness.robust_search import CountedCover, RobustSearch
+from seip_addon.core.robustness.robust_placement import solve_robust
+from seip_addon.core.robustness.robust_search import BestUnderRisk
 from seip_addon.core.robustness.views import Views
 
 RISKS = [
@@ -47,7 +49,7 @@ def under_risk(draw, risks=RISKS):
     flips = rng.random((draw(st.integers(1, 4)), *problem.visible.shape)) < draw(st.sampled_from([0.1, 0.3]))
     views = problem.visible ^ flips
     views[:, 0] |= problem.visible[0]
-    possible = [risk for risk in risks if risk.least_sensors <= allowed_sensors(problem)]
+    possible = [risk for risk in risks if risk.least_sensors <= problem.most_sensors]
     assume(possible and all_placements(problem))
     return problem, views, draw(st.sampled_from(possible))
 
@@ -63,8 +65,8 @@ def by_hand(problem, views, risk, choice):
     for view in views:
         whole = weight_seen(view, choice)
         left = [weight_seen(view, [i for i in choice if i != gone]) for gone in choice] or [0.0]
-        spare = allowed_sensors(problem) - len(choice)  # sensors that may fail without being missed
-        mean = (sum(left) + spare * whole) / allowed_sensors(problem) if choice else 0.0
+        spare = problem.most_sensors - len(choice)  # sensors that may fail without being missed
+        mean = (sum(left) + spare * whole) / problem.most_sensors if choice else 0.0
         outcomes.append({"none": whole, "worst": min(left), "mean": mean}[risk.failure])
     counted = max(1, math.ceil(risk.tail * len(outcomes) - 1e-9))
     return sum(sorted(outcomes)[:counted]) / counted
@@ -74,7 +76,7 @@ def by_hand(problem, views, risk, choice):
 @settings(max_examples=150, deadline=None)
 def test_no_subset_is_better(case):
     problem, views, risk = case
-    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    answer = finish(solve_robust(problem, pack(views), risk))
     best = max(by_hand(problem, views, risk, choice) for choice in all_placements(problem))
     choice = tuple(answer.chosen.tolist())
     assert sorted(choice) in [sorted(one) for one in all_placements(problem)]
@@ -117,7 +119,7 @@ def reached_at_most(problem, views, risk):
 @pytest.mark.parametrize("count", [4, 5])
 def test_no_placement_is_better_where_branches_are_many(risk, count):
     problem, views = crowd(3, count)
-    answer = finish(solve_robust(problem, pack(views), risk)).placement
+    answer = finish(solve_robust(problem, pack(views), risk))
     assert answer.objective == pytest.approx(reached_at_most(problem, views, risk))
     assert answer.status == "optimal"
     assert answer.gap == 0
@@ -128,63 +130,50 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
     monkeypatch.setattr("seip_addon.core.robustness.robust_placement.LEAST_SECONDS", 1e-6)
     for seed in range(4):
         problem, views = crowd(seed, 4)
-        answer = finish(solve_robust(problem, pack(views), risk, time_limit=1e-6)).placement
+        answer = finish(solve_robust(problem, pack(views), risk, SolverLimits(time_limit=1e-6)))
         best = reached_at_most(problem, views, risk)
         assert answer.objective <= best + 1e-9
         assert answer.bound >= best - 1e-9
         assert answer.status == "optimal" or any("too short" in note for note in answer.notes)
 
 
-class Branches:
-    """A clock that runs out after so many branches."""
-
-    def __init__(self, number):
-        self.number = number
-
-    @property
-    def left(self):
-        self.number -= 1
-        return self.number + 1
-
-    def spend(self, operations):
-        pass
-
-
 @pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
-@pytest.mark.parametrize("open_branches", [10_000, 3])
-def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, open_branches, monkeypatch):
-    monkeypatch.setattr("seip_addon.core.robustness.robust_search.OPEN", open_branches)
+@pytest.mark.parametrize("waiting", [10_000, 3])
+def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting, monkeypatch):
+    monkeypatch.setattr("seip_addon.core.placement.branch_and_bound.WAITING", waiting)
     problem, views = crowd(5, 5)
     instance, scale = make_instance(problem)
-    worth = risk.worth(5)
+    instance = replace(instance, cover=risk.cover(5))
     best = reached_at_most(problem, views[:1], risk)
 
-    def judge(chosen):
+    def evaluate(chosen):
         seen = views[:1, instance.original[chosen]].astype(np.uint8)
         return risk.of(risk.outcomes(seen, problem.weights, 5))
 
+    start = np.zeros(0, dtype=np.int64)
+    root = finish(lagrangian_bound(instance, 0.0, Clock(math.inf)))
+
     def searched(branches):
-        start = np.zeros(0, dtype=np.int64)
-        search = RobustSearch(CountedCover(instance, worth), scale * worth.unit, judge, start, 1e-9)
-        return finish(search.run(Branches(branches)))
+        search = BestUnderRisk(instance, scale * instance.cover.unit, evaluate, start, 1e-9, root)
+        finished = finish(search.run(Clock(math.inf), math.inf, branches))
+        return search, finished
 
     found = [searched(branches) for branches in (0, 1, 2, 4, 8, 16, 32, 64, 128, 100_000)]
-    bounds = [each.bound for each in found]
+    bounds = [search.bound for search, _ in found]
     assert bounds == sorted(bounds, reverse=True)
     assert bounds[0] > bounds[4]
-    assert all(each.value <= best * (1 + 1e-12) and each.bound >= best * (1 - 1e-12) for each in found)
-    assert found[-1].finished
-    assert found[-1].value == pytest.approx(best)
-    assert found[-1].bound == pytest.approx(best)
+    assert all(search.value <= best * (1 + 1e-12) and search.bound >= best * (1 - 1e-12) for search, _ in found)
+    last, finished = found[-1]
+    assert finished
+    assert last.value == pytest.approx(best)
+    assert last.bound == pytest.approx(best)
 
 
 @given(under_risk(risks=[Risk()]))
 @settings(max_examples=40, deadline=None)
 def test_worst_is_below_tail_is_below_expectation(case):
     problem, views, _ = case
-    worst, tail, mean = (
-        finish(solve_robust(problem, pack(views), Risk(tail=share))).placement for share in (0.0, 0.5, 1.0)
-    )
+    worst, tail, mean = (finish(solve_robust(problem, pack(views), Risk(tail=share))) for share in (0.0, 0.5, 1.0))
     assert worst.objective <= tail.objective + 1e-9
     assert tail.objective <= mean.objective + 1e-9
     assert mean.objective <= mean.bound + 1e-9
@@ -195,7 +184,7 @@ def test_worst_is_below_tail_is_below_expectation(case):
 def test_without_errors_it_is_the_nominal_answer(problem, risk):
     assume(all_placements(problem))
     nominal = finish(solve(problem))
-    robust = finish(solve_robust(problem, pack(np.stack([problem.visible] * 3)), risk)).placement
+    robust = finish(solve_robust(problem, pack(np.stack([problem.visible] * 3)), risk))
     assert robust.chosen.tolist() == nominal.chosen.tolist()
     assert robust.objective == nominal.objective
     assert robust.bound == nominal.bound
@@ -217,31 +206,31 @@ def test_the_order_of_candidates_does_not_matter(case, random):
         mandatory=problem.mandatory[:, order],
         forbidden=problem.forbidden[order],
     )
-    one = finish(solve_robust(problem, pack(views), risk)).placement
-    other = finish(solve_robust(shuffled, pack(views[:, order]), risk)).placement
+    one = finish(solve_robust(problem, pack(views), risk))
+    other = finish(solve_robust(shuffled, pack(views[:, order]), risk))
     assert sorted(np.array(order)[other.chosen].tolist()) == sorted(one.chosen.tolist())
     assert one.objective == pytest.approx(other.objective, abs=1e-9)
 
 
 @given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
 def test_no_failure_leaves_a_target_worth_more(seen_by, failure, sensors):
-    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    cover = Risk(seen_by=seen_by, failure=failure).cover(sensors)
     for times in range(sensors + 1):
         for used in range(max(times, 1), sensors + 1):
             after = 1 - seen_by / used if times == seen_by else float(times > seen_by)
             left = float(times >= seen_by) if failure == "none" else after
-            assert worth.reached(np.array([times]))[0] / worth.unit >= left - 1e-12
+            assert cover.value(np.array([times]))[0] / cover.unit >= left - 1e-12
 
 
 @given(st.integers(1, 4), st.sampled_from(["none", "worst", "mean"]), st.integers(2, 9))
 def test_what_is_to_come_is_bounded_by_the_least_concave_function(seen_by, failure, sensors):
-    worth = Risk(seen_by=seen_by, failure=failure).worth(sensors)
+    cover = Risk(seen_by=seen_by, failure=failure).cover(sensors)
     for times in range(sensors + 1):
         seen = np.array([times])
-        assert worth.added(seen, 1)[0] == worth.reached(seen + 1)[0] - worth.reached(seen)[0]
+        assert cover.increment(seen, 1)[0] == cover.value(seen + 1)[0] - cover.value(seen)[0]
         for left in range(sensors + 2):
-            rises = [worth.added(seen, left, level)[0] for level in range(worth.top)]
-            reached = [worth.reached(seen + more)[0] - worth.reached(seen)[0] for more in range(left + 1)]
+            rises = [cover.increment(seen, left, level)[0] for level in range(cover.top)]
+            reached = [cover.value(seen + more)[0] - cover.value(seen)[0] for more in range(left + 1)]
             bounds = np.concatenate([[0], np.cumsum(rises), np.full(left, np.sum(rises))])[: left + 1]
             assert (np.diff(rises) <= 0).all()
             assert (bounds >= reached).all()

@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.placement import solve
+from seip_addon.core.placement import SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import Progress, finish
@@ -21,13 +21,12 @@ from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_v
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.pose_study import StudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_placement import RobustPlacement
 from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
 
 MODELS = load_catalogue()
-SETTINGS = RobustSettings(scenarios=4, unseen=30, time_limit=20.0)
+SETTINGS = RobustSettings(scenarios=4, unseen=30, limits=SolverLimits(time_limit=20.0))
 
 
 @pytest.fixture(scope="module")
@@ -61,10 +60,9 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
     around, problem = laid_out
     worst = int(np.flatnonzero(problem.allowed)[problem.visible[problem.allowed].sum(axis=1).argmin()])
 
-    def poor(problem, scenarios, risk, **_):
+    def poor(problem, *_):
         yield Progress(0, 0, "searching badly")
-        short = replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
-        return RobustPlacement(risk, short, np.zeros(len(scenarios)))
+        return replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
 
     monkeypatch.setattr("seip_addon.core.robustness.robust_study.solve_robust", poor)
     found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)]))

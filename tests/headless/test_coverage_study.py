@@ -13,6 +13,7 @@ import pytest
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.placement import SolverLimits
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
 
@@ -144,7 +145,7 @@ def test_what_no_cell_can_do_is_an_error(example):
     with pytest.raises(SeipError, match="no candidate sees"):
         solved(example, visible=np.zeros_like(example.visible))
     with pytest.raises(SeipError, match="cplex"):
-        finish(coverage_study(example.site, example.models, example.visible, solver="cplex"))
+        finish(coverage_study(example.site, example.models, example.visible, SolverLimits("cplex")))
 
 
 def write_all(folder, study):

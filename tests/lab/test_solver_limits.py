@@ -28,11 +28,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import cheapest_for_coverage, solve, solve_greedy
+from seip_addon.core.placement import SolverLimits, cheapest_for_coverage, solve, solve_greedy
 from seip_addon.core.placement import near_optimal as near_best
 from seip_addon.core.placement.near_optimal import near_best as list_near_best
 from seip_addon.core.placement.problem import TIE
-from seip_addon.core.placement.scale_notes import scale_notes
+from seip_addon.core.placement.solver import scale_notes
 from seip_addon.core.progress import finish
 
 
@@ -117,7 +117,7 @@ def test_planes_are_planes(order: int) -> None:
 
 
 def test_a_second_is_a_second() -> None:
-    found = finish(solve(plane(17), time_limit=1.0))
+    found = finish(solve(plane(17), SolverLimits(time_limit=1.0)))
     assert found.seconds < 5.0  # shared machines stall
     assert found.bound >= found.covered
     assert found.status == "optimal" or any("too short" in note for note in found.notes)

@@ -17,7 +17,7 @@ import pulp
 from pulp.apis.coin_api import pulp_cbc_path
 
 from seip_addon.core.arrays import Boolean, Integer
-from seip_addon.core.placement import PlacementProblem, solve, solve_greedy
+from seip_addon.core.placement import PlacementProblem, SolverLimits, solve, solve_greedy
 from seip_addon.core.progress import finish
 
 
@@ -42,7 +42,7 @@ class Found:
 
 def ours(problem: PlacementProblem, seconds: float) -> Found:
     """Solve as the project does."""
-    placement = finish(solve(problem, time_limit=seconds))
+    placement = finish(solve(problem, SolverLimits(time_limit=seconds)))
     return Found(placement.chosen, placement.bound)
 
 

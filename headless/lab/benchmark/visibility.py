@@ -14,7 +14,7 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
-from seip_addon.core.placement import Placement, solve
+from seip_addon.core.placement import Placement, SolverLimits, solve
 from seip_addon.core.placement.goal import Goal, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
@@ -189,7 +189,7 @@ def placed(site: Site, models: Mapping[str, LidarModel], visible: Boolean, time_
     """Return the best placement of four sensors of the site's first type, the vanilla problem."""
     sensor = site.candidates.sensor
     problem = placement_problem(site, visible, models, Goal(count=COUNT))
-    return finish(solve(replace(problem, forbidden=sensor != sensor[0]), time_limit=time_limit))
+    return finish(solve(replace(problem, forbidden=sensor != sensor[0]), SolverLimits(time_limit=time_limit)))
 
 
 def cast_rate(caster: RayCaster, origin: Float, rays: int = 20_000) -> float:

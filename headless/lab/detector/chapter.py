@@ -129,7 +129,7 @@ def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[SensorCo
         layout.site,
         layout.models,
         surveyed.grid,
-        **settings.limits,
+        settings.limits,
     )
 
 

@@ -11,7 +11,7 @@ from headless import survey
 from headless.charts import robust as robust_charts
 from headless.charts import traffic as traffic_charts
 
-from seip_addon.core.placement import PlacementProblem, solve
+from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, placement_problem
 from seip_addon.core.placement.near_optimal import FlatTop, near_best
@@ -167,7 +167,7 @@ def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     tops: list[tuple[str, FlatTop]] = []
     for sensor in stage.surveyed.layout.models:
         problem = stage.problem(sensor)
-        best = yield from solve(problem, solver=stage.surveyed.layout.settings.solver)
+        best = yield from solve(problem, SolverLimits(stage.surveyed.layout.settings.solver))
         top = yield from near_best(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
@@ -230,7 +230,7 @@ def traffic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
         problem,
         scenarios,
         judged,
-        **settings.limits,
+        settings.limits,
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
@@ -266,7 +266,7 @@ def detector(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def _settings(stage: StudiedScene) -> RobustSettings:
-    return replace(stage.scope.robust, **stage.surveyed.layout.settings.limits)
+    return replace(stage.scope.robust, limits=stage.surveyed.layout.settings.limits)
 
 
 def introduction(stage: StudiedScene) -> str:

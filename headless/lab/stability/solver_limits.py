@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer
-from seip_addon.core.placement import Placement, PlacementProblem, solve, solve_greedy
+from seip_addon.core.placement import Placement, PlacementProblem, SolverLimits, solve, solve_greedy
 from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.placement.integer_program import is_available, reaching
@@ -284,7 +284,7 @@ def _uneven(problem: PlacementProblem, by: float, random: np.random.Generator) -
 def _check_greedy(count: int) -> GreedyCheck:
     problem = worst_for_greedy(count)
     whole = math.fsum(problem.weights)
-    exact: Placement = finish(solve(problem, time_limit=20.0))
+    exact: Placement = finish(solve(problem, SolverLimits(time_limit=20.0)))
     return GreedyCheck(
         count=count,
         greedy=solve_greedy(problem).covered / whole,
@@ -295,7 +295,7 @@ def _check_greedy(count: int) -> GreedyCheck:
 
 
 def _check_time(name: str, problem: PlacementProblem, limit: float) -> TimeCheck:
-    found: Placement = finish(solve(problem, time_limit=limit))
+    found: Placement = finish(solve(problem, SolverLimits(time_limit=limit)))
     return TimeCheck(name, limit, found.seconds, found.gap, found.status == "optimal")
 
 

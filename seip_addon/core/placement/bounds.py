@@ -1,10 +1,12 @@
 r"""Upper bounds by Lagrangian relaxation, and the candidates that they rule out.
 
-Relaxing :math:`y_j \le \sum_i V_{ij} x_i` with multipliers
-:math:`0 \le \lambda_j \le w_j` leaves
+Let the i-th sensor that sees target j add at most :math:`a_{ji}` to the objective,
+:math:`a_{j1} \ge a_{j2} \ge …`; for coverage :math:`a_{j1} = w_j` and the others are 0
+(`multi_cover`). Relaxing the number of sensors that see a target with multipliers
+:math:`0 \le \lambda_j \le a_{j1}` leaves
 
 .. math::
-    L(\lambda) = \sum_j (w_j - \lambda_j) + \max_{x \in X} \sum_i s_i x_i,
+    L(\lambda) = \sum_j \sum_i \max(0, a_{ji} - \lambda_j) + \max_{x \in X} \sum_i s_i x_i,
     \qquad s_i = \sum_j V_{ij} \lambda_j,
 
 where X keeps the number of sensors and a partition into cliques (one sensor at
@@ -19,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -44,6 +47,14 @@ NEAR = (0.8, 0.95, 1.0, 1.05, 1.25)
 
 PRICES = 200
 """Multipliers of the price that are tried for a bound on it."""
+
+
+class HasValue(Protocol):
+    """A bound, of whatever form."""
+
+    @property
+    def value(self) -> float:
+        """No placement has a larger objective value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +86,7 @@ class Bound:
     Parameters
     ----------
     value : float
-        No placement covers more.
+        No placement has a larger objective value.
     targets : (t,) float64
         Multipliers of the targets.
     groups : (g,) float64
@@ -116,23 +127,96 @@ def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
     return best
 
 
-def bound_from(instance: Instance, targets: Float, groups: Float, *, exact: bool, near: float = 0.0) -> Bound:
+B = TypeVar("B", bound=HasValue)
+
+
+class SubgradientDescent(Generic[B]):
+    """Deflected subgradient steps that lower a bound.
+
+    Parameters
+    ----------
+    bound : B
+        At the multipliers to begin from.
+    total : float
+        Objective value of all targets: a bound falls where it falls by a share of this.
+
+    Attributes
+    ----------
+    best, current : B
+        The smallest bound met, and the one to make the next step from.
+    step : float
+        Length of a step, as a share of the excess over the goal. It shrinks each time that `PATIENCE` steps in a row
+        have not lowered the bound.
+    """
+
+    def __init__(self, bound: B, total: float) -> None:
+        self._total = total
+        self.step = 1.0
+        self._stale = 0
+        self.restart(bound)
+
+    def restart(self, bound: B) -> None:
+        """Go on from another bound, without the deflection by earlier steps."""
+        self.best = self.current = bound
+        self._direction: Float | float = 0.0
+
+    def move(self, slope: Float, goal: float) -> Float | None:
+        """Return what is to be taken from the multipliers; None where the slope shows that no bound is smaller."""
+        self._direction = slope + DEFLECTION * self._direction
+        size = float(self._direction @ self._direction)
+        if size == 0:
+            return None
+        length = self.step * max(self.current.value - goal, 1e-6 * self._total) / size
+        return length * self._direction
+
+    def record(self, bound: B) -> None:
+        """Take the bound that a step has led to; after too many in vain, return to the best."""
+        self.current = bound
+        self._stale += 1
+        if bound.value < self.best.value - 1e-7 * self._total:
+            self.best, self._stale = bound, 0
+        elif self._stale == PATIENCE:
+            self.step, self._stale = self.step * SHRINK, 0
+            self.restart(self.best)
+
+
+def bound_from(
+    instance: Instance,
+    targets: Float,
+    groups: Float,
+    layers: Float | None = None,
+    *,
+    exact: bool = True,
+    near: float = 0.0,
+) -> Bound:
     """Return the bound that some multipliers give, in double precision where ``exact``.
 
     The budget's multiplier is sought near the one given, if any.
+
+    Parameters
+    ----------
+    layers : (top, t) float64, optional
+        What each further sensor adds at most to a target; without them no target is seen yet.
     """
+    if layers is None:
+        layers = instance.unseen_layers
     if exact:
         score = np.concatenate([block @ targets for block in np.array_split(instance.visible, 16)])
     else:
         score = instance.gains(targets)
     selection = select(instance, score + groups @ instance.mandatory, near)
-    total = math.fsum if exact else np.sum
-    value = float(total(instance.weight - targets)) - math.fsum(groups) + selection.value
+    rest = np.maximum(layers - targets, 0.0).ravel()
+    value = (math.fsum(rest) if exact else float(rest.sum())) - math.fsum(groups) + selection.value
     return Bound(value, targets, groups, selection)
 
 
 def lagrangian_bound(
-    instance: Instance, goal: float, clock: Clock, start: Float | None = None, iterations: int = ITERATIONS
+    instance: Instance,
+    goal: float,
+    clock: Clock,
+    start: Float | None = None,
+    iterations: int = ITERATIONS,
+    layers: Float | None = None,
 ) -> Generator[Progress, None, tuple[Integer, Bound]]:
     """Search for multipliers with a small bound by deflected subgradients.
 
@@ -142,72 +226,64 @@ def lagrangian_bound(
     Parameters
     ----------
     goal : float
-        Covered weight to reach; the search ends when the bound falls below.
+        Objective value to reach; the search ends when the bound falls below.
     clock : Clock
         Ends the search when the time is up.
     start : (t,) float64, optional
         Multipliers of the targets to begin from.
     iterations : int
         At most so many steps.
-
-    Yields
-    ------
-    Progress
+    layers : (top, t) float64, optional
+        As for `bound_from`.
 
     Returns
     -------
     (k,) int64
-        Candidates that some placement covering ``goal`` may contain.
+        Candidates that some placement reaching ``goal`` may contain.
     Bound
         The best one found for placements of these, evaluated in double
         precision; where none is left, of those that were left last.
     """
+    layers = instance.unseen_layers if layers is None else layers
+    most = layers[0]
     keep = np.arange(len(instance))
-    targets = instance.weight / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5 if start is None else start
+    targets = most / np.maximum(1, instance.visible.sum(axis=0)) ** 0.5 if start is None else start
     groups = np.zeros(len(instance.mandatory))
     # group multipliers live on the scale of scores, those of targets on that of weights
     stretch = instance.visible.sum() / len(instance) if len(groups) else 1.0
-    best = bound_from(instance, targets, groups, exact=False)
-    direction, group_direction = np.zeros(len(targets)), np.zeros(len(groups))
-    step, stale = 1.0, 0
-    current = best
+    descent = SubgradientDescent(bound_from(instance, targets, groups, layers, exact=False), float(layers.sum()))
     for iteration in range(iterations):
-        if best.value < goal - instance.margin or step < SMALLEST_STEP or clock.left <= 0:
+        best = descent.best
+        if best.value < goal - instance.margin or descent.step < SMALLEST_STEP or clock.left <= 0:
             break
         if iteration % REVIEW == REVIEW - 1 and len(can_reach(instance, best, goal)) <= WORTHWHILE * len(keep):
-            within = can_reach(instance, bound_from(instance, best.targets, best.groups, exact=True), goal)
+            within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)
             if _few(instance, within):
                 break
             keep, instance = keep[within], instance.of(within)
-            targets, groups = best.targets, best.groups
-            current = best = bound_from(instance, targets, groups, exact=False)
-            direction[:], group_direction[:] = 0.0, 0.0
+            descent.restart(bound_from(instance, best.targets, best.groups, layers, exact=False))
         yield Progress(iteration, iterations, "bounding what any placement can cover")
         clock.spend(2 * instance.visible.size)
+        current = descent.current
         picked = current.selection.picked
         seen = instance.visible[picked].sum(axis=0)
-        slope = np.where(targets < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
-        direction = slope + DEFLECTION * direction
-        group_direction = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0) + DEFLECTION * group_direction
-        size = float(direction @ direction + group_direction @ group_direction)
-        if size == 0:
+        # the subgradient nearest to zero: where a multiplier meets layers any number of these may count
+        slope = np.maximum(
+            seen - (layers >= current.targets).sum(axis=0),
+            np.minimum(seen - (layers > current.targets).sum(axis=0), 0),
+        )
+        group_slope = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0)
+        change = descent.move(np.concatenate([slope, group_slope]), goal)
+        if change is None:
             break
-        length = step * max(current.value - goal, 1e-6 * instance.total) / size
-        targets = np.clip(targets - length * direction, 0.0, instance.weight)
-        groups = np.maximum(groups - length * stretch * group_direction, 0.0)
-        current = bound_from(instance, targets, groups, exact=False, near=current.selection.multiplier)
-        if current.value < best.value - 1e-7 * instance.total:
-            best, stale = current, 0
-        else:
-            stale += 1
-            if stale == PATIENCE:
-                step, stale = step * SHRINK, 0
-                targets, groups, current = best.targets, best.groups, best
-                direction[:], group_direction[:] = 0.0, 0.0
-    best = bound_from(instance, best.targets, best.groups, exact=True)
+        targets = np.clip(current.targets - change[: len(most)], 0.0, most)
+        groups = np.maximum(current.groups - stretch * change[len(most) :], 0.0)
+        descent.record(bound_from(instance, targets, groups, layers, exact=False, near=current.selection.multiplier))
+    best = descent.best
+    best = bound_from(instance, best.targets, best.groups, layers)
     within = can_reach(instance, best, goal)
     if len(within):
-        best = bound_from(instance.of(within), best.targets, best.groups, exact=True)
+        best = bound_from(instance.of(within), best.targets, best.groups, layers)
     return keep[within], best
 
 
@@ -231,7 +307,7 @@ def least_price(instance: Instance, bound: Bound, goal: float) -> float:
 
 
 def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
-    """Return the candidates that some placement covering ``goal`` may contain, (k,) int64.
+    """Return the candidates that some placement reaching ``goal`` may contain, (k,) int64.
 
     A candidate is ruled out when the bound, with that candidate forced into
     the selection, falls short of the goal by more than `TIE`: all optimal

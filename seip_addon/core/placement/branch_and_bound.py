@@ -1,4 +1,4 @@
-"""Best-first branch and bound on the marginal gains of sensors.
+r"""Best-first branch and bound on the marginal gains of sensors, for coverage and multi-cover.
 
 A placement is built in greedy order: each sensor adds no more than the one
 before it, because coverage is submodular. At a node with k sensors still to
@@ -9,6 +9,19 @@ submodular set functions). The gains on top of all children come from one
 matrix product, and cut most of them before they become nodes. Where rings of
 beams overlap a little everywhere the relaxed integer program is weak and this
 bound is strong.
+
+The value φ of a target by the number of sensors that see it (`multi_cover`)
+need not be concave: where two sensors must see it, one is worth nothing. With
+S chosen and l sensors still to come, a target seen n times is worth φ(n), and
+what follows adds to it no more than the least concave function
+:math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
+
+.. math::
+    F(S \cup R) \le F(S) + \sum_j w_j\, φ_{n_j(S),\,l}(n_j(R)), \quad |R| \le l,
+
+which is submodular in R, and tighter in every branch than above it: who has
+been seen once counts in full or not at all, who cannot be seen often enough
+any more counts no longer, and for the last sensor it is exact.
 
 The largest bound among the open nodes holds for every placement that the
 search has not seen: it falls as the search goes on, and a search that is
@@ -29,7 +42,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
-from .bounds import lagrangian_bound, select
+from .bounds import Bound, lagrangian_bound, select
 from .clock import Clock
 from .instance import EXACT, Instance, Numbers
 from .problem import TIE
@@ -38,7 +51,10 @@ RELAXED = 3
 """With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""
 
 WIDE = 60
-"""... where at least so many children are left ..."""
+"""... where at least so many children are left, and each sensor adds no more than the one before it ...
+
+Elsewhere branching itself tightens the bound, and sooner.
+"""
 
 TRIALS, WORTHWHILE = 4, 0.5
 """... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
@@ -63,16 +79,16 @@ class _Node:
     Parameters
     ----------
     bound : float
-        No placement below this node covers more.
+        No placement below this node has a larger objective value.
     chosen : tuple of int
         In the order in which they were chosen.
     value : float
-        What they cover.
+        Their objective value.
     goal : float
-        What a placement below this node must cover to be wanted.
+        Objective value that a placement below this node must have to be wanted.
     followers : (n,) int64
     gains : (n,) float
-        What each follower would add.
+        What each follower would add at most, with those that follow it.
     multipliers : (t,) float64, optional
         Lagrangian multipliers of the targets to begin from.
     multiplier : float
@@ -116,19 +132,28 @@ class Search:
     Parameters
     ----------
     goal : float
-        Weight to be covered at least.
+        Objective value to be reached at least.
     depth_first : bool
         Whether to follow each branch to its end before the next one, instead of taking the largest bound first.
+    root : (n,) int64 and Bound, optional
+        Candidates to search among, and a bound on what placements of these reach, where known.
 
     Attributes
     ----------
     goal : float
-        A placement of less is not wanted. It rises as placements are found.
+        A placement of a smaller value is not wanted. It rises as placements are found.
     satisfied : bool
         Whether enough was found.
     """
 
-    def __init__(self, instance: Instance, goal: float, *, depth_first: bool = False) -> None:
+    def __init__(
+        self,
+        instance: Instance,
+        goal: float,
+        *,
+        depth_first: bool = False,
+        root: tuple[Integer, Bound] | None = None,
+    ) -> None:
         self.instance = instance
         self.goal = instance.attainable(goal) - instance.slack
         self.satisfied = False
@@ -137,7 +162,7 @@ class Search:
         self._matrix = instance.matrix
         self._by_target = np.ascontiguousarray(self._matrix.T)
         self._weight = instance.weight.astype(self._matrix.dtype)
-        self._overlap = (self._matrix * self._weight) @ self._by_target
+        self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
         self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
         # running sums of all gains, each at most the total, are exact below EXACT and rounded at each step beyond
         most = instance.total * (len(instance) + 1)
@@ -146,13 +171,16 @@ class Search:
         self._stack: list[_Node] = []
         self._serial = self._waiting = self._met = 0
         self._left_over: dict[int, list[float]] = {}
-        gains = self._matrix @ self._weight
-        everyone = np.argsort(-gains, kind="stable")
-        self._push([_Node(math.inf, (), 0.0, -math.inf, everyone, gains[everyone])])
+        gains = self._matrix @ instance.unseen_layers[0].astype(self._matrix.dtype)
+        first = np.argsort(-gains, kind="stable")
+        bound, multipliers = math.inf, None
+        if root is not None:
+            first, bound, multipliers = first[np.isin(first, root[0])], root[1].value, root[1].targets
+        self._push([_Node(bound, (), 0.0, -math.inf, first, gains[first], multipliers)])
 
     @property
     def bound(self) -> float:
-        """No placement that the search has not seen covers more; -inf where all is seen that can be wanted."""
+        """No placement not seen yet has a larger objective value; -inf where all is seen that can be wanted."""
         bounds = [node.bound for node in self._stack] + [node.bound for _, node in self._queue[:1]]
         bound = max(bounds, default=-math.inf)
         return bound if bound >= self.goal - self._rounding else -math.inf
@@ -170,18 +198,17 @@ class Search:
             self._push((yield from self._expand(self._pop())))
         return True
 
-    def _take(self, placement: Integer, value: float) -> float:
+    def _take(self, placement: Integer) -> float:
         """Take a placement that may reach the goal; return the goal that placements with more sensors must reach."""
         raise NotImplementedError
 
-    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:
-        """Whether nothing below is wanted for another reason than its coverage."""
-        raise NotImplementedError
+    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- for subclasses
+        """Whether nothing below is wanted for another reason than its objective value."""
+        return False
 
     def offer(self, chosen: Integer) -> float:
         """Take a placement found elsewhere; return the goal that placements with more sensors must reach."""
-        placement = np.sort(np.array(chosen, dtype=np.int64))
-        return self._take(placement, self.instance.covered(placement))
+        return self._take(np.sort(np.array(chosen, dtype=np.int64)))
 
     def _is_open(self) -> bool:
         if not self._stack and self._queue and self._queue[0][1].bound < self.goal - self._rounding:
@@ -216,7 +243,8 @@ class Search:
         if left == 1:
             self._take_leaves(node, children)
             return []
-        if children >= WIDE and self._relaxation_pays(left):
+        known = node.multipliers is not None and not node.chosen
+        if children >= WIDE and self.instance.cover.concave and not known and self._relaxation_pays(left):
             before = children
             node, children = yield from self._relaxed(node, left, goal)
             self._left_over.setdefault(left, []).append(children / before)
@@ -232,9 +260,11 @@ class Search:
 
     def _children(self, node: _Node, children: int, left: int, goal: float) -> list[_Node]:
         """Return the children of a node whose bounds reach the goal, after offering those that reach it themselves."""
-        later, gains_after = self._after_each(node, children)
+        times = self.instance.times(node.chosen)
+        later = self._may_follow(node, children)
+        gains_after = self._gains(node, times, left - 1) - self._overlaps(times, left - 1, node.followers, children)
         multiplier, best = self._best_completions(node, np.where(later, gains_after, 0.0), left - 1)
-        values = node.value + node.gains[:children].astype(np.float64)
+        values = node.value + self._gains(node, times, 1)[:children].astype(np.float64)
         kept = []
         for row in np.flatnonzero(values + best >= goal):
             chosen, value, wanted = (*node.chosen, int(node.followers[row])), float(values[row]), self._wanted(node)
@@ -249,7 +279,7 @@ class Search:
         return kept
 
     def _wanted(self, node: _Node) -> float:
-        """Return what a placement below a node must cover, but for rounding."""
+        """Return the objective value that a placement below a node must have, but for rounding."""
         return max(node.goal, self.goal) - self._rounding
 
     def _left(self, node: _Node) -> int:
@@ -295,18 +325,21 @@ class Search:
     def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
         """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
         instance, followers = self.instance, node.followers
-        unseen = np.flatnonzero(~instance.visible[list(node.chosen)].any(axis=0))
+        layers = instance.layers(instance.times(node.chosen), left)
+        open_targets = np.flatnonzero(layers[0] > 0)
         rest = replace(
             self._limits(node, left),
-            visible=instance.visible[np.ix_(followers, unseen)],
-            weight=instance.weight[unseen],
+            visible=instance.visible[np.ix_(followers, open_targets)],
+            weight=instance.weight[open_targets],
             conflict=instance.conflict[np.ix_(followers, followers)],
         )
-        start = None if node.multipliers is None else node.multipliers[unseen]
+        start = None if node.multipliers is None else node.multipliers[open_targets]
         steps = FIRST_STEPS if start is None else LATER_STEPS
-        keep, bound = yield from lagrangian_bound(rest, goal - node.value, self._clock, start, steps)
+        keep, bound = yield from lagrangian_bound(
+            rest, goal - node.value, self._clock, start, steps, layers[:, open_targets]
+        )
         multipliers = np.zeros(len(instance.weight))
-        multipliers[unseen] = bound.targets
+        multipliers[open_targets] = bound.targets
         node = replace(
             node,
             bound=min(node.bound, node.value + bound.value),
@@ -316,33 +349,47 @@ class Search:
         )
         return _within_reach(node, left, goal)
 
-    def _after_each(self, node: _Node, children: int) -> tuple[Boolean, Numbers]:
-        """Return who may follow each child, and the gains of all followers on top of it, (children, n) each."""
+    def _may_follow(self, node: _Node, children: int) -> Boolean:
+        """Return who may follow each child, (children, n)."""
         instance, followers = self.instance, node.followers
         first = followers[:children]
-        gains_after = node.gains - self._overlaps(node.chosen, followers, children)
         later: Boolean = np.arange(len(followers)) > np.arange(children)[:, None]
         later &= ~self._excluded[first[:, None], followers]
         if math.isfinite(instance.budget):
             spent = math.fsum(instance.price[list(node.chosen)])
             later &= instance.affordable(spent + instance.price[first, None] + instance.price[followers])
-        return later, gains_after
+        return later
 
-    def _overlaps(self, chosen: tuple[int, ...], followers: Integer, children: int) -> Numbers:
-        """Return the weight that each child sees together with each follower and no chosen one, (children, n)."""
-        visible = self.instance.visible
-        seen = visible[list(chosen)].any(axis=0)
-        by_child = visible[followers[:children]].any(axis=0)
-        already, anew = np.flatnonzero(seen & by_child), np.flatnonzero(~seen & by_child)
-        targets = min(already, anew, key=len)
+    def _gains(self, node: _Node, times: Integer, left: int) -> Numbers:
+        """Return what each follower adds at most to targets seen so many times, with so many to come, (n,)."""
+        instance = self.instance
+        if instance.cover.concave:  # the same however many are to come
+            return node.gains
+        increments = instance.increments(times, left).astype(self._matrix.dtype)
+        gains: Numbers = (self._matrix @ increments)[node.followers]
+        return gains
+
+    def _overlaps(self, times: Integer, left: int, followers: Integer, children: int) -> Numbers:
+        """Return how much less each follower adds after each child, with so many to come, (children, n).
+
+        For plain coverage this is the weight that both see and no chosen one: all that both see, less what is seen
+        already, where that is shorter.
+        """
+        instance = self.instance
+        lost = instance.increments(times, left) - instance.increments(times + 1, left)
+        by_child = instance.visible[followers[:children]].any(axis=0)
+        kept, changed = np.flatnonzero(by_child & (lost == 0)), np.flatnonzero(by_child & (lost != 0))
+        overlap = self._overlap if len(kept) <= len(changed) else None
+        targets = changed if overlap is None else kept
+        factor = (lost if overlap is None else instance.weight)[targets].astype(self._matrix.dtype)[:, None]
         self._clock.spend(len(targets) * len(followers) * (children + COPY))
         rows, by_target = followers[:children], self._by_target[targets]
-        if 2 * len(followers) < len(self.instance):
+        if 2 * len(followers) < len(instance):
             by_target = by_target[:, followers]
-            shared: Numbers = (by_target[:, :children] * self._weight[targets, None]).T @ by_target
+            shared: Numbers = (by_target[:, :children] * factor).T @ by_target
         else:
-            shared = ((by_target[:, rows] * self._weight[targets, None]).T @ by_target)[:, followers]
-        return self._overlap[rows[:, None], followers] - shared if targets is already else shared
+            shared = ((by_target[:, rows] * factor).T @ by_target)[:, followers]
+        return shared if overlap is None else overlap[rows[:, None], followers] - shared
 
     def _best_completions(self, node: _Node, gains_after: Numbers, left: int) -> tuple[float, Float]:
         """Return what so many sensors more add to each child at most, within what it leaves of the budget.
@@ -397,8 +444,8 @@ class BestPlacements(Search):
         """Sorted candidates of the placements that cover most, in the order in which they were met."""
         return list(self._listed.values())
 
-    def _take(self, placement: Integer, value: float) -> float:
-        instance = self.instance
+    def _take(self, placement: Integer) -> float:
+        instance, value = self.instance, self.instance.value(placement)
         if value < self.goal or not instance.feasible(placement):
             return self.goal
         if value > self._value + instance.slack:
@@ -414,9 +461,6 @@ class BestPlacements(Search):
             self.goal = self._value + instance.step - instance.slack
         self.satisfied = self.overflowed and self._bound < self._value + instance.step - instance.slack
         return value + instance.step - instance.slack
-
-    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- coverage is all
-        return False
 
 
 class FirstInOrder(Search):
@@ -441,8 +485,8 @@ class FirstInOrder(Search):
         self.best: Integer | None = None
         self._key: tuple[int, float, float, list[int]] | None = None
 
-    def _take(self, placement: Integer, value: float) -> float:
-        if value >= self.goal and self.instance.feasible(placement):
+    def _take(self, placement: Integer) -> float:
+        if self.instance.value(placement) >= self.goal and self.instance.feasible(placement):
             key = merit(self.instance, placement)
             if self._key is None or key < self._key:
                 self.best, self._key = placement, key
@@ -456,7 +500,7 @@ class FirstInOrder(Search):
         price = relative_price(instance, math.fsum(instance.price[list(chosen)]) + math.fsum(prices))
         if price != self._key[1]:
             return price > self._key[1]
-        twice = np.minimum(instance.visible[list(chosen)].sum(axis=0), 2)
+        twice = np.minimum(instance.times(chosen), 2)
         below_two = instance.gains(instance.weight * (twice < 2))
         reach = float(instance.weight @ twice) + float(_largest(below_two[followers], left).sum())
         doubly = reach - self.goal + self._rounding

@@ -12,14 +12,13 @@ from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
-from .clock import Clock
+from .clock import DEFAULT_LIMITS, Clock, SolverLimits
 from .feasibility import starting_choice
-from .greedy import greedy, greedy_and_exchange, without_idle
+from .greedy import greedy, greedy_with_swaps, without_idle
 from .instance import Instance, common_unit, make_instance
 from .integer_program import check_solver, reaching
-from .problem import TIE, Placement, PlacementProblem, record_choice, relative_gap
-from .scale_notes import scale_notes
-from .solver import prove, solve_within
+from .problem import TIE, Placement, PlacementProblem, assess
+from .solver import prove, scale_notes, solve_within
 from .ties import fewest
 
 FINISH = 1.0
@@ -27,12 +26,7 @@ FINISH = 1.0
 
 
 def cheapest_for_coverage(
-    problem: PlacementProblem,
-    coverage: float,
-    *,
-    solver: str = "highs",
-    time_limit: float = 60.0,
-    effort: float = math.inf,
+    problem: PlacementProblem, coverage: float, limits: SolverLimits = DEFAULT_LIMITS
 ) -> Generator[Progress, None, Placement]:
     """Choose the cheapest placement that covers a share of all weight.
 
@@ -47,19 +41,6 @@ def cheapest_for_coverage(
         Its number of sensors and budget limit the placement where they are given.
     coverage : float
         Share of the weight of all targets, above 0 and at most 1.
-    solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
-    time_limit : float, seconds
-    effort : float, units of work
-        As for `solve`.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Placement
 
     Raises
     ------
@@ -68,7 +49,7 @@ def cheapest_for_coverage(
     """
     if not 0 < coverage <= 1:
         raise SeipError(f"the coverage to reach is {coverage:g}; give a share above 0 and at most 1")
-    clock = Clock(time_limit, effort)
+    solver, clock = limits.solver, limits.clock()
     check_solver(solver)
     instance, factor = make_instance(problem)
     whole = math.fsum(problem.weights) * factor
@@ -92,12 +73,12 @@ def _reaching(
 ) -> Generator[Progress, None, Integer]:
     """Return some placement that reaches the goal."""
     start = yield from starting_choice(problem, instance, solver)
-    chosen, _ = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
-    if instance.covered(chosen) >= goal - instance.slack:
+    chosen = greedy(instance, start, per_price=bool(instance.price.any()), enough=goal - instance.slack)
+    if instance.value(chosen) >= goal - instance.slack:
         return chosen
-    first = yield from greedy_and_exchange(instance, start)
+    first = yield from greedy_with_swaps(instance, start)
     proof = yield from prove(instance, first, solver, clock)
-    covered = instance.covered(proof.chosen)
+    covered = instance.value(proof.chosen)
     if covered >= goal - instance.slack:
         return proof.chosen
     wanted = f"a coverage of {goal / whole:.2%}"
@@ -128,7 +109,7 @@ def _cheapest(
         single = float(instance.price[0])
         return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
     cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
-    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups, exact=True), goal)
+    within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups), goal)
     keep, cheaper = keep[within], cheaper.part(within)
     if len(keep) == 0:
         return chosen, price
@@ -156,10 +137,7 @@ def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer)
 
 
 def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
-    record = record_choice(
-        problem, chosen, math.inf, optimal=False, solver=best.solver, seconds=clock.seconds, notes=()
-    )
-    price = record.price
+    price = math.fsum(problem.prices[chosen])
     optimal = bound >= price * (1 - 3 * TIE)
     notes = [*scale_notes(problem)]
     if not optimal:
@@ -168,11 +146,13 @@ def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Plac
         )
     if best.status != "optimal":
         notes.append("among equally cheap placements another one may cover more")
-    return replace(
-        record,
-        objective=price,
-        bound=price if optimal else max(bound, 0.0),
-        gap=0.0 if optimal else relative_gap(price, max(bound, 0.0)),
-        status="optimal" if optimal else "feasible",
+    return assess(
+        problem,
+        chosen,
+        max(bound, 0.0),
+        optimal=optimal,
+        solver=best.solver,
+        seconds=clock.seconds,
         notes=tuple(notes),
+        objective=price,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
 
 from ..errors import SeipError
 
@@ -15,6 +16,33 @@ OVERHEAD = 3e6
 
 SHORTEST = 0.01
 """Seconds, or units of work, of a part of a limit where nothing is left."""
+
+
+@dataclass(frozen=True)
+class SolverLimits:
+    """Solver of integer programs, and how long a placement is searched.
+
+    Parameters
+    ----------
+    solver : str
+        ``highs``, ``cbc`` or ``gurobi``.
+    time_limit : float, seconds
+        After it the best placement found is returned with its bound and gap.
+    effort : float, units of work
+        Alike, but counted: the same on every machine, about a second of one processor core each. Where it ends the
+        search before the time does, the same inputs give the same result again.
+    """
+
+    solver: str = "highs"
+    time_limit: float = 60.0
+    effort: float = math.inf
+
+    def clock(self) -> Clock:
+        """Return a clock that starts now."""
+        return Clock(self.time_limit, self.effort)
+
+
+DEFAULT_LIMITS = SolverLimits()
 
 
 class Clock:

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
-from .bounds import DEFLECTION, PATIENCE, SHRINK, SMALLEST_STEP
+from .bounds import SMALLEST_STEP, SubgradientDescent
 from .clock import Clock
 from .greedy import greedy
 from .instance import Instance, Numbers
@@ -82,49 +82,32 @@ def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float
         The search ends when the bound falls below.
     seconds : float
         Longest time to search.
-
-    Yields
-    ------
-    Progress
     """
     districts = _districts(instance)
     end = clock.elapsed + min(seconds, clock.left)
     shared = np.zeros(len(instance.weight))
     for district in districts:
         shared[district.targets] += 1
-    multipliers = instance.weight / np.maximum(shared, 1)
-    value, seen = _bound(instance, districts, multipliers)
-    best, best_at, seen_at_best = value, multipliers, seen
-    direction, step, stale = np.zeros(len(multipliers)), 1.0, 0
+    descent = SubgradientDescent(_bound(instance, districts, instance.weight / np.maximum(shared, 1)), instance.total)
     for iteration in range(ITERATIONS):
-        if best < goal - instance.margin or step < SMALLEST_STEP or clock.elapsed > end:
+        if descent.best.value < goal - instance.margin or descent.step < SMALLEST_STEP or clock.elapsed > end:
             break
-        yield Progress(iteration, ITERATIONS, "bounding by districts")
+        yield Progress(iteration, ITERATIONS, "bounding by parts of the candidates")
         clock.spend(6 * sum(district.matrix.size for district in districts))
-        slope = np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0))
-        direction = slope + DEFLECTION * direction
-        size = float(direction @ direction)
-        if size == 0:
+        multipliers, seen = descent.current.multipliers, descent.current.seen
+        change = descent.move(np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0)), goal)
+        if change is None:
             break
-        length = step * max(value - goal, 1e-6 * instance.total) / size
-        multipliers = np.clip(multipliers - length * direction, 0.0, instance.weight)
-        value, seen = _bound(instance, districts, multipliers)
-        stale += 1
-        if value < best - 1e-7 * instance.total:
-            best, best_at, seen_at_best, stale = value, multipliers, seen, 0
-        elif stale == PATIENCE:
-            step, stale = step * SHRINK, 0
-            value, multipliers, seen = best, best_at, seen_at_best
-            direction[:] = 0.0
+        descent.record(_bound(instance, districts, np.clip(multipliers - change, 0.0, instance.weight)))
     precise = [replace(district, matrix=district.matrix.astype(np.float64)) for district in districts]
-    return _bound(instance, precise, best_at)[0]
+    return _bound(instance, precise, descent.best.multipliers).value
 
 
 def _districts(instance: Instance) -> list[_District]:
     """Part the candidates around the first of a greedy choice, each clique where it overlaps most."""
     number = max(1, round(instance.count / SENSORS))
     free = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
-    centres, _ = greedy(free, np.zeros(0, np.int64))
+    centres = greedy(free, np.zeros(0, np.int64))
     overlap = instance.gains((instance.visible[centres] * instance.weight).T)
     shared = np.zeros((int(instance.clique.max()) + 1, len(centres)))
     np.add.at(shared, instance.clique, overlap)
@@ -138,8 +121,16 @@ def _district(instance: Instance, members: Integer) -> _District:
     return _District(targets, instance.matrix[np.ix_(members, targets)], excluded)
 
 
-def _bound(instance: Instance, districts: list[_District], multipliers: Float) -> tuple[float, Float]:
-    """Return L and how often each target counts in it."""
+@dataclass(frozen=True, eq=False)
+class _DistrictBound:
+    """L at some multipliers, and how often each target counts in it."""
+
+    value: float
+    multipliers: Float
+    seen: Float
+
+
+def _bound(instance: Instance, districts: list[_District], multipliers: Float) -> _DistrictBound:
     found = [district.values(multipliers, instance.count) for district in districts]
     value, numbers = _share_out(np.array([values for values, _ in found]))
     seen = np.zeros(len(multipliers))
@@ -150,7 +141,7 @@ def _bound(instance: Instance, districts: list[_District], multipliers: Float) -
             seen[district.targets] += counted[1] * number / 2
         elif number > 1:
             seen[district.targets] += counted[2]
-    return math.fsum(instance.weight - multipliers) + value, seen
+    return _DistrictBound(math.fsum(instance.weight - multipliers) + value, multipliers, seen)
 
 
 def _share_out(values: Float) -> tuple[float, list[int]]:

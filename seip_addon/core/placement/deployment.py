@@ -114,10 +114,6 @@ def deploy(
         Which pose sees which target.
     chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
-
-    Returns
-    -------
-    Deployment
     """
     order = _by_added_coverage(visible, chosen)
     hung = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
@@ -133,10 +129,6 @@ def deployed(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
         In the order in which each adds to those before it; their own shares are not looked at.
     rows : (k, t) bool
         What each of them sees.
-
-    Returns
-    -------
-    Deployment
     """
     seen_by = rows.sum(axis=0, dtype=np.int64)
     seen = seen_by > 0

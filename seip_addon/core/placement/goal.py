@@ -17,6 +17,7 @@ from ..progress import Progress
 from ..settings import setting
 from ..site.site import Candidates, Site
 from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
+from .clock import DEFAULT_LIMITS, SolverLimits
 from .deployment import Deployment, deploy
 
 DEFAULT_COUNT = 4
@@ -143,10 +144,6 @@ def placement_problem(
     models : mapping of str to LidarModel
         By catalogue key.
 
-    Returns
-    -------
-    PlacementProblem
-
     Raises
     ------
     SeipError
@@ -180,15 +177,12 @@ def check_goal(site: Site, models: Mapping[str, LidarModel], goal: Goal) -> None
     placement_problem(site, everything, models, goal)
 
 
-def make_plan(  # noqa: PLR0913 -- a problem, and the limits of its solution
+def make_plan(
     site: Site,
     visible: NDArray[np.bool_],
     models: Mapping[str, LidarModel],
     goal: Goal,
-    *,
-    solver: str = "highs",
-    time_limit: float = 60.0,
-    effort: float = math.inf,
+    limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, Plan]:
     """Answer a goal on a site: the most coverage, or the least price for a coverage.
 
@@ -198,19 +192,6 @@ def make_plan(  # noqa: PLR0913 -- a problem, and the limits of its solution
         The visibility grid.
     models : mapping of str to LidarModel
         By catalogue key.
-    solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
-    time_limit : float, seconds
-    effort : float, units of work
-        As for `placement.solve`.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Plan
 
     Raises
     ------
@@ -219,12 +200,10 @@ def make_plan(  # noqa: PLR0913 -- a problem, and the limits of its solution
     """
     problem = placement_problem(site, visible, models, goal)
     if goal.coverage is not None:
-        placement = yield from cheapest_for_coverage(
-            problem, goal.coverage, solver=solver, time_limit=time_limit, effort=effort
-        )
+        placement = yield from cheapest_for_coverage(problem, goal.coverage, limits)
         greedy = None
     else:
-        placement = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
+        placement = yield from solve(problem, limits)
         greedy = solve_greedy(problem)
     return Plan(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Iterator
 
 import numpy as np
 
@@ -15,19 +15,17 @@ from .instance import Instance
 from .problem import TIE
 
 STARTS = 8
-"""Candidates to begin a greedy choice with, before exchanges."""
+"""Candidates to begin a greedy choice with, before swaps."""
 
 STEPS = 2
-"""Exchanges of a tabu search for each candidate."""
+"""Swaps of a tabu search for each candidate."""
 
 HOLD, RETURN = 4, 12
 """Who came stays for fewer steps than the first of these, and who went stays away for once or twice the second."""
 
 
-def greedy(
-    instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf
-) -> tuple[Integer, float]:
-    """Add the candidate of largest gain until nothing that is allowed gains.
+def greedy(instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf) -> Integer:
+    """Add the candidate of largest gain until nothing that is allowed gains; return the choice, ascending.
 
     Parameters
     ----------
@@ -36,63 +34,73 @@ def greedy(
     per_price : bool
         Whether gains are divided by prices (for budgets).
     enough : float
-        Covered weight at which to stop.
-
-    Returns
-    -------
-    (k,) int64
-        The choice, ascending.
-    float
-        An upper bound on the covered weight of any placement: the smallest,
-        over all steps, of what is covered and the best gains on top of it
-        (Leskovec et al. 2007, section 3.2).
+        Objective value at which to stop.
     """
-    chosen, bound = start, instance.total
+    *_, chosen = greedy_steps(instance, start, per_price=per_price, enough=enough)
+    return np.sort(chosen)
+
+
+def greedy_steps(
+    instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf
+) -> Iterator[Integer]:
+    """Yield what `greedy` has chosen before and after each step, in the order in which it was chosen."""
+    chosen = start
     while True:
-        gain = instance.gains(instance.uncovered(chosen))
-        bound = min(bound, instance.covered(chosen) + select(instance, gain).value)
+        yield chosen
+        left = max(instance.count - len(chosen), 0)
+        gain = instance.gains(instance.increments(instance.times(chosen), left))
         gain[~addable(instance, chosen)] = 0.0
         score = gain / np.maximum(instance.price, TIE * instance.price.max()) if per_price else gain
         best = int(np.argmax(score))
-        if gain[best] <= 0 or instance.covered(chosen) >= enough:
-            return np.sort(chosen), bound
+        if gain[best] <= 0 or instance.value(chosen) >= enough:
+            return
         chosen = np.append(chosen, best)
 
 
-def greedy_choices(instance: Instance, start: Integer) -> list[tuple[Integer, float]]:
-    """Return the greedy choice by gain and, under a budget, the one by gain per price, each with its bound."""
-    by_price = [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
-    return [greedy(instance, start, per_price=per_price) for per_price in by_price]
+def greedy_bound(instance: Instance, steps: Iterable[Integer]) -> float:
+    """Return an upper bound on the covered weight of any placement, for `COVERAGE`.
+
+    It is the smallest, over all steps, of what is covered and the best gains
+    on top of it (Leskovec et al. 2007, section 3.2).
+    """
+    reached = [
+        instance.value(chosen) + select(instance, instance.gains(instance.increments(instance.times(chosen)))).value
+        for chosen in steps
+    ]
+    return min([instance.total, *reached])
 
 
-def greedy_and_exchange(instance: Instance, start: Integer) -> Generator[Progress, None, Integer]:
-    """Return the best of several greedy choices after exchanges, ascending.
+def orders(instance: Instance) -> list[bool]:
+    """Return whether to choose greedily by gain per price, under a budget in both ways."""
+    return [False, True] if math.isfinite(instance.budget) and instance.price.max() > 0 else [False]
 
-    Exchanges end in a local optimum; beside the greedy choices themselves those
+
+def greedy_with_swaps(instance: Instance, start: Integer) -> Generator[Progress, None, Integer]:
+    """Return the best of several greedy choices after swaps, ascending.
+
+    Swaps end in a local optimum; beside the greedy choices themselves those
     are improved that begin with another of the candidates that see the most.
     """
     best = start
-    for chosen, _ in greedy_choices(instance, start):
-        improved = yield from exchange(instance, chosen)
-        best = max(best, improved, key=instance.covered)
-    first = np.where(addable(instance, start), instance.gains(instance.uncovered(start)), 0.0)
+    for per_price in orders(instance):
+        improved = yield from swap_search(instance, greedy(instance, start, per_price=per_price))
+        best = max(best, improved, key=instance.value)
+    first = np.where(addable(instance, start), instance.gains(instance.increments(instance.times(start))), 0.0)
     for candidate in np.argsort(-first, kind="stable")[1:STARTS]:
-        if first[candidate] > 0 and instance.covered(best) < instance.total:
-            improved = yield from exchange(instance, np.append(start, candidate))
-            best = max(best, improved, key=instance.covered)
+        if first[candidate] > 0 and instance.value(best) < instance.total:
+            improved = yield from swap_search(instance, np.append(start, candidate))
+            best = max(best, improved, key=instance.value)
     return best
 
 
-def exchange(instance: Instance, chosen: Integer) -> Generator[Progress, None, Integer]:
-    """Swap one sensor for another, and add sensors, for as long as coverage grows."""
+def swap_search(instance: Instance, chosen: Integer) -> Generator[Progress, None, Integer]:
+    """Swap one sensor for another, and add sensors, for as long as the objective value grows."""
     while True:
-        chosen = greedy(instance, chosen)[0]
-        covered = instance.covered(chosen)
-        if covered == instance.total:
+        chosen = greedy(instance, chosen)
+        if instance.value(chosen) == instance.total:
             return chosen
-        yield Progress(0, 0, "exchanging sensors")
-        rests = _rests(instance, chosen)
-        gain = _swap_gains(instance, chosen, rests, instance.gains(rests.T).T)
+        yield Progress(0, 0, "swapping sensors")
+        gain = swap_gains(instance, chosen)
         if gain.max(initial=0.0) <= instance.slack:
             return chosen
         gone, new = np.unravel_index(int(np.argmax(gain)), gain.shape)
@@ -102,13 +110,13 @@ def exchange(instance: Instance, chosen: Integer) -> Generator[Progress, None, I
 def tabu_search(
     instance: Instance, chosen: Integer, clock: Clock, seconds: float
 ) -> Generator[Progress, None, Integer]:
-    """Make the best exchange again and again, even for the worse, and return the best choice met (Glover 1989).
+    """Make the best swap again and again, even for the worse, and return the best choice met (Glover 1989).
 
     Who went cannot come back for a while, and who came cannot go, unless that
     leads to a choice better than any before.
     """
     best, end = chosen, clock.elapsed + seconds
-    covered = most = instance.covered(chosen)
+    covered = most = instance.value(chosen)
     locked = np.zeros(len(instance), np.int64)
     random = np.random.default_rng(0)
     columns = np.ascontiguousarray(instance.matrix.T)
@@ -117,7 +125,7 @@ def tabu_search(
     for step in range(steps):
         if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
             break
-        yield Progress(step, steps, "searching exchanges")
+        yield Progress(step, steps, "searching swaps")
         clock.spend(2 * columns.size)
         before, rests = rests, _rests(instance, chosen)
         if len(rests) == len(before):
@@ -125,7 +133,7 @@ def tabu_search(
             seen += (rests - before)[:, changed].astype(columns.dtype) @ columns[changed]
         else:
             seen = instance.gains(rests.T).T
-        gain = _swap_gains(instance, chosen, rests, seen)
+        gain = _allowed_gains(instance, chosen, seen)
         held = (locked > step) | (locked[chosen, None] > step)
         gain[held & (covered + gain <= most + instance.slack)] = -np.inf
         if not np.isfinite(gain).any():
@@ -135,8 +143,8 @@ def tabu_search(
         locked[chosen[gone]] = step + random.integers(RETURN, 2 * RETURN)
         chosen = np.where(np.arange(len(chosen)) == gone, came, chosen)
         if len(chosen) < instance.count:
-            chosen, _ = greedy(instance, chosen)
-        covered = instance.covered(chosen)
+            chosen = greedy(instance, chosen)
+        covered = instance.value(chosen)
         if covered > most:
             best, most = np.sort(chosen), covered
     return best
@@ -146,14 +154,14 @@ def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
     """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != candidate]
-        if instance.mandatory[:, rest].any(axis=1).all() and instance.covered(rest) >= goal - instance.slack:
+        if instance.mandatory[:, rest].any(axis=1).all() and instance.value(rest) >= goal - instance.slack:
             chosen = rest
     return chosen
 
 
 def without_weakest(instance: Instance, chosen: Integer) -> Integer:
     """Take away the sensor that is missed least."""
-    return max((chosen[chosen != candidate] for candidate in chosen), key=instance.covered)
+    return max((chosen[chosen != candidate] for candidate in chosen), key=instance.value)
 
 
 def addable(instance: Instance, chosen: Integer) -> Boolean:
@@ -168,19 +176,20 @@ def addable(instance: Instance, chosen: Integer) -> Boolean:
     return room
 
 
+def swap_gains(instance: Instance, chosen: Integer) -> Float:
+    """Return what it adds to swap each chosen candidate for any other, (k, c); -inf where that is forbidden."""
+    return _allowed_gains(instance, chosen, instance.gains(_rests(instance, chosen).T).T)
+
+
 def _rests(instance: Instance, chosen: Integer) -> Float:
-    """Return the weights that are not covered without each of the chosen candidates, (k, t) float64."""
-    visible = instance.visible[chosen]
-    rests: Float = (visible.sum(axis=0) - visible == 0) * instance.weight
-    return rests
+    """Return what one sensor adds to each target once each of the chosen candidates is gone, (k, t) float64."""
+    return instance.increments(instance.times(chosen) - instance.visible[chosen])
 
 
-def _swap_gains(instance: Instance, chosen: Integer, rests: Float, seen: Float) -> Float:
-    """Return what it adds to exchange each chosen candidate for any other, (k, c); -inf where that is forbidden.
-
-    ``seen`` is what each candidate sees of the ``rests`` that the chosen ones leave.
-    """
-    gain: Float = seen + (instance.total - instance.covered(chosen) - rests.sum(axis=1))[:, None]
+def _allowed_gains(instance: Instance, chosen: Integer, seen: Float) -> Float:
+    """Return `swap_gains` by what each candidate adds to the others, (k, c)."""
+    without = instance.cover.value(instance.times(chosen) - instance.visible[chosen]) @ instance.weight
+    gain: Float = seen + (without - instance.value(chosen))[:, None]
     for row, candidate in zip(gain, chosen, strict=True):
         row[~addable(instance, chosen[chosen != candidate])] = -np.inf
     gain[:, chosen] = -np.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
+from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE, PlacementProblem, canonical_order
 
 EXACT = 2**53
@@ -66,6 +68,8 @@ class Instance:
         At most this many sensors.
     budget : float
         At most this total price; infinite where there is no budget.
+    cover : MultiCover
+        What a unit of weight is worth by how many sensors see it.
     """
 
     visible: Boolean
@@ -80,6 +84,7 @@ class Instance:
     original: Integer
     count: int
     budget: float
+    cover: MultiCover = COVERAGE
 
     def __len__(self) -> int:
         """Return the number of candidates."""
@@ -87,13 +92,13 @@ class Instance:
 
     @cached_property
     def matrix(self) -> Numbers:
-        """``visible`` as numbers, in the smallest precision in which products with weights are exact."""
+        """``visible`` as numbers, in the smallest precision in which products with increments are exact."""
         return self.visible.astype(np.float32 if self.total < SINGLE else np.float64)
 
     @cached_property
     def total(self) -> float:
-        """Weight that all candidates together cover."""
-        return float(self.weight.sum())
+        """Value of all targets, each seen as often as counts."""
+        return float(self.weight.sum()) * self.cover.unit
 
     def attainable(self, goal: float) -> float:
         """Return the smallest covered weight of at least ``goal`` that a placement can have at all."""
@@ -103,25 +108,38 @@ class Instance:
         """Return the largest covered weight up to ``bound`` that a placement can have at all."""
         return math.floor(bound + self.margin) if self.step == 1 else bound
 
-    def uncovered(self, chosen: Integer) -> Float:
-        """Return the weights of the targets, zero where the chosen candidates see them, (t,) float64."""
-        rest: Float = self.weight * ~self.visible[chosen].any(axis=0)
-        return rest
+    def times(self, chosen: Integer | Sequence[int]) -> Integer:
+        """Return how many of the chosen candidates see each target, (t,) int64."""
+        seen: Integer = self.visible[np.asarray(chosen, dtype=np.int64)].sum(axis=0, dtype=np.int64)
+        return seen
 
-    def gains(self, rest: Float) -> Float:
-        """Return what each candidate sees of some weights per target, exactly, (c, ...) float64.
+    def increments(self, times: Integer, left: int = 1, level: int = 0) -> Float:
+        """Return what the next sensor adds at most to targets seen so many times; see `MultiCover.increment`."""
+        more: Float = self.weight * self.cover.increment(times, left, level)
+        return more
+
+    def layers(self, times: Integer, left: int) -> Float:
+        """Return what each of the next sensors adds at most to targets seen so many times, (top, t) float64."""
+        return np.stack([self.increments(times, left, level) for level in range(self.cover.top)])
+
+    @property
+    def unseen_layers(self) -> Float:
+        """What each of the sensors adds at most to targets that are not seen yet, (top, t) float64."""
+        return self.layers(np.zeros(len(self.weight), dtype=np.int64), self.count)
+
+    def gains(self, per_target: Float) -> Float:
+        """Return what each candidate sees of increments per target, exactly, (c, ...) float64.
 
         Parameters
         ----------
-        rest : (t, ...) float64
-            Each is a target's weight or zero.
+        per_target : (t, ...) float64
         """
-        gained: Float = (self.matrix @ rest.astype(self.matrix.dtype)).astype(np.float64)
+        gained: Float = (self.matrix @ per_target.astype(self.matrix.dtype)).astype(np.float64)
         return gained
 
-    def covered(self, chosen: Integer) -> float:
-        """Return the weight that the chosen candidates cover."""
-        return float(self.weight[self.visible[chosen].any(axis=0)].sum())
+    def value(self, chosen: Integer) -> float:
+        """Return the value of the targets that the chosen candidates see: for `COVERAGE`, the covered weight."""
+        return float(self.weight @ self.cover.value(self.times(chosen)))
 
     def doubly(self, chosen: Integer) -> float:
         """Return the weight that two or more of the chosen candidates cover."""
@@ -177,7 +195,6 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
     margin = TIE * float(weight.sum())
     slack = min(margin, WHOLE_SLACK) if whole else margin
-    places = len(np.unique(problem.positions[order]))
     conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
         visible=visible,
@@ -190,19 +207,10 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         clique=_cliques(conflict),
         mandatory=problem.mandatory_groups[:, order],
         original=order,
-        count=min(places if problem.count is None else problem.count, _affordable_number(problem, order)),
+        count=problem.most_sensors,
         budget=math.inf if problem.budget is None else float(problem.budget),
     )
     return instance.part(np.flatnonzero(~_superfluous(instance, problem.positions[order]))), 1 / unit
-
-
-def _affordable_number(problem: PlacementProblem, order: Integer) -> int:
-    """Return how many sensors the budget buys at most, one at each position."""
-    if problem.budget is None:
-        return len(order)
-    cheapest = np.full(int(problem.positions.max()) + 1, math.inf)
-    np.minimum.at(cheapest, problem.positions[order], problem.prices[order])
-    return max(1, int(np.count_nonzero(np.cumsum(np.sort(cheapest)) <= problem.budget * (1 + TIE))))
 
 
 def common_unit(weights: Float) -> tuple[float, bool]:

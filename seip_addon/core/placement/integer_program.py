@@ -134,7 +134,7 @@ class CoverProgram:
     def require_coverage(self, goal: float) -> None:
         """Require a covered weight, but for the instance's slack."""
         instance = self.instance
-        self.require(self._at_least(self.covered, goal), lambda c: instance.covered(c) >= goal - instance.slack)
+        self.require(self._at_least(self.covered, goal), lambda c: instance.value(c) >= goal - instance.slack)
 
     def require_double_coverage(self, goal: float) -> None:
         """Require a doubly covered weight, but for the instance's slack."""

@@ -83,10 +83,6 @@ def near_best(
     share : float
         0 to 1.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     FlatTop or None
@@ -102,7 +98,7 @@ def near_best(
     instance, factor = make_instance(problem)
     if not is_worthwhile(instance, np.arange(len(instance))):
         return None
-    best = math.fsum(problem.weights[problem.visible[chosen].any(axis=0)]) * factor
+    best = problem.covered(chosen) * factor
     search = _NearBest(instance, (1 - share) * best)
     finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
     if not finished:
@@ -131,21 +127,19 @@ class _NearBest(Search):
         """Take a placement, and those that have another candidate in place of one of its own."""
         self.offer(chosen)
         for kept in (np.delete(chosen, number) for number in range(len(chosen))):
-            values = self.instance.covered(kept) + self.instance.gains(self.instance.uncovered(kept))
+            increments = self.instance.increments(self.instance.times(kept))
+            values = self.instance.value(kept) + self.instance.gains(increments)
             for other in np.setdiff1d(np.flatnonzero(values >= self.goal), kept):
                 self.offer(np.append(kept, other))
 
-    def _take(self, placement: Integer, value: float) -> float:
-        key = tuple(placement.tolist())
+    def _take(self, placement: Integer) -> float:
+        key, value = tuple(placement.tolist()), self.instance.value(placement)
         if value >= self.goal and key not in self.found and self.instance.feasible(placement):
             if len(self.found) == MOST_LISTED:
                 self.satisfied = True
             else:
                 self.found[key] = value
         return self.goal
-
-    def _is_hopeless(self, chosen: tuple[int, ...], followers: Integer) -> bool:  # noqa: ARG002 -- coverage is all
-        return False
 
 
 def _in_rows(placements: Sequence[Integer], least: int) -> Integer:

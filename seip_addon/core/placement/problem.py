@@ -104,6 +104,22 @@ class PlacementProblem:
             return [f"mandatory group {index + 1}" for index in range(len(self.mandatory_groups))]
         return [str(name) for name in self.mandatory_names]
 
+    @property
+    def most_sensors(self) -> int:
+        """The largest number of sensors that number, budget and positions allow."""
+        positions, position = np.unique(self.positions[self.allowed], return_inverse=True)
+        most = len(positions) if self.count is None else self.count
+        if self.budget is None:
+            return most
+        cheapest = np.full(len(positions), math.inf)
+        np.minimum.at(cheapest, position, self.prices[self.allowed])
+        affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE))
+        return min(most, max(1, int(affordable)))
+
+    def covered(self, chosen: Integer) -> float:
+        """Return the weight of the targets that some chosen candidate sees."""
+        return math.fsum(self.weights[self.visible[chosen].any(axis=0)])
+
     def _check_values(self) -> None:
         if len(self.visible) == 0:
             raise SeipError("there is no candidate to choose from; add poles or candidate areas")
@@ -185,7 +201,7 @@ def canonical_order(problem: PlacementProblem) -> Integer:
     return order
 
 
-def record_choice(  # noqa: PLR0913 -- the fields of one record
+def assess(  # noqa: PLR0913 -- the fields of one record
     problem: PlacementProblem,
     chosen: Integer,
     bound: float,
@@ -193,16 +209,19 @@ def record_choice(  # noqa: PLR0913 -- the fields of one record
     optimal: bool,
     solver: str,
     seconds: float,
-    notes: tuple[str, ...],
+    notes: tuple[str, ...] = (),
+    objective: float | None = None,
 ) -> Placement:
-    """Make the record of a choice that was optimised for coverage."""
-    covered = math.fsum(problem.weights[problem.visible[chosen].any(axis=0)])
-    bound = covered if optimal else max(bound, covered)
+    """Return a choice with coverage, price and certificate; the objective is the coverage if none is given."""
+    covered = problem.covered(chosen)
+    if objective is None:
+        objective, bound = covered, max(bound, covered)
+    bound = objective if optimal else bound
     return Placement(
         chosen=chosen,
-        objective=covered,
+        objective=objective,
         bound=bound,
-        gap=relative_gap(covered, bound),
+        gap=relative_gap(objective, bound),
         status="optimal" if optimal else "feasible",
         solver=solver,
         seconds=seconds,

@@ -12,21 +12,20 @@ from ..arrays import Integer
 from ..progress import Progress, finish
 from .bounds import Bound, can_reach, lagrangian_bound
 from .branch_and_bound import BestPlacements, is_worthwhile
-from .clock import Clock
+from .clock import DEFAULT_LIMITS, Clock, SolverLimits
 from .decomposition import district_bound
 from .feasibility import starting_choice
-from .greedy import exchange, greedy_and_exchange, greedy_choices, tabu_search, without_idle
-from .instance import Instance, make_instance
+from .greedy import greedy_bound, greedy_steps, greedy_with_swaps, orders, swap_search, tabu_search, without_idle
+from .instance import Instance, common_unit, make_instance
 from .integer_program import CoverProgram, check_solver
-from .problem import Placement, PlacementProblem, record_choice
-from .scale_notes import scale_notes
+from .problem import TIE, Placement, PlacementProblem, assess
 from .ties import MANY, canonical_optimum
 
 BRANCHING = 0.15
 """Share of what is left of the limits for a first branch and bound, which goes on after the other methods."""
 
 SEARCHING, PROBING, BOUNDING = 0.1, 0.05, 0.4
-"""Shares for a search of exchanges, for a first bound by districts, and for a full one where the first gains."""
+"""Shares for a tabu search of swaps, for a first bound by districts, and for a full one where the first gains."""
 
 GAIN = 0.05
 """Share of the gap that the first bound by districts must close for the full one to be worth its time."""
@@ -69,9 +68,7 @@ class Proof:
     halfway: float | None = None
 
 
-def solve(
-    problem: PlacementProblem, *, solver: str = "highs", time_limit: float = 60.0, effort: float = math.inf
-) -> Generator[Progress, None, Placement]:
+def solve(problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS) -> Generator[Progress, None, Placement]:
     """Choose the placement that covers most.
 
     Among optimal placements the one with fewest sensors is returned, then the
@@ -80,30 +77,11 @@ def solve(
     candidates and targets are ordered.
 
     Reductions that lose nothing come first; a greedy choice improved by
-    exchanges gives an incumbent, a Lagrangian relaxation a bound; candidates
+    swaps gives an incumbent, a Lagrangian relaxation a bound; candidates
     that the bound rules out are dropped. Among the rest branch and bound
     decides; where it does not soon, a tabu search improves the incumbent,
     districts and an integer program the bound where they can, and branch and
     bound goes on with the time that is left, its bound falling all the while.
-
-    Parameters
-    ----------
-    solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
-    time_limit : float, seconds
-        After it the best placement found is returned with its bound and gap.
-    effort : float, units of work
-        Alike, but counted: the same on every machine, about a second of one
-        processor core each. Where it ends the search before the time does, the
-        same inputs give the same result again.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Placement
 
     Raises
     ------
@@ -111,7 +89,7 @@ def solve(
         The constraints cannot be met together, no candidate sees any target,
         or the solver is not available.
     """
-    return (yield from solve_within(problem, solver, Clock(time_limit, effort)))
+    return (yield from solve_within(problem, limits.solver, limits.clock()))
 
 
 def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Generator[Progress, None, Placement]:
@@ -119,9 +97,9 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
     version = check_solver(solver)
     instance, factor = make_instance(problem)
     start = yield from starting_choice(problem, instance, solver)
-    first = yield from greedy_and_exchange(instance, start)
+    first = yield from greedy_with_swaps(instance, start)
     proof = yield from prove(instance, first, solver, clock)
-    chosen = without_idle(instance, proof.chosen, instance.covered(proof.chosen))
+    chosen = without_idle(instance, proof.chosen, instance.value(proof.chosen))
     notes = [*scale_notes(problem)]
     if proof.optimal:
         part = clock.counted_part(max(clock.work, LEAST_FOR_TIES))
@@ -139,7 +117,7 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
     if problem.count is not None and len(chosen) < problem.count:
         notes.append(_surplus(problem.count, len(chosen)))
     original = instance.original[chosen]
-    return record_choice(
+    return assess(
         problem,
         original,
         proof.bound / factor,
@@ -160,10 +138,6 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
     alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor 1999). The bound of
     the result is computed from the data and is usually far closer.
 
-    Returns
-    -------
-    Placement
-
     Raises
     ------
     SeipError
@@ -171,12 +145,13 @@ def solve_greedy(problem: PlacementProblem) -> Placement:
     """
     clock = Clock(math.inf)
     instance, factor = make_instance(problem)
-    runs = greedy_choices(instance, finish(starting_choice(problem, instance, "highs")))
-    chosen = max((choice for choice, _ in runs), key=instance.covered)
-    bound = min(bound for _, bound in runs)
+    start = finish(starting_choice(problem, instance, "highs"))
+    runs = [[*greedy_steps(instance, start, per_price=per_price)] for per_price in orders(instance)]
+    chosen = max((np.sort(steps[-1]) for steps in runs), key=instance.value)
+    bound = min(greedy_bound(instance, steps) for steps in runs)
     optimal = instance.attained(bound) < _better(instance, chosen)
     original = instance.original[chosen]
-    return record_choice(
+    return assess(
         problem,
         original,
         bound / factor,
@@ -194,16 +169,8 @@ def prove(instance: Instance, chosen: Integer, solver: str, clock: Clock) -> Gen
     ----------
     chosen : (k,) int64
         A placement to begin from.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Proof
     """
-    keep, bound = yield from lagrangian_bound(instance, instance.covered(chosen), clock)
+    keep, bound = yield from lagrangian_bound(instance, instance.value(chosen), clock)
     proof = yield from _prove_among(instance.part(keep), np.searchsorted(keep, chosen), bound, solver, clock)
     ties = None if proof.ties is None else tuple(keep[choice] for choice in proof.ties)
     return replace(proof, chosen=keep[proof.chosen], bound=instance.attained(proof.bound), ties=ties)
@@ -214,26 +181,26 @@ def _prove_among(
 ) -> Generator[Progress, None, Proof]:
     """Improve an incumbent among the candidates that a bound leaves, none better being among the others."""
     relaxed = yield from _from_relaxation(instance, bound, chosen)
-    chosen = max(chosen, relaxed, key=instance.covered)
+    chosen = max(chosen, relaxed, key=instance.value)
     least = min(bound.value, instance.total)
-    as_good = np.union1d(can_reach(instance, bound, instance.covered(chosen)), chosen)
+    as_good = np.union1d(can_reach(instance, bound, instance.value(chosen)), chosen)
     search = None
     if is_worthwhile(instance, as_good):
-        search = BestPlacements(instance.part(as_good), instance.covered(chosen), MANY, least)
+        search = BestPlacements(instance.part(as_good), instance.value(chosen), MANY, least)
         finished = yield from search.run(clock, BRANCHING * clock.left)
-        chosen = max([chosen, *_found(search, as_good)], key=instance.covered)
+        chosen = max([chosen, *_found(search, as_good)], key=instance.value)
         if finished:
             return _finished(instance, search, as_good, chosen)
         least = min(least, search.bound)
     if least >= _better(instance, chosen) - instance.margin:
         for beginning in (chosen, relaxed):
             searched = yield from tabu_search(instance, beginning, clock, SEARCHING * clock.left)
-            chosen = max(chosen, searched, key=instance.covered)
+            chosen = max(chosen, searched, key=instance.value)
         least = min(least, (yield from _by_districts(instance, least, chosen, clock)))
     keep = can_reach(instance, bound, _better(instance, chosen))
     if least < _better(instance, chosen) - instance.margin or len(keep) == 0:
-        return Proof(chosen, instance.covered(chosen), optimal=True)
-    tight = bound.value - instance.covered(chosen) <= TIGHT * instance.covered(chosen)
+        return Proof(chosen, instance.value(chosen), optimal=True)
+    tight = bound.value - instance.value(chosen) <= TIGHT * instance.value(chosen)
     if clock.left > 0 and (tight or search is None) and np.count_nonzero(instance.visible[keep]) <= LARGEST:
         yield Progress(0, 0, f"proving with {len(keep)} of {len(instance)} candidates")
         known, share = Proof(chosen, least, optimal=False), 1.0 if search is None else SOLVING
@@ -255,13 +222,13 @@ def _search_on(  # what is known, and how far to go
     halfway = None
     for share in (0.5, 1.0):
         finished = yield from search.run(clock, share * clock.left)
-        chosen = max([chosen, *_found(search, among)], key=instance.covered)
+        chosen = max([chosen, *_found(search, among)], key=instance.value)
         if finished:
             return _finished(instance, search, among, chosen)
         least = min(least, search.bound)
         halfway = least if halfway is None else halfway
     optimal = instance.attained(least) < _better(instance, chosen)
-    return Proof(chosen, max(least, instance.covered(chosen)), optimal=optimal, halfway=halfway)
+    return Proof(chosen, max(least, instance.value(chosen)), optimal=optimal, halfway=halfway)
 
 
 def _found(search: BestPlacements, among: Integer) -> list[Integer]:
@@ -271,7 +238,7 @@ def _found(search: BestPlacements, among: Integer) -> list[Integer]:
 def _finished(instance: Instance, search: BestPlacements, among: Integer, chosen: Integer) -> Proof:
     """Return the proof that a search has come to its end gives."""
     ties = None if search.overflowed else (chosen, *_found(search, among))
-    return Proof(chosen, instance.covered(chosen), optimal=True, ties=ties)
+    return Proof(chosen, instance.value(chosen), optimal=True, ties=ties)
 
 
 def _by_districts(instance: Instance, least: float, chosen: Integer, clock: Clock) -> Generator[Progress, None, float]:
@@ -285,7 +252,7 @@ def _by_districts(instance: Instance, least: float, chosen: Integer, clock: Cloc
 
 def _better(instance: Instance, chosen: Integer) -> float:
     """Return the covered weight that a strictly better placement reaches at least."""
-    return instance.covered(chosen) + instance.step
+    return instance.value(chosen) + instance.step
 
 
 def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Generator[Progress, None, Integer]:
@@ -293,7 +260,7 @@ def _from_relaxation(instance: Instance, bound: Bound, chosen: Integer) -> Gener
     picked = np.sort(bound.selection.picked)
     if not instance.feasible(picked):
         return chosen
-    return (yield from exchange(instance, picked))
+    return (yield from swap_search(instance, picked))
 
 
 def _decide(  # what is known, and how far to go
@@ -313,7 +280,7 @@ def _decide(  # what is known, and how far to go
         if outcome.chosen is None:
             break
         chosen = keep[outcome.chosen]
-    value = instance.covered(chosen)
+    value = instance.value(chosen)
     if not outcome.finished:
         bound = max(value, min(bound, outcome.bound))
     optimal = outcome.finished or instance.attained(bound) < _better(instance, chosen)
@@ -322,7 +289,7 @@ def _decide(  # what is known, and how far to go
 
 def _outlook(instance: Instance, proof: Proof) -> list[str]:
     """Say what more time would do."""
-    value = instance.covered(proof.chosen)
+    value = instance.value(proof.chosen)
     if proof.halfway is None or value <= 0:
         return []
     before, now = (bound / value - 1 for bound in (proof.halfway, proof.bound))
@@ -347,3 +314,29 @@ def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
     if problem.budget is not None:
         return "greedy covers at least (1 - 1/e)/2 (32 %) of the optimum"
     return f"greedy covers at least {'1 - 1/e (63 %)' if single else 'one half'} of the optimum"
+
+
+def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
+    """Say which targets and prices cannot decide because others are too large.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for weights and one for prices, where there is anything to say.
+    """
+    notes = []
+    weights = problem.weights[problem.weights > 0]
+    light = int(np.count_nonzero(weights < TIE * weights.sum()))
+    if light and not common_unit(weights)[1]:
+        notes.append(
+            f"{light:,} of {len(weights):,} targets weigh less than {TIE:g} of all weight each: beside the others "
+            "they cannot decide; bring the weights closer together"
+        )
+    prices = problem.prices[problem.allowed & (problem.prices > 0)]
+    cheap = int(np.count_nonzero(prices < TIE * prices.max(initial=0.0)))
+    if cheap:
+        notes.append(
+            f"{cheap:,} candidates cost less than {TIE:g} of the dearest: beside it their prices cannot decide; "
+            "give all prices in the same currency"
+        )
+    return tuple(notes)

@@ -19,7 +19,7 @@ from ..progress import Progress
 from .bounds import lagrangian_bound
 from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
 from .clock import Clock
-from .greedy import exchange, without_idle, without_weakest
+from .greedy import swap_search, without_idle, without_weakest
 from .instance import Instance
 from .integer_program import reaching
 
@@ -45,10 +45,6 @@ def canonical_optimum(
     ties : tuple of (k,) int64, optional
         All optimal placements, but for those with idle sensors, where they are known.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (k,) int64
@@ -58,7 +54,7 @@ def canonical_optimum(
     """
     if ties is not None:
         return min(ties, key=lambda choice: merit(instance, choice)), True
-    goal = instance.covered(chosen)
+    goal = instance.value(chosen)
     chosen, settled = yield from fewest(instance, chosen, goal, solver, clock)
     if not settled:
         return chosen, False
@@ -86,9 +82,9 @@ def fewest(
     """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
     while len(chosen) > 1:
         fewer = replace(instance, count=len(chosen) - 1)
-        exchanged = yield from exchange(fewer, without_weakest(instance, chosen))
-        if fewer.feasible(exchanged) and fewer.covered(exchanged) >= goal - instance.slack:
-            chosen = without_idle(fewer, exchanged, goal)
+        improved = yield from swap_search(fewer, without_weakest(instance, chosen))
+        if fewer.feasible(improved) and fewer.value(improved) >= goal - instance.slack:
+            chosen = without_idle(fewer, improved, goal)
             continue
         keep, bound = yield from lagrangian_bound(fewer, goal, clock)
         if bound.value < goal - instance.slack or len(keep) == 0:

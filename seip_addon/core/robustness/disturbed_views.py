@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
 from ..visibility.settings import VisibilitySettings
 from ..visibility.visibility_model import VisibilityModel
 from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
-from .views import Views
+from .views import Views, each_in_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +63,6 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
     ------
     Progress
         After each place of a draw.
-
-    Returns
-    -------
-    Views
     """
     site, models = around.site, around.models
     candidates = site.candidates
@@ -87,11 +82,5 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
         packed[draw, members] = np.packbits(seen, axis=1)
 
     works = [(draw, members) for draw in range(len(draws)) for members in together]
-    pool = ThreadPoolExecutor(caster.threads)
-    try:
-        for done, _ in enumerate(pool.map(look, works)):
-            yield Progress(done, len(works), "looking from poses as they may be")
-    finally:
-        pool.shutdown(cancel_futures=True)
-    yield Progress(len(works), len(works), "looking from poses as they may be")
+    yield from each_in_threads(look, works, caster.threads, "looking from poses as they may be")
     return Views(packed, len(site.targets))

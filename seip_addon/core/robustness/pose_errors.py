@@ -134,10 +134,6 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
         Ground point of each sensor's position; equal ones err alike.
     seed : int
         At least 0.
-
-    Returns
-    -------
-    PoseDraws
     """
     require_draws(draws)
     if seed < 0:

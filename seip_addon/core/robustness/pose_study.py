@@ -130,14 +130,6 @@ def pose_study(
     ----------
     deployment : Deployment
         The placement, at poses of the site.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    PoseStudy
     """
     site = around.site
     poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)

@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
+from ..placement.multi_cover import MultiCover, multi_cover
 from ..settings import setting
-from .worth import Worth, worth_of
 
 Failure = Literal["none", "worst", "mean"]
 
@@ -128,8 +128,8 @@ class Risk:
         """Return the scenarios that count, (m,) int64; of equal ones the first."""
         return np.argsort(outcomes, kind="stable")[: self.counted(len(outcomes))]
 
-    def worth(self, sensors: int) -> Worth:
-        r"""Return what a target is worth by the sensors that see it: on average, or more than at worst.
+    def cover(self, sensors: int) -> MultiCover:
+        r"""Return the value of a target by the sensors that see it: on average, or more than at worst.
 
         A target seen n times is worth 1 from n = κ on. After a failure among N
         sensors it is worth :math:`1 - κ/N` on average at n = κ and 1 from
@@ -143,4 +143,4 @@ class Risk:
         values = [Fraction(0)] * self.seen_by + [Fraction(1)]
         if self.failure != "none":
             values = [*values[:-1], max(Fraction(sensors - self.seen_by, sensors), Fraction(0)), Fraction(1)]
-        return worth_of(values)
+        return multi_cover(values)

@@ -31,21 +31,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..placement import Placement, PlacementProblem, solve
-from ..placement.clock import Clock
+from ..placement.bounds import lagrangian_bound
+from ..placement.branch_and_bound import FIRST_STEPS
+from ..placement.clock import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.feasibility import starting_choice
+from ..placement.greedy import swap_search
 from ..placement.instance import Instance, common_unit, make_instance, merge_targets
-from ..placement.problem import TIE, relative_gap
+from ..placement.problem import TIE, assess, relative_gap
 from ..placement.solver import solve_within
 from ..progress import Progress, within
 from .risk import Risk
-from .robust_search import CountedCover, RobustSearch, exchanged, exchanged_as_judged, exchanged_from_pairs
+from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .views import Views
 
 ROUNDS = 16
@@ -59,35 +62,16 @@ LEAST_SECONDS = 1.0
 """Or units of work, for what comes after them, however slow they were."""
 
 
-@dataclass(frozen=True, eq=False)
-class RobustPlacement:
-    """A placement chosen for what may go wrong.
-
-    Parameters
-    ----------
-    risk : Risk
-        What was optimised.
-    placement : Placement
-        Objective and bound are T, in units of the targets' weight; ``covered`` is what it covers as planned.
-    outcomes : (K,) float64
-        What becomes of it in each scenario, in units of the targets' weight.
-    """
-
-    risk: Risk
-    placement: Placement
-    outcomes: Float
+TOO_SHORT = "the time was too short to prove this placement the best: the gap says how far"
 
 
-def solve_robust(  # noqa: PLR0913 -- a problem, and the limits of its solution
+def solve_robust(
     problem: PlacementProblem,
     scenarios: Views,
     risk: Risk,
-    *,
-    solver: str = "highs",
-    time_limit: float = 60.0,
-    effort: float = math.inf,
+    limits: SolverLimits = DEFAULT_LIMITS,
     foreseen: Sequence[Placement] | None = None,
-) -> Generator[Progress, None, RobustPlacement]:
+) -> Generator[Progress, None, Placement]:
     """Choose the placement that has the least to fear.
 
     Parameters
@@ -98,82 +82,50 @@ def solve_robust(  # noqa: PLR0913 -- a problem, and the limits of its solution
         Of all candidates.
     risk : Risk
         What is to be large.
-    solver : str
-        ``highs``, ``cbc`` or ``gurobi``.
-    time_limit : float, seconds
-        After it the best placement found is returned with its bound and gap.
-    effort : float, units of work
-        As for `placement.solve`.
     foreseen : sequence of Placement, optional
         See `foresee`; found within the time limit if not given, and only of use where one look is enough.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
-    RobustPlacement
-        The same whatever the order of candidates. Of equally good placements the one with fewest sensors, then the
-        cheapest; for the expectation as `placement.solve` chooses.
+    Placement
+        Objective and bound are T, in units of the targets' weight; ``covered`` is what it covers as planned. The same
+        whatever the order of candidates. Of equally good placements the one with fewest sensors, then the cheapest;
+        for the expectation as `placement.solve` chooses.
 
     Raises
     ------
     SeipError
         As `placement.solve`, or fewer sensors are allowed than the risk asks for.
     """
-    most = allowed_sensors(problem)
+    most = problem.most_sensors
     if most < risk.least_sensors:
         raise SeipError(f"{risk.in_words()} needs at least {risk.least_sensors} sensors, not {most}; allow more")
     different = _without_copies(scenarios)
     plain = risk.seen_by == 1 and risk.failure == "none"
     if plain and len(different) == 1:
         planned = replace(problem, visible=different.seen(0))
-        placement = yield from solve(planned, solver=solver, time_limit=time_limit, effort=effort)
-        placement = replace(placement, covered=_covered(problem, placement.chosen))
-        return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
-    clock = Clock(time_limit, effort)
+        placement = yield from solve(planned, limits)
+        return replace(placement, covered=problem.covered(placement.chosen))
+    solver, clock = limits.solver, limits.clock()
     if foreseen is None and risk.seen_by == 1:
-        foreseen = yield from _foreseen(problem, different, solver, clock.part(FORESEEING * clock.left))
+        foreseen = yield from foresee(problem, different, solver, clock.part(FORESEEING * clock.left))
     placement = yield from _searched(problem, different, risk, solver, clock.part(math.inf, LEAST_SECONDS))
     if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
         placement = _with_foresight(problem, different, risk, placement, foreseen)
-    placement = replace(placement, seconds=clock.seconds)
-    return RobustPlacement(risk, placement, outcomes_of(problem, scenarios, risk, placement.chosen))
+    return replace(placement, seconds=clock.seconds)
 
 
 def foresee(
-    problem: PlacementProblem,
-    scenarios: Views,
-    *,
-    solver: str = "highs",
-    time_limit: float = 60.0,
-    effort: float = math.inf,
+    problem: PlacementProblem, scenarios: Views, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
     """Solve each scenario as if it were known that it comes: no placement does better there.
-
-    Parameters
-    ----------
-    time_limit : float, seconds
-        For all of them.
-    effort : float, units of work
-        For all of them, as for `placement.solve`.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
     tuple of Placement
         One for each scenario; one alone where all are the same.
     """
-    return (yield from _foreseen(problem, _without_copies(scenarios), solver, Clock(time_limit, effort)))
-
-
-def _foreseen(
-    problem: PlacementProblem, scenarios: Views, solver: str, clock: Clock
-) -> Generator[Progress, None, tuple[Placement, ...]]:
+    scenarios = _without_copies(scenarios)
     found = []
     for scenario in range(len(scenarios)):
         here = Progress(scenario, len(scenarios), "solving each scenario by itself")
@@ -200,16 +152,15 @@ def _with_foresight(
             value, chosen = reached, other.chosen
     bound = max(min(placement.bound, risk.of(np.array([other.bound for other in foreseen]))), value)
     optimal = placement.status == "optimal" or bound <= value * (1 + TIE)
-    return replace(
-        placement,
-        chosen=chosen,
-        objective=value,
-        bound=value if optimal else bound,
-        gap=0.0 if optimal else relative_gap(value, bound),
-        status="optimal" if optimal else "feasible",
-        covered=_covered(problem, chosen),
-        price=math.fsum(problem.prices[chosen]),
+    return assess(
+        problem,
+        chosen,
+        bound,
+        optimal=optimal,
+        solver=placement.solver,
+        seconds=placement.seconds,
         notes=() if optimal else placement.notes,
+        objective=value,
     )
 
 
@@ -234,28 +185,13 @@ def at_least(found: Placement, other: Placement, reached: float) -> Placement:
 
 def outcomes_of(problem: PlacementProblem, scenarios: Views, risk: Risk, chosen: Integer) -> Float:
     """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
-    return risk.outcomes(_seen(scenarios, chosen), problem.weights, allowed_sensors(problem))
-
-
-def allowed_sensors(problem: PlacementProblem) -> int:
-    """Return N, the largest number of sensors that number, budget and positions allow."""
-    places, place = np.unique(problem.positions[problem.allowed], return_inverse=True)
-    cheapest = np.full(len(places), math.inf)
-    np.minimum.at(cheapest, place, problem.prices[problem.allowed])
-    affordable = len(places)
-    if problem.budget is not None:
-        affordable = int(np.count_nonzero(np.cumsum(np.sort(cheapest)) <= problem.budget * (1 + TIE)))
-    return affordable if problem.count is None else min(problem.count, affordable)
+    return risk.outcomes(scenarios.seen_by_each(chosen), problem.weights, problem.most_sensors)
 
 
 def _without_copies(scenarios: Views) -> Views:
     """Return one scenario where all are the same, so that without errors nothing is rounded otherwise."""
     same = (scenarios.packed == scenarios.packed[:1]).all()
     return Views(scenarios.packed[:1], scenarios.targets) if same else scenarios
-
-
-def _seen(scenarios: Views, chosen: Integer) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    return np.unpackbits(scenarios.packed[:, chosen], axis=2, count=scenarios.targets)
 
 
 def _stacked(problem: PlacementProblem, scenarios: Views, share: Float) -> PlacementProblem:
@@ -265,46 +201,34 @@ def _stacked(problem: PlacementProblem, scenarios: Views, share: Float) -> Place
     return replace(problem, visible=visible, weights=np.concatenate([share[k] * problem.weights for k in used]))
 
 
-def _covered(problem: PlacementProblem, chosen: Integer) -> float:
-    return math.fsum(problem.weights[problem.visible[chosen].any(axis=0)])
-
-
 def _searched(
     problem: PlacementProblem, scenarios: Views, risk: Risk, solver: str, clock: Clock
 ) -> Generator[Progress, None, Placement]:
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
     yield Progress(0, 0, "reducing the scenarios' targets")
     whole, _ = make_instance(_stacked(problem, scenarios, np.ones(len(scenarios))))
-    game = _Game(problem, scenarios, risk, whole)
+    game = FictitiousPlay(problem, scenarios, risk, whole)
     start = yield from starting_choice(problem, whole, solver)
     chosen, share = yield from game.play(start, clock)
-    search = RobustSearch(game.cover(share), game.unit(share), game.judge, chosen, TIE * math.fsum(problem.weights))
-    found = yield from search.run(clock)
-    notes = () if found.finished else ("the time was too short to prove this placement the best: the gap says how far",)
-    return _record(problem, whole.original[found.chosen], found.value, found.bound, notes, clock.seconds)
-
-
-def _record(  # what is known of a placement
-    problem: PlacementProblem, chosen: Integer, value: float, bound: float, notes: tuple[str, ...], seconds: float
-) -> Placement:
-    optimal = not notes
-    bound = value if optimal else bound
-    return Placement(
-        chosen=chosen,
-        objective=value,
-        bound=bound,
-        gap=relative_gap(value, bound),
-        status="optimal" if optimal else "feasible",
+    instance, unit, slack = game.instance(share), game.unit(share), TIE * math.fsum(problem.weights)
+    goal = (game.evaluate(chosen) - slack) * unit
+    root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
+    search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
+    finished = yield from search.run(clock, clock.left)
+    return assess(
+        problem,
+        whole.original[search.best],
+        search.bound,
+        optimal=finished,
         solver="branch and bound",
-        seconds=seconds,
-        covered=_covered(problem, chosen),
-        price=math.fsum(problem.prices[chosen]),
-        notes=notes,
+        seconds=clock.seconds,
+        notes=() if finished else (TOO_SHORT,),
+        objective=search.value,
     )
 
 
-class _Game:
-    """Placements against scenarios: who places fears the worst of them.
+class FictitiousPlay:
+    """Weights of scenarios with a small bound: placements answer the scenarios that were worst before.
 
     Parameters
     ----------
@@ -317,36 +241,36 @@ class _Game:
         self._weight = problem.weights
         self._used = problem.weights > 0
         self._unit, _ = common_unit(problem.weights[self._used])
-        self._sensors = allowed_sensors(problem)
-        self._worth = risk.worth(self._sensors)
+        self._sensors = problem.most_sensors
+        self._cover = risk.cover(self._sensors)
 
-    def judge(self, chosen: Integer) -> float:
+    def evaluate(self, chosen: Integer) -> float:
         """Return T of candidates of the whole instance."""
-        seen = _seen(self._scenarios, self._whole.original[chosen])
+        seen = self._scenarios.seen_by_each(self._whole.original[chosen])
         return self._risk.of(self._risk.outcomes(seen, self._weight, self._sensors))
 
-    def cover(self, share: Integer) -> CountedCover:
-        """Return F for whole shares of the scenarios."""
+    def instance(self, share: Integer) -> Instance:
+        """Return the instance whose objective value is F, for whole shares of the scenarios."""
         weight = np.rint(self._weight[self._used] / self._unit)
         scenarios = np.flatnonzero(share).tolist()
         columns = [self._scenarios.seen(k)[np.ix_(self._whole.original, self._used)] for k in scenarios]
         weights = np.concatenate([share[k] * weight for k in scenarios])
         visible, merged = merge_targets(np.concatenate(columns, axis=1), weights)
-        return CountedCover(replace(self._whole, visible=visible, weight=merged), self._worth)
+        return replace(self._whole, visible=visible, weight=merged, cover=self._cover)
 
     def unit(self, share: Integer) -> float:
         """Return by what T is to be multiplied to be compared with F."""
-        return float(share.sum()) * self._worth.unit / self._unit
+        return float(share.sum()) * self._cover.unit / self._unit
 
     def play(self, start: Integer, clock: Clock) -> Generator[Progress, None, tuple[Integer, Integer]]:
         """Return the best placement met, and how often each scenario was among the worst, (K,) int64."""
         even = np.ones(len(self._scenarios), dtype=np.int64)
-        cover = self.cover(even)
-        chosen = yield from exchanged(cover, start)
-        if not self._worth.concave:
-            chosen = yield from exchanged_from_pairs(cover, start, chosen, clock)
-            chosen = yield from exchanged_as_judged(cover, self.judge, chosen)
-        best, value = chosen, self.judge(chosen)
+        instance = self.instance(even)
+        chosen = yield from swap_search(instance, start)
+        if not self._cover.concave:
+            chosen = yield from swap_search_from_pairs(instance, start, chosen, clock)
+            chosen = yield from swap_search_by_risk(instance, self.evaluate, chosen)
+        best, value = chosen, self.evaluate(chosen)
         if self._risk.counted(len(even)) == len(even):
             return best, even
         share = np.zeros_like(even)
@@ -355,9 +279,9 @@ class _Game:
                 break
             yield Progress(played, ROUNDS, "weighing the scenarios")
             clock.spend(2 * self._scenarios.packed.size * 8)
-            seen = _seen(self._scenarios, self._whole.original[chosen])
+            seen = self._scenarios.seen_by_each(self._whole.original[chosen])
             share[self._risk.worst(self._risk.outcomes(seen, self._weight, self._sensors))] += 1
-            chosen = yield from exchanged(self.cover(share), chosen)
-            if self.judge(chosen) > value:
-                best, value = chosen, self.judge(chosen)
+            chosen = yield from swap_search(self.instance(share), chosen)
+            if self.evaluate(chosen) > value:
+                best, value = chosen, self.evaluate(chosen)
         return best, share if share.any() else even

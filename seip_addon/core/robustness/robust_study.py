@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -10,12 +9,13 @@ import numpy as np
 
 from ..arrays import Float
 from ..estimates import Estimate, mean_of, quantile_gain, quantile_of
-from ..placement import Placement, PlacementProblem, solve
+from ..placement import Placement, PlacementProblem, SolverLimits, solve
+from ..placement.clock import DEFAULT_LIMITS
 from ..progress import Progress, within
 from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .pose_errors import PoseErrors
 from .risk import Risk
-from .robust_placement import RobustPlacement, at_least, foresee, outcomes_of, solve_robust
+from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 
 LOW = 0.05
 """The quantile that judges."""
@@ -36,19 +36,15 @@ class RobustSettings:
         Draws to judge by.
     seed : int
         Of the scenarios; the unseen draws have the next one.
-    time_limit : float, seconds
+    limits : SolverLimits
         For each placement.
-    effort : float, units of work
-        As for `placement.solve`.
     """
 
     errors: PoseErrors = field(default_factory=PoseErrors)
     scenarios: int = 20
     unseen: int = 500
     seed: int = 0
-    solver: str = "highs"
-    time_limit: float = 60.0
-    effort: float = math.inf
+    limits: SolverLimits = DEFAULT_LIMITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,82 +130,51 @@ def robust_study(
     ----------
     problem : PlacementProblem
         Of all candidates of the site.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    RobustStudy
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
     scenarios = yield from disturbed_views(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
-    nominal = yield from solve(problem, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort)
+    nominal = yield from solve(problem, settings.limits)
     foreseen = None
     if any(risk.seen_by == 1 for risk in risks):
-        foreseen = yield from foresee(
-            problem, spread, solver=settings.solver, time_limit=settings.time_limit, effort=settings.effort
-        )
+        foreseen = yield from foresee(problem, spread, settings.limits.solver, settings.limits.clock())
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
-    entries = [_Entry("the poses as planned", nominal, way) for way in ways]
+    entries = [("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.in_words()}")
         yield here
-        steps = solve_robust(
-            problem,
-            spread,
-            risk,
-            solver=settings.solver,
-            time_limit=settings.time_limit,
-            effort=settings.effort,
-            foreseen=foreseen,
-        )
-        found: RobustPlacement = yield from within(here, steps)
-        placed = at_least(found.placement, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
-        entries.append(_Entry(risk.in_words(), placed, risk.alone))
+        steps = solve_robust(problem, spread, risk, settings.limits, foreseen)
+        found: Placement = yield from within(here, steps)
+        placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
+        entries.append((risk.in_words(), placed, risk.alone))
     contenders = yield from _judged(around, problem, settings, entries)
     return RobustStudy(
         settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
     )
 
 
-@dataclass(frozen=True)
-class _Entry:
-    """A placement that is to be judged."""
-
-    name: str
-    placement: Placement
-    judged_by: Risk
-
-
 def _judged(
-    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, entries: Sequence[_Entry]
+    around: Surroundings,
+    problem: PlacementProblem,
+    settings: RobustSettings,
+    entries: Sequence[tuple[str, Placement, Risk]],
 ) -> Generator[Progress, None, list[Contender]]:
     """Look from all chosen poses at once, in draws of another seed."""
-    used = np.unique(np.concatenate([entry.placement.chosen for entry in entries]))
+    used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
     drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
     views = yield from disturbed_views(around, used, drawn)
     planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []
-    for entry in entries:
-        rows = np.searchsorted(used, entry.placement.chosen)
-        (undisturbed,) = outcomes_of(problem, planned, entry.judged_by, rows)
-        outcomes = [
-            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), entry.judged_by, rows)
+    for name, placement, judged_by in entries:
+        rows = np.searchsorted(used, placement.chosen)
+        (undisturbed,) = outcomes_of(problem, planned, judged_by, rows)
+        outcomes = [  # one draw at a time: all at once take much memory
+            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), judged_by, rows)
             for draw in range(len(views))
         ]
-        contenders.append(
-            Contender(
-                entry.name,
-                entry.placement,
-                entry.placement.covered / total,
-                entry.judged_by,
-                float(undisturbed) / total,
-                np.concatenate(outcomes) / total,
-            )
-        )
+        unseen = np.concatenate(outcomes) / total
+        planned_coverage = placement.covered / total
+        contenders.append(Contender(name, placement, planned_coverage, judged_by, float(undisturbed) / total, unseen))
     return contenders

@@ -7,7 +7,6 @@ stretches of time (`mean_over_time`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +14,8 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..estimates import Estimate, mean_over_time
-from ..placement import Placement, PlacementProblem, solve
+from ..placement import Placement, PlacementProblem, SolverLimits, solve
+from ..placement.clock import DEFAULT_LIMITS
 from ..progress import Progress
 from .disturbed_views import Surroundings
 from .risk import Risk
@@ -171,15 +171,12 @@ def look_at_traffic(
     return Scenarios(layer, spread.seen(0), Views(spread.packed[1:], spread.targets))
 
 
-def traffic_study(  # noqa: PLR0913 -- a problem, and the limits of its solution
+def traffic_study(
     around: Surroundings,
     problem: PlacementProblem,
     scenarios: Scenarios,
     judged: Instants,
-    *,
-    solver: str = "highs",
-    time_limit: float = 60.0,
-    effort: float = math.inf,
+    limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, TrafficStudy]:
     """Place for the empty road and on traffic, and judge both at other instants.
 
@@ -189,26 +186,14 @@ def traffic_study(  # noqa: PLR0913 -- a problem, and the limits of its solution
         Of all candidates of the site; what they see is taken from the scenarios.
     judged : Instants
         Of runs that are not those of the scenarios.
-    time_limit : float, seconds
+    limits : SolverLimits
         For each placement.
-    effort : float, units of work
-        As for `placement.solve`.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    TrafficStudy
     """
     problem = replace(problem, visible=scenarios.empty)
-    empty = yield from solve(problem, solver=solver, time_limit=time_limit, effort=effort)
-    found = yield from solve_robust(
-        problem, scenarios.views, Risk(), solver=solver, time_limit=time_limit, effort=effort
-    )
+    empty = yield from solve(problem, limits)
+    found = yield from solve_robust(problem, scenarios.views, Risk(), limits)
     reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
-    placed = at_least(found.placement, empty, reached)
+    placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
     crowds = judged.standing()
     layers: tuple[Layer, ...] = ("road", "height")

@@ -17,7 +17,6 @@ target's answer is looked at again only where one of its own rays was stopped.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
@@ -33,7 +32,7 @@ from ..visibility.scanning import ScanPosition
 from ..visibility.target_index import TargetIndex
 from .disturbed_views import Surroundings
 from .traffic_instants import Standing
-from .views import Views
+from .views import Views, each_in_threads
 
 Layer = Literal["road", "height"]
 
@@ -87,13 +86,7 @@ def traffic_views(
         for instant, crowd in enumerate(crowds):
             packed[instant, number] = np.packbits(looker.seen(static.stopped_by(crowd)))
 
-    pool = ThreadPoolExecutor(caster.threads)
-    try:
-        for done, _ in enumerate(pool.map(look, range(len(poses)))):
-            yield Progress(done, len(poses), "looking between vehicles")
-    finally:
-        pool.shutdown(cancel_futures=True)
-    yield Progress(len(poses), len(poses), "looking between vehicles")
+    yield from each_in_threads(look, range(len(poses)), caster.threads, "looking between vehicles")
     return Views(packed, len(wanted))
 
 

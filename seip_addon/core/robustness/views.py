@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Boolean, Integer
+from ..progress import Progress
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +43,10 @@ class Views:
         """Return what one pose sees in each circumstance, (n, t) bool."""
         return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
 
+    def seen_by_each(self, poses: Integer) -> NDArray[np.uint8]:
+        """Return what a few poses see in each circumstance, (n, s, t) uint8."""
+        return np.unpackbits(self.packed[:, poses], axis=2, count=self.targets)
+
     def seen_by_any(self, poses: Integer) -> Boolean:
         """Return what some of a few poses sees in each circumstance, (n, t) bool."""
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)
@@ -47,3 +57,16 @@ class Views:
         packed = np.zeros((len(self), number, self.packed.shape[2]), dtype=np.uint8)
         packed[:, poses] = self.packed
         return Views(packed, self.targets)
+
+
+def each_in_threads(
+    compute: Callable[[T], None], items: Sequence[T], threads: int, message: str
+) -> Generator[Progress, None, None]:
+    """Call a function for each item, several at once; what has not begun is dropped when the generator is closed."""
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for done, _ in enumerate(pool.map(compute, items)):
+            yield Progress(done, len(items), message)
+    finally:
+        pool.shutdown(cancel_futures=True)
+    yield Progress(len(items), len(items), message)

@@ -209,7 +209,15 @@ class Judge:
     def plan(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Plan]:
         """Return the best placement on a site."""
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
-        return (yield from make_plan(site, grid.visible, self._models, self._goal, **settings.limits))
+        return (
+            yield from make_plan(
+                site,
+                grid.visible,
+                self._models,
+                self._goal,
+                settings.limits,
+            )
+        )
 
     def judge(self, plan: Plan) -> float:
         """Return the share of the fine grid's weight that a placement sees."""

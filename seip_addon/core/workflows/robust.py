@@ -107,7 +107,7 @@ def place_robustly(
         scenarios=robustness.scenarios,
         unseen=robustness.draws,
         seed=robustness.seed,
-        **layout.settings.limits,
+        limits=layout.settings.limits,
     )
     problem = placement_problem(site, grid.visible, models, goal)
     study = yield from robust_study(around, problem, settings, [robustness.risk])

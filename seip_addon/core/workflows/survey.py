@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import SeipError
 from ..lidar import LidarModel, find_models, load_catalogue
 from ..placement import Placement
-from ..placement.clock import Clock
+from ..placement.clock import SolverLimits
 from ..placement.deployment import deploy
 from ..placement.goal import Goal, Plan, make_plan, placement_problem, target_weights
 from ..placement.integer_program import check_solver
@@ -79,11 +79,6 @@ class SurveySettings:
     )
     spacings_because: str = ""
 
-    @property
-    def limits(self) -> dict[str, Any]:
-        """The solver and its limits, as `placement.solve` takes them."""
-        return {"solver": self.solver, "time_limit": self.time_limit, "effort": self.effort}
-
     def models(self) -> dict[str, LidarModel]:
         """Return the sensor types to choose from, by catalogue key.
 
@@ -93,8 +88,13 @@ class SurveySettings:
             The solver or a type is unknown, a limit is no positive number, or a catalogue cannot be read.
         """
         check_solver(self.solver)
-        Clock(self.time_limit, self.effort)  # refuses what is no limit before any ray is cast
+        self.limits.clock()  # refuses what is no limit before any ray is cast
         return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
+
+    @property
+    def limits(self) -> SolverLimits:
+        """The solver, and how long it searches."""
+        return SolverLimits(self.solver, self.time_limit, self.effort)
 
     def reach(self) -> float:
         """Return how far from a target a ray that sees it can begin, or be stopped, in metres."""
@@ -222,7 +222,14 @@ def place(
     else.
     """
     site, models, settings = layout.site, layout.models, layout.settings
-    plan = yield from make_plan(site, grid.visible, models, goal, **settings.limits)
+    steps = make_plan(
+        site,
+        grid.visible,
+        models,
+        goal,
+        settings.limits,
+    )
+    plan = yield from steps
     notes = [*plan.placement.notes]
     if plan.placement.status == "optimal" and not goal.cheapest:
         top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)

@@ -132,7 +132,7 @@ def place_in_traffic(
     chosen_at = spread_instants(runs.optimisation, settings.instants, settings.seed)
     scenarios = yield from look_at_traffic(around, problem, chosen_at, settings.layer)
     judged = spread_instants(runs.evaluation, settings.judged_at, settings.seed + 1)
-    study = yield from traffic_study(around, problem, scenarios, judged, **layout.settings.limits)
+    study = yield from traffic_study(around, problem, scenarios, judged, layout.settings.limits)
     placement = study.traffic.placement
     note = (
         f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "

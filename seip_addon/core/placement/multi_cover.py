@@ -14,15 +14,15 @@ from ..arrays import Integer
 
 
 @dataclass(frozen=True, eq=False)
-class Worth:
-    """A rising function of how many sensors see a target, in whole units.
+class MultiCover:
+    """A non-decreasing function of how many sensors see a target, in whole units.
 
     Parameters
     ----------
     values : (top + 1,) int64
-        Worth of a target seen 0, 1, … times; the last one for all that are seen more often.
+        Value of a target seen 0, 1, … times; the last one for all that are seen more often.
     rises : (top + 1, top + 1, top) int64
-        What the next sensor, the one after it, … adds to the least concave function above the worth of a target
+        What the next sensor, the one after it, … adds to the least concave function above the value of a target
         that is seen n times and can be seen by l more. It is exact at n, and the first rise of l = 1 is what one
         sensor adds indeed.
     unit : int
@@ -35,7 +35,7 @@ class Worth:
 
     @property
     def top(self) -> int:
-        """Number of looks after which nothing is added."""
+        """Number of sensors beyond which nothing is added."""
         return len(self.values) - 1
 
     @property
@@ -43,23 +43,23 @@ class Worth:
         """Whether each sensor adds no more than the one before it."""
         return bool((np.diff(self.values, 2) <= 0).all())
 
-    def reached(self, times: Integer) -> Integer:
-        """Return the worth of targets seen so many times, (t,) int64."""
-        reached: Integer = self.values[np.minimum(times, self.top)]
-        return reached
+    def value(self, times: Integer) -> Integer:
+        """Return the value of targets seen so many times, of the same shape."""
+        value: Integer = self.values[np.minimum(times, self.top)]
+        return value
 
-    def added(self, times: Integer, left: int, level: int = 0) -> Integer:
+    def increment(self, times: Integer, left: int, level: int = 0) -> Integer:
         """Return what the next sensor adds at most, or with ``level`` one after it, if so many are to come."""
         more: Integer = self.rises[np.minimum(times, self.top), min(left, self.top), level]
         return more
 
 
-def worth_of(values: Sequence[Fraction]) -> Worth:
-    """Return a function by its worth at 0, 1, … looks, which rises to its end."""
+def multi_cover(values: Sequence[Fraction]) -> MultiCover:
+    """Return a function by its value for 0, 1, … sensors, which rises to its end."""
     top = len(values) - 1
     rises = [[_concave_rises(values[n : n + left + 1], top) for left in range(top + 1)] for n in range(top + 1)]
     unit = math.lcm(*(rise.denominator for row in rises for steps in row for rise in steps))
-    return Worth(
+    return MultiCover(
         values=np.array([int(value * unit) for value in values], dtype=np.int64),
         rises=np.array([[[int(rise * unit) for rise in steps] for steps in row] for row in rises], dtype=np.int64),
         unit=unit,
@@ -85,3 +85,7 @@ def _upper_hull(values: Sequence[Fraction]) -> list[int]:
             corners.pop()
         corners.append(right)
     return corners
+
+
+COVERAGE = multi_cover([Fraction(0), Fraction(1)])
+"""One sensor is enough."""
