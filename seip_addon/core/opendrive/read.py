@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
-from .profile import NONE, Profile, Shape, profile, shape
+from .profile import NONE, LateralShape, Profile, lateral_shape, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
@@ -182,9 +182,9 @@ def _crossfall(road: Node, side: str) -> Profile:
     return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
 
 
-def _shape(road: Node) -> Shape:
+def _shape(road: Node) -> LateralShape:
     nodes = road.children("lateralProfile", "shape")
-    return shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
+    return lateral_shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
 
 
 def _cubic(node: Node) -> tuple[float, float, float, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Float
-from .profile import Profile, Shape
+from .profile import LateralShape, Profile
 from .reference_line import ReferenceLine
 
 MIDDLE_STEP = 10.0
@@ -179,7 +179,7 @@ class Road:
     superelevation, left_crossfall, right_crossfall : Profile
         Radians over metres along the road. A road with superelevation above
         zero falls to the right; crossfall above zero falls outwards.
-    shape : Shape
+    shape : LateralShape
         Height of the surface above the plane that these make.
     sections : tuple of LaneSection
         In order along the road.
@@ -194,7 +194,7 @@ class Road:
     superelevation: Profile
     left_crossfall: Profile
     right_crossfall: Profile
-    shape: Shape
+    shape: LateralShape
     lane_offset: Profile
     sections: tuple[LaneSection, ...]
     objects: tuple[RoadObject, ...]
@@ -205,11 +205,11 @@ class Road:
         """Length of the reference line in plan, metres."""
         return self.reference_line.end
 
-    def frame(self, s: Float) -> Frame:
+    def frame(self, s: Float) -> RoadFrame:
         """Return the axes of the road at ``s``, (k,) metres along it; beyond an end those of the end."""
         s = np.clip(s, 0.0, self.length)
         x, y, heading = self.reference_line(s)
-        return Frame(
+        return RoadFrame(
             origin=np.stack([x, y, self.elevation(s)], axis=-1),
             heading=heading,
             pitch=np.arctan(self.elevation.slope(s)),
@@ -223,7 +223,7 @@ class Road:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class RoadFrame:
     """The moving axes of a road at k places.
 
     Superelevation turns the road about its reference line, which itself climbs

@@ -36,7 +36,7 @@ class _End:
 
 
 @dataclass(frozen=True, eq=False)
-class _Street:
+class _ApproachRoad:
     """A road by its driving lanes: the range of s, its two ends, and whether an approach goes along it."""
 
     start: float
@@ -81,12 +81,12 @@ def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: 
     )
 
 
-def _street(lanes: Sequence[LaneSurface]) -> _Street:
+def _street(lanes: Sequence[LaneSurface]) -> _ApproachRoad:
     start, stop = min(lane.s[0] for lane in lanes), max(lane.s[-1] for lane in lanes)
     first = _end([(lane, 0) for lane in lanes if lane.s[0] == start])
     last = _end([(lane, -1) for lane in lanes if lane.s[-1] == stop])
     turn = math.acos(float(np.clip(first.along @ last.along, -1.0, 1.0)))
-    return _Street(start, stop, (first, last), lanes[0].junction_id is None or turn < STRAIGHT_ON)
+    return _ApproachRoad(start, stop, (first, last), lanes[0].junction_id is None or turn < STRAIGHT_ON)
 
 
 def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
@@ -98,7 +98,7 @@ def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
     return _End(shapely.multilinestrings(across[:, :, :2]), float(across[:, :, 2].mean()), along)
 
 
-def _joints(streets: Mapping[str, _Street]) -> dict[Key, list[Key]]:
+def _joints(streets: Mapping[str, _ApproachRoad]) -> dict[Key, list[Key]]:
     """Return for each end those that it leads into."""
     keys = [(road, which) for road in streets for which in (0, 1)]
     ends = [streets[road].ends[which] for road, which in keys]
@@ -111,7 +111,7 @@ def _joints(streets: Mapping[str, _Street]) -> dict[Key, list[Key]]:
     return joints
 
 
-def _distances(streets: Mapping[str, _Street], inside: set[str], most: float) -> dict[Key, float]:
+def _distances(streets: Mapping[str, _ApproachRoad], inside: set[str], most: float) -> dict[Key, float]:
     """Return how far each end of a road is from a junction, metres along the roads; infinity beyond ``most``."""
     away = {(road, which): math.inf for road in streets for which in (0, 1)}
     joints = _joints(streets)
@@ -132,7 +132,7 @@ def _distances(streets: Mapping[str, _Street], inside: set[str], most: float) ->
     return away
 
 
-def _pieces(lane: LaneSurface, street: _Street, away: Sequence[float], distance: float) -> Iterator[LaneSurface]:
+def _pieces(lane: LaneSurface, street: _ApproachRoad, away: Sequence[float], distance: float) -> Iterator[LaneSurface]:
     """Yield what of a lane lies within the distance of the junction, from either end of its road."""
     from_start, from_stop = street.start + distance - away[0], street.stop - distance + away[1]
     ranges = [(-math.inf, math.inf)] if from_start >= from_stop else [(-math.inf, from_start), (from_stop, math.inf)]

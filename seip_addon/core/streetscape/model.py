@@ -65,7 +65,7 @@ FARTHEST_GARDEN = 300.0
 VERGE_SPACING = 12.0
 VEIL_SPACING = 4.0
 """As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
-VEILS = {
+AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
     Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
     Role.FORBIDDEN_AREAS: (0.05, "forbidden veil"),
@@ -117,7 +117,7 @@ class SiteModel:
 
 
 @dataclass(frozen=True, eq=False)
-class _Street:
+class _Surroundings:
     """What everything else of a site stands on and leans against, in local axes."""
 
     origin: Float
@@ -340,7 +340,7 @@ def _level_notes(levels: Levels) -> Iterator[str]:
         yield f"{crossing}: road {away} is on another level, in the way but not studied"
 
 
-def _other_level_parts(others: Sequence[LaneSurface], street: _Street) -> tuple[list[Part], BaseGeometry]:
+def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
     """Return the roads of other levels, above and below, and the area in plan of those below."""
     lanes = road_surface.local_strips(others, street.origin, street.extent)
     if not lanes:
@@ -355,7 +355,7 @@ def _other_level_parts(others: Sequence[LaneSurface], street: _Street) -> tuple[
     return parts, outline(triangles[~above], road_surface.GRID)
 
 
-def _on_level(part: Part, street: _Street) -> Part:
+def _on_level(part: Part, street: _Surroundings) -> Part:
     """Return a part of the map; a pole that stands on another level carries no sensor."""
     x, y, z = part.foot
     if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > APART:
@@ -370,16 +370,16 @@ def _origin(surfaces: Sequence[LaneSurface], centre: Float) -> Float:
     return np.round([*centre, nearest[2]])
 
 
-def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Street:
+def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
-    return _Street(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
+    return _Surroundings(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
 
 
-def _surface_parts(street: _Street) -> list[Part]:
+def _surface_parts(street: _Surroundings) -> list[Part]:
     groups = {road_surface.group(lane) for lane in street.lanes}
     return [
         Part(
@@ -392,7 +392,7 @@ def _surface_parts(street: _Street) -> list[Part]:
     ]
 
 
-def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
+def _pavement_parts(street: _Surroundings, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
     own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
     if len(own) == 0:
@@ -424,7 +424,7 @@ def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], t
     return parts, tuple(notes)
 
 
-def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> Part:
+def _verge_strip(street: _Surroundings, sides: BaseGeometry, below: BaseGeometry) -> Part:
     """Return the verge along sides of the carriageway.
 
     There is none where the map ends and the road goes on, nor beside a bridge.
@@ -436,7 +436,7 @@ def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> P
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry) -> Part:
+def _verge_part(street: _Surroundings, furniture: Sequence[Part], below: BaseGeometry) -> Part:
     """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
@@ -449,7 +449,7 @@ def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
-def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
+def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
     quads = road_surface.markings(street.lanes)
     if stop_lines:
         quads = np.concatenate([quads, road_surface.stop_lines(street.lanes)])
@@ -457,7 +457,7 @@ def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
 
 
-def _region_part(street: _Street) -> Part:
+def _region_part(street: _Surroundings) -> Part:
     return _area_part("Region of interest", street.region, Role.REGION, street)
 
 
@@ -479,7 +479,7 @@ def _weighted_areas(
 
 
 def _weighted_parts(
-    areas: Sequence[tuple[str, BaseGeometry, float]], street: _Street, *, described: bool
+    areas: Sequence[tuple[str, BaseGeometry, float]], street: _Surroundings, *, described: bool
 ) -> Iterator[Part]:
     for name, area, weight in areas:
         local = _shifted(area, -street.origin)
@@ -508,7 +508,7 @@ def _junction_driving_area(surfaces: Sequence[LaneSurface], junction_id: str) ->
     return junction_area(surfaces, junction_id) if area.is_empty else area
 
 
-def _area_parts(description: SiteDescription, street: _Street) -> list[Part]:
+def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
     kinds = (
         (description.forbidden_areas, Role.FORBIDDEN_AREAS),
         (description.mandatory_areas, Role.MANDATORY_AREAS),
@@ -520,7 +520,7 @@ def _area_parts(description: SiteDescription, street: _Street) -> list[Part]:
     ]
 
 
-def _described_parts(description: SiteDescription, street: _Street) -> list[Part]:
+def _described_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
     """Return what the site description adds, standing on the ground."""
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
@@ -541,7 +541,7 @@ def _described_parts(description: SiteDescription, street: _Street) -> list[Part
     return parts
 
 
-def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]:
+def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
         yield pole_part(f"Street light {number}", shape, foot, heading, DESCRIBED)
@@ -551,21 +551,23 @@ def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]
         yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading, DESCRIBED)
 
 
-def _pole_places(rows: Sequence[Poles], street: _Street) -> Iterator[tuple[Float, float, Poles]]:
+def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple[Float, float, Poles]]:
     """Yield foot, heading of the arm and row of each post."""
     for row in rows:
         for foot in _on_ground(row.positions, street):
             yield foot, arm_heading(foot[:2], street.carriageway) if row.heading is None else row.heading, row
 
 
-def _on_ground(plan: Float, street: _Street) -> Float:
+def _on_ground(plan: Float, street: _Surroundings) -> Float:
     local = plan - street.origin[:2]
     return np.column_stack([local, street.terrain.height(local)])
 
 
-def _area_part(name: str, area: BaseGeometry, role: Role, street: _Street, *, weight: float | None = None) -> Part:
+def _area_part(
+    name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None
+) -> Part:
     """Return an area in plan as a veil over the ground."""
-    above, material = VEILS[role]
+    above, material = AREA_OVERLAYS[role]
     triangles = street.terrain.drape(area, spacing=VEIL_SPACING, above=above)
     return Part(name, _solid(triangles, material), (role,), weight=weight)
 
