@@ -124,17 +124,6 @@ class RoadObject:
 
 
 @dataclass(frozen=True)
-class RoadPlace:
-    """Another road on which a signal stands, and where (metres, radians)."""
-
-    road_id: str
-    s: float
-    t: float
-    z_offset: float
-    heading: float
-
-
-@dataclass(frozen=True)
 class MapPlace:
     """Where a signal stands in map coordinates (metres, radians)."""
 
@@ -146,11 +135,17 @@ class MapPlace:
 
 @dataclass(frozen=True)
 class RoadSignal:
-    """A signal as the file gives it, in road coordinates (metres, radians).
+    """A signal as the file gives it, in the coordinates of the road on which it stands (metres, radians).
 
-    ``place`` is where it really stands, if that is not where it applies.
+    Parameters
+    ----------
+    road_id : str
+        The road on which it stands, which need not be the one that it applies to.
+    place : MapPlace or None
+        Where it stands, if the file says that in map coordinates.
     """
 
+    road_id: str
     id: str
     name: str
     kind: str
@@ -159,7 +154,7 @@ class RoadSignal:
     t: float
     z_offset: float
     heading: float
-    place: RoadPlace | MapPlace | None
+    place: MapPlace | None
 
 
 @dataclass(frozen=True, eq=False)

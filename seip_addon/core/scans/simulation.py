@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,10 +99,9 @@ class Simulation:
             _returns(scanner, scan, sensor, self._random(sensor, number), rolling=self._settings.rolling_shutter)
             for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
         ]
-        merged = {
-            part.name: np.concatenate([getattr(one, part.name) for one in parts]) for part in fields(_SensorReturns)
-        }
-        return Frame(time=snapshot.time, labels=self._labels(snapshot, scans, parts), **merged)
+        merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        labels = self._labels(snapshot, scans, [part["instance"] for part in parts])
+        return Frame(time=snapshot.time, labels=labels, **merged)
 
     def scans(self, snapshot: Snapshot) -> list[Scan]:
         """Return what the rays of each sensor end on, without noise or losses."""
@@ -119,7 +119,7 @@ class Simulation:
         seed = np.random.SeedSequence(entropy, spawn_key=(sensor, frame))
         return np.random.Generator(np.random.SFC64(seed))
 
-    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], parts: Sequence[_SensorReturns]) -> Labels:
+    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], instances: Sequence[NDArray[np.int32]]) -> Labels:
         most = len(self._trajectories)
         users = [self._trajectories.users[number] for number in snapshot.user]
         size = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
@@ -135,7 +135,7 @@ class Simulation:
             yaw=(snapshot.yaw + math.pi) % (2 * math.pi) - math.pi,
             pitch=snapshot.pitch,
             speed=snapshot.speed,
-            points=np.stack([by_user(part.instance, most)[snapshot.user] for part in parts], axis=1),
+            points=np.stack([by_user(instance, most)[snapshot.user] for instance in instances], axis=1),
             visibility=(met / np.maximum(could, 1))[snapshot.user],
             inside=self._static.inside(centre),
         )
@@ -224,21 +224,10 @@ _SLACK = 1e-6
 """Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
 
 
-@dataclass(frozen=True, eq=False)
-class _SensorReturns:
-    """The points of one sensor, as in `Frame`."""
-
-    points: NDArray[np.float32]
-    sensor: NDArray[np.int16]
-    delay: NDArray[np.float32]
-    intensity: NDArray[np.float32]
-    instance: NDArray[np.int32]
-
-
 def _returns(
     scanner: Scanner, scan: Scan, number: int, random: np.random.Generator | None, *, rolling: bool
-) -> _SensorReturns:
-    """Return what a sensor measures of a scan, noisy and incomplete where a generator is given."""
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a `Frame` for one sensor's scan, noisy and incomplete where a generator is given."""
     sensor = scanner.sensor
     if random is None:
         ray = np.flatnonzero(scanner.in_range(scan.distance))
@@ -249,10 +238,10 @@ def _returns(
     points *= measured.astype(np.float32)[:, None]
     points += sensor.xyz.astype(np.float32)
     delay = scanner.delay[ray % sensor.model.azimuth_count] if rolling else np.zeros(len(ray))
-    return _SensorReturns(
-        points=points,
-        sensor=np.full(len(ray), number, dtype=np.int16),
-        delay=delay.astype(np.float32),
-        intensity=scan.intensity[ray].astype(np.float32),
-        instance=scan.instance[ray],
-    )
+    return {
+        "points": points,
+        "sensor": np.full(len(ray), number, dtype=np.int16),
+        "delay": delay.astype(np.float32),
+        "intensity": scan.intensity[ray].astype(np.float32),
+        "instance": scan.instance[ray],
+    }

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..opendrive import LaneSurface
-from .road_surface import GROUPS, cut_along
+from .road_surface import by_road, cut_along, in_groups
 
 JOINT, LEAST_JOINT = 0.3, 0.5
 """Ends of roads within so many metres, along so many metres of their width, lead into each other."""
@@ -63,20 +63,18 @@ def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: 
     tuple of LaneSurface
         Cut at the distance.
     """
-    driving = [lane for lane in surfaces if GROUPS.get(lane.lane_type) == "driving"]
-    by_road: dict[str, list[LaneSurface]] = {}
-    for lane in driving:
-        by_road.setdefault(lane.road_id, []).append(lane)
+    driving = in_groups(surfaces, ["driving"])
+    roads = by_road(driving)
     inside = {lane.road_id for lane in driving if lane.junction_id == junction_id}
     if not inside:
         return ()
-    streets = {road: _street(lanes) for road, lanes in by_road.items()}
+    streets = {road: _street(lanes) for road, lanes in roads.items()}
     away = _distances(streets, inside, distance)
     return tuple(
         piece
         for road, street in streets.items()
         if road in inside or street.leads_on
-        for lane in by_road[road]
+        for lane in roads[road]
         for piece in _pieces(lane, street, [away[road, 0], away[road, 1]], distance)
     )
 

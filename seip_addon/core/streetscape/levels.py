@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..opendrive import LaneSurface
-from .road_surface import GROUPS, SEAM
+from .road_surface import SEAM, by_road, group, is_near
 from .terrain import Terrain
 
 JOINED = 1.0
@@ -91,7 +91,7 @@ def split_levels(
         road of ``level`` is not here.
     """
     shapely.prepare(around)
-    near = [lane for lane in surfaces if lane.lane_type in GROUPS and _is_near(lane, around)]
+    near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]
     roads = _roads(near, around)
     _check_level(level, roads)
     crossings = _crossings(roads) if roads else ()
@@ -132,17 +132,9 @@ class _RoadArea:
         return sum(self.heights) / 2
 
 
-def _is_near(lane: LaneSurface, around: BaseGeometry) -> bool:
-    points = np.concatenate([lane.left, lane.right])[:, :2]
-    return bool(around.intersects(shapely.box(*points.min(axis=0), *points.max(axis=0))))
-
-
 def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _RoadArea]:
-    by_road: dict[str, list[LaneSurface]] = {}
-    for lane in lanes:
-        by_road.setdefault(lane.road_id, []).append(lane)
     roads = {}
-    for road, own in by_road.items():
+    for road, own in by_road(lanes).items():
         outline = shapely.union_all([shapely.make_valid(lane.polygon) for lane in own]).intersection(around)
         if outline.area > 0:
             triangles = np.concatenate([lane.triangles for lane in own])

@@ -16,21 +16,17 @@ from ..opendrive import (
     LaneSurface,
     PlacedObject,
     RoadMap,
-    find_junction,
-    junction_area,
     lane_surfaces,
-    nearest_junctions,
     placed_objects,
     placed_signals,
 )
 from ..progress import Progress
 from ..site.obstruction import BARE, can_hide
-from ..site.scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
+from ..site.scene_geometry import ASSUMED, DESCRIBED
 from . import road_surface, street_furniture
-from .approaches import approach_lanes
-from .degrees import in_metres, looks_like_degrees
-from .description import DEFAULT_RADIUS, Poles, SiteDescription, WeightedRegion
-from .levels import APART, Levels, split_levels
+from .degrees import in_metres
+from .description import Poles, SiteDescription
+from .levels import APART, Levels
 from .map_furniture import (
     CROWN_SHARE,
     arm_heading,
@@ -42,6 +38,7 @@ from .map_furniture import (
     tree_part,
 )
 from .parts import Part, Role
+from .place import MARGIN, Place, shifted
 from .road_surface import Roadside
 from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
@@ -49,15 +46,11 @@ from .terrain import Terrain
 STAGES = 6
 """Pieces of work that a model is made in once the map's lanes are known."""
 ROADS_PER_STEP = 20
-MARGIN = 40.0
-"""How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
 CANDIDATE_MARGIN = 15.0
 """How far outside the region of interest (metres) a new post may stand."""
 VERGE_STRIP = (0.8, 2.3)
 """Where new posts may stand beside a road without pavements: metres from the carriageway."""
 VERGE_BELOW = 0.03
-NEAR_CROSSING = 10.0
-"""Roads this near to the middle of the place (metres) may each be the one that is meant."""
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
 FARTHEST_GARDEN = 300.0
@@ -157,16 +150,15 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     description, place_notes = in_metres(description, road_map, surfaces)
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
-    centre = _centre(road_map, surfaces, description)
-    within = _within(road_map, surfaces, description, centre)
-    levels = _levels(road_map, surfaces, description, centre, within)
-    surfaces = levels.studied
-    region = _region(road_map, surfaces, description, centre, within)
-    origin = _origin(surfaces, centre)
+    place = Place(road_map, surfaces, description)
+    levels = place.levels()
+    place = replace(place, surfaces=levels.studied)
+    region = place.region()
+    origin = _origin(place)
     yield next(stages)
-    street = _street(surfaces, origin, _shifted(region, -origin))
+    street = _surroundings(place.surfaces, origin, shifted(region, -origin))
     yield next(stages)
-    around = _shifted(street.extent, origin)
+    around = shifted(street.extent, origin)
     placed = local_objects(placed_objects(road_map, area=around), origin)
     away = levels.other_roads()
     hung = [
@@ -184,7 +176,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     yield next(stages)
     carriageway = _surface_parts(street)
     yield next(stages)
-    weighted = _weighted_areas(road_map, surfaces, description, centre)
+    weighted = place.weighted_areas()
     parts = [
         *carriageway,
         *pavement,
@@ -235,104 +227,6 @@ def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface
     return tuple(surfaces)
 
 
-def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription) -> Float:
-    """Return the middle (x, y) of the place in map coordinates."""
-    if description.near is not None:
-        return np.array(description.near, dtype=np.float64)
-    if description.junction is not None:
-        junction = find_junction(road_map, surfaces, description.junction)
-        centre = _junction_driving_area(surfaces, junction.id).centroid
-    elif description.region is not None:
-        centre = description.region.centroid
-    else:
-        raise SeipError(
-            "no place is named: give --near X Y or --junction ID, or near, junction or region in the site file"
-        )
-    return np.array([centre.x, centre.y])
-
-
-def _within(
-    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
-) -> BaseGeometry:
-    """Return the area in map coordinates in which the region of interest lies."""
-    if description.region is not None:
-        return description.region
-    if description.along is None:
-        return shapely.Point(centre).buffer(description.radius or DEFAULT_RADIUS, quad_segs=32)
-    lanes = _approach_lanes(road_map, surfaces, description)
-    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
-
-
-def _approach_lanes(
-    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription
-) -> tuple[LaneSurface, ...]:
-    assert description.junction is not None  # noqa: S101  # for the type checker: approaches are a junction's
-    junction = find_junction(road_map, surfaces, description.junction)
-    return approach_lanes(surfaces, junction.id, description.along or 0.0)
-
-
-def _region(
-    road_map: RoadMap,
-    surfaces: Sequence[LaneSurface],
-    description: SiteDescription,
-    centre: Float,
-    within: BaseGeometry,
-) -> BaseGeometry:
-    """Return the region of interest in map coordinates."""
-    shapely.prepare(within)
-    lanes = surfaces if description.along is None else _approach_lanes(road_map, surfaces, description)
-    driving = road_surface.in_groups((lane for lane in lanes if lane.lane_type in road_surface.GROUPS), ["driving"])
-    shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
-    near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
-    if near:
-        region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(_shifted(within, -shift)))
-        if not region.is_empty:
-            return _shifted(region, shift)
-    where = f"within {description.radius or DEFAULT_RADIUS:g} m of ({centre[0]:g}, {centre[1]:g})"
-    if description.along is not None:
-        where = f"in junction {description.junction!r}"
-    elif description.region is not None:
-        where = "within the region"
-    x, y = centre.tolist()
-    given = description.near is not None and not (x.is_integer() and y.is_integer())
-    degrees = given and looks_like_degrees((x, y))
-    hint = " (give metres of the map, not latitude and longitude)" if degrees else ""
-    raise SeipError(f"there is no driving lane {where}{hint}{_nearest(road_map, surfaces, centre)}")
-
-
-def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) -> str:
-    """Return the junctions next to a place, as the end of a sentence."""
-    names = []
-    x, y = centre.tolist()
-    for junction, _ in nearest_junctions(road_map, surfaces, x, y, 3):
-        middle = junction_area(surfaces, junction.id).centroid
-        names.append(f"{junction.id} at ({middle.x:.0f}, {middle.y:.0f})")
-    if names:
-        return f"; the nearest junctions are {', '.join(names)}"
-    x_low, y_low, x_high, y_high = shapely.total_bounds([lane.polygon for lane in surfaces])
-    return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
-
-
-def _levels(
-    road_map: RoadMap,
-    surfaces: Sequence[LaneSurface],
-    description: SiteDescription,
-    centre: Float,
-    within: BaseGeometry,
-) -> Levels:
-    """Return the lanes on the level of the place, and those that cross above or below."""
-    around = within.convex_hull.buffer(MARGIN, quad_segs=16)
-    if description.near is None and description.junction is not None:
-        junction = find_junction(road_map, surfaces, description.junction).id
-        anchors = {lane.road_id for lane in surfaces if lane.junction_id == junction}
-    else:
-        driving = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
-        away = shapely.distance([lane.polygon for lane in driving], shapely.Point(centre))
-        least = max(away.min(initial=np.inf), NEAR_CROSSING)
-        anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
-    return split_levels(surfaces, around, anchors, description.level)
-
-
 def _level_notes(levels: Levels) -> Iterator[str]:
     roads = levels.other_roads()
     for crossing in levels.crossings:
@@ -363,14 +257,14 @@ def _on_level(part: Part, street: _Surroundings) -> Part:
     return part
 
 
-def _origin(surfaces: Sequence[LaneSurface], centre: Float) -> Float:
+def _origin(place: Place) -> Float:
     """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
-    points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in surfaces])
-    nearest = points[np.argmin(np.hypot(*(points[:, :2] - centre).T))]
-    return np.round([*centre, nearest[2]])
+    points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
+    nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
+    return np.round([*place.centre, nearest[2]])
 
 
-def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
+def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
@@ -461,28 +355,11 @@ def _region_part(street: _Surroundings) -> Part:
     return _area_part("Region of interest", street.region, Role.REGION, street)
 
 
-def _weighted_areas(
-    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
-) -> list[tuple[str, BaseGeometry, float]]:
-    """Return name, area and weight of the weighted regions, map coordinates.
-
-    Where none is described it is the box of the junction nearest to the middle.
-    """
-    if description.weighted_regions:
-        return [
-            (weighted.name, _weighted_area(road_map, surfaces, weighted), weighted.weight)
-            for weighted in description.weighted_regions
-        ]
-    x, y = centre.tolist()
-    nearest = nearest_junctions(road_map, surfaces, x, y, 1)
-    return [(f"Junction {found.id}", _central_box(surfaces, found.id), DEFAULT_WEIGHT) for found, _ in nearest]
-
-
 def _weighted_parts(
     areas: Sequence[tuple[str, BaseGeometry, float]], street: _Surroundings, *, described: bool
 ) -> Iterator[Part]:
     for name, area, weight in areas:
-        local = _shifted(area, -street.origin)
+        local = shifted(area, -street.origin)
         if local.intersects(street.region):
             yield _area_part(name, local, Role.WEIGHTED_REGIONS, street, weight=weight)
         elif described:
@@ -491,30 +368,13 @@ def _weighted_parts(
             )
 
 
-def _weighted_area(road_map: RoadMap, surfaces: Sequence[LaneSurface], weighted: WeightedRegion) -> BaseGeometry:
-    if weighted.junction is None:
-        return weighted.polygon
-    return _central_box(surfaces, find_junction(road_map, surfaces, weighted.junction).id)
-
-
-def _central_box(surfaces: Sequence[LaneSurface], junction_id: str) -> BaseGeometry:
-    """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
-    return shapely.minimum_rotated_rectangle(_junction_driving_area(surfaces, junction_id))
-
-
-def _junction_driving_area(surfaces: Sequence[LaneSurface], junction_id: str) -> BaseGeometry:
-    inside = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
-    area = junction_area(inside, junction_id)
-    return junction_area(surfaces, junction_id) if area.is_empty else area
-
-
 def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
     kinds = (
         (description.forbidden_areas, Role.FORBIDDEN_AREAS),
         (description.mandatory_areas, Role.MANDATORY_AREAS),
     )
     return [
-        _area_part(area.name, _shifted(area.polygon, -street.origin), role, street)
+        _area_part(area.name, shifted(area.polygon, -street.origin), role, street)
         for areas, role in kinds
         for area in areas
     ]
@@ -574,7 +434,3 @@ def _area_part(
 
 def _solid(faces: Float, material: str) -> street_furniture.Solid:
     return street_furniture.from_faces(faces, material)
-
-
-def _shifted(area: BaseGeometry, by: Float) -> BaseGeometry:
-    return shapely.transform(area, lambda xy: xy + by[:2])
