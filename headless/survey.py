@@ -18,7 +18,7 @@ from headless.options import add_settings, read_settings
 import bpy
 import numpy as np
 
-from seip_addon.core.geometry.orientation import tilt_in_words
+from seip_addon.core.geometry.orientation import describe_tilt
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Sensor
 from seip_addon.core.placement.goal import Plan
@@ -168,7 +168,7 @@ def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool, pose_
 
 def sensor_in_words(sensor: Sensor) -> str:
     """Say which sensor hangs where."""
-    tilt = tilt_in_words(sensor.tilt)
+    tilt = describe_tilt(sensor.tilt)
     return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
 
 

@@ -34,14 +34,14 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.demand import Demand
-from seip_addon.core.traffic.floating_car_data import Window, some
+from seip_addon.core.traffic.floating_car_data import TimeAndPlace, listed
 from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
 from seip_addon.core.traffic.source import (
     MARGIN,
     TrafficFiles,
-    kinds_in_words,
+    describe_categories,
     load_traffic,
     read_sumo,
     road_bounds,
@@ -85,7 +85,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     with tempfile.TemporaryDirectory() as folder:
         files = _run(simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0)))
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
-        window = Window(options.warm_up, end, road_bounds(geometry, MARGIN))
+        window = TimeAndPlace(options.warm_up, end, road_bounds(geometry, MARGIN))
         made = TrafficFiles(files.floating_car_data, (files.routes,), files.network)
         read = _run(read_sumo(made, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
@@ -94,7 +94,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     apart, collided = _run(without_overlaps(simulated))
     if collided:
         session.LOG.info(
-            f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {some(collided)}"
+            f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {listed(collided)}"
         )
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))
 
@@ -108,7 +108,7 @@ def _in_words(trajectories: Trajectories) -> str:
     begin, end = trajectories.span
     present = len(trajectories.at((begin + end) / 2.0))
     return (
-        f"{len(trajectories)} road users ({kinds_in_words(trajectories)}) from {begin:g} to {end:g} s, "
+        f"{len(trajectories)} road users ({describe_categories(trajectories)}) from {begin:g} to {end:g} s, "
         f"{len(trajectories.time):,} samples, {present} at once halfway"
     )
 

@@ -14,7 +14,7 @@ from mathutils import Vector
 
 from .. import live_coverage, preferences, scene_status, scene_survey, selection
 from ..core.errors import SeipError
-from ..core.geometry.orientation import tilt_in_words
+from ..core.geometry.orientation import describe_tilt
 from ..core.placement.goal import Plan, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
@@ -124,7 +124,7 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ran
             line = ranking.add()
             line.pose, line.share = one.pose, one.share
             position = candidates.position_name[candidates.position_of[one.pose]]
-            tilt = tilt_in_words(candidates.tilt[one.pose])
+            tilt = describe_tilt(candidates.tilt[one.pose])
             line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m{tilt} {position}"
 
 

@@ -11,7 +11,7 @@ import shapely
 
 from ..core.progress import Progress
 from ..core.storage.files import digest
-from ..core.streetscape.model import VEILS, SiteModel
+from ..core.streetscape.model import AREA_OVERLAYS, SiteModel
 from ..core.streetscape.parts import Part, Role
 from . import contract
 from .blend_file import CLIP_END, CLIP_START
@@ -94,7 +94,7 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
         thing[contract.WEIGHT] = part.weight
     if part.source:
         thing[contract.SOURCE] = part.source
-    thing.hide_render = VEILS.keys() >= set(part.roles)  # the viewport shows what only means an area
+    thing.hide_render = AREA_OVERLAYS.keys() >= set(part.roles)  # the viewport shows what only means an area
     for role in part.roles:
         contract.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import SeipError
-from ..core.streetscape.model import VEILS
+from ..core.streetscape.model import AREA_OVERLAYS
 from ..core.streetscape.parts import Role
 from . import contract
 from .build import COLLECTIONS
@@ -119,7 +119,7 @@ def add_area(
     corners : int
         Four make a rectangle, more an ellipse.
     """
-    above, shade = VEILS[role]
+    above, shade = AREA_OVERLAYS[role]
     name = role.value.capitalize()
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(_polygon(size, corners), [], [tuple(range(corners))])

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..core.arrays import Integer
 from ..core.errors import SeipError
-from ..core.geometry.orientation import tilt_in_words
+from ..core.geometry.orientation import describe_tilt
 from ..core.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
 from ..core.placement.deployment import Deployment, Sensor
 from ..core.site.site import Site, Targets
 from ..core.site.target_squares import target_squares
-from ..core.streetscape.model import VEILS
+from ..core.streetscape.model import AREA_OVERLAYS
 from ..core.streetscape.street_furniture import Solid, join, prism, tube
 from . import contract
 from .materials import linear, matt
@@ -29,7 +29,7 @@ SEEN_BY, TARGET_WEIGHT, COLOUR = "seip_seen", "seip_weight", "seip_colour"
 CLASS_WORDS, CLASS_COLOURS, SHARES, ASPECT = "seip_classes", "seip_class_colours", "seip_shares", "seip_aspect"
 """Custom properties of the coverage: what its colours mean; the aspect is empty where they are another's."""
 
-LIFT = max(height for height, _ in VEILS.values()) + 0.02
+LIFT = max(height for height, _ in AREA_OVERLAYS.values()) + 0.02
 """Metres of the coverage above the road: over the veils of areas, under the top of a kerb, which cuts it off."""
 BODY_RADIUS, BODY_HEIGHT = 0.12, 0.22  # metres; somewhat larger than life
 POST_RADIUS, BRACKET_RADIUS = 0.06, 0.03  # metres
@@ -123,7 +123,7 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
 
 
 def _name(sensor: Sensor) -> str:
-    return f"{sensor.model.key} @ {sensor.height:.3g} m{tilt_in_words(sensor.tilt)} · {sensor.position_name}"
+    return f"{sensor.model.key} @ {sensor.height:.3g} m{describe_tilt(sensor.tilt)} · {sensor.position_name}"
 
 
 def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:

@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import CATEGORIES, RoadUser
-from seip_addon.core.traffic.bodies import COLOURS, REFLECTIVITY, colour_of, fitted_body
-from seip_addon.core.traffic.body_parts import signed_volume
+from seip_addon.core.traffic.bodies import COLOURS, MESHES, REFLECTIVITY, colour_of, fitted_body, read_mesh
 
 USUAL = {
     "hatchback": ("car", 3.9, 1.75, 1.48),
@@ -59,6 +58,12 @@ def edges(triangles):
     return [tuple(edge) for i in range(3) for edge in corners[:, [i, (i + 1) % 3]].tolist()]
 
 
+def signed_volume(triangles):
+    """Volume that closed triangles enclose, below zero where they are inside out."""
+    inner = triangles - triangles[0, 0]
+    return np.einsum("ij,ij->", inner[:, 0], np.cross(inner[:, 1], inner[:, 2])) / 6
+
+
 def areas(triangles):
     return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
 
@@ -97,13 +102,50 @@ def test_the_bounding_box_is_exactly_the_size(user):
     assert triangles.max(axis=(0, 1)).tolist() == [user.length / 2, user.width / 2, user.height]
 
 
-@given(any_user)
-def test_every_part_is_closed_and_turned_outwards_at_any_size(user):
-    triangles = fitted_body(user).triangles
+@pytest.mark.parametrize("path", sorted(MESHES.glob("*.obj")), ids=lambda path: path.stem)
+def test_every_part_of_a_mesh_is_closed_and_turned_outwards(path):
+    triangles, _ = read_mesh(path)
+    assert path.name.split(".")[0] in CATEGORIES
     directed = edges(triangles)
     assert len(set(directed)) == len(directed)
     assert {(b, a) for a, b in directed} == set(directed)
     assert all(signed_volume(triangles[part]) > 0 for part in parts(triangles))
+
+
+def test_a_road_user_looks_like_the_model_nearest_in_size():
+    coach, city_bus = (fitted_body(RoadUser("u", "bus", length, 2.55, 3.2)) for length in (15.0, 11.5))
+    assert len(coach) == len(read_mesh(MESHES / "bus.coach.obj")[0])
+    assert len(city_bus) == len(read_mesh(MESHES / "bus.city_bus.obj")[0])
+
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl {material}\nf 1 3 2\nf 1/1/1 2/2/2 4/3/3\nf 2 3 4\nf 1 4 3\n"
+
+
+def test_a_mesh_is_read_as_blender_writes_it(tmp_path):
+    path = tmp_path / "car.mine.obj"
+    path.write_text("mtllib mine.mtl\no Body\ns 0\n" + TETRAHEDRON.format(material="tail_lamp"))
+    triangles, material = read_mesh(path)
+    assert triangles[0].tolist() == [[0, 0, 0], [0, 1, 0], [1, 0, 0]]
+    assert material.tolist() == ["tail lamp"] * 4
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl paint\nf 1 2 3\n", "has no length, width and height"),
+        (TETRAHEDRON.format(material="chrome"), "unknown material 'chrome'; known are cargo box"),
+        (TETRAHEDRON.format(material="paint") + "f 1 2 3 4\n", "not all faces are triangles"),
+        (TETRAHEDRON.format(material="paint") + "f 1 2 9\n", "is no Wavefront OBJ mesh"),
+        (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 x"), "is no Wavefront OBJ mesh"),
+        (TETRAHEDRON.format(material="paint").replace("0 0 1", "0 0 nan"), "has no length, width and height"),
+        ("", "is no Wavefront OBJ mesh"),
+    ],
+)
+def test_no_mesh_of_a_body_is_one_sentence(tmp_path, text, message):
+    path = tmp_path / "car.obj"
+    path.write_text(text)
+    with pytest.raises(SeipError, match=message):
+        read_mesh(path)
 
 
 @usual

@@ -113,8 +113,8 @@ def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"price_usd": None}, "lacks price_usd"),
-        ({"channels": None}, "lacks channels"),
+        ({"price_usd": None}, "price_usd is missing"),
+        ({"channels": None}, "channels is missing"),
         ({"chanels": "4"}, "chanels"),
         ({"channels": "1"}, "channels"),
         ({"channels": "4.5"}, "channels"),

@@ -226,11 +226,8 @@ VALUES = [match.span(1) for match in re.finditer(r'(?<![a-z])[a-zA-Z]+="([^"]*)"
 WRONG = ["0", "-1", "0.5", "3", "1e5", "1e9", "-1e9", "1e-300", "1e300", "nan", "-inf", "x", ""]
 
 
-@given(st.sampled_from(VALUES), st.sampled_from(WRONG))
-@settings(max_examples=200)
-def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, value):
+def is_read_or_refused_in_words(folder, span, value):
     text = EVERYTHING[: span[0]] + value + EVERYTHING[span[1] :]
-    folder = tmp_path_factory.getbasetemp()
     try:
         road_map = read_text(folder, text, "mutant.xodr")
         surfaces = map_lanes(road_map)
@@ -239,3 +236,16 @@ def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, 
         return
     assert all(np.isfinite(surface.triangles).all() for surface in surfaces)
     assert all(np.isfinite(thing.position).all() for thing in things)
+
+
+@given(st.sampled_from(VALUES), st.sampled_from(WRONG))
+@settings(max_examples=30)
+def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, value):
+    is_read_or_refused_in_words(tmp_path_factory.getbasetemp(), span, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("value", WRONG)
+def test_every_value_gone_wrong_is_read_or_refused_in_words(tmp_path, value):
+    for span in VALUES:
+        is_read_or_refused_in_words(tmp_path, span, value)

@@ -315,7 +315,7 @@ def test_a_junction_is_found_by_id_and_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("name", "place"),
     [
-        ("Town05", {"near": (-49.0, -1.0)}),
+        pytest.param("Town05", {"near": (-49.0, -1.0)}, marks=pytest.mark.slow),
         ("Town01", {"junction": "87"}),
         ("crest-curve", {"near": (200.0, -10.0)}),
         ("parking_demo", {"junction": "100"}),

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import angles_of, orientation, orientations, tilt_in_words, turned
+from seip_addon.core.geometry.orientation import angles_of, describe_tilt, orientation, orientations, turned
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.goal import Goal
@@ -235,7 +235,7 @@ def test_tilts_are_named_in_degrees_one_by_one_or_as_a_range():
     for text in ("steep", "0:10", "10:0:1", "0:95:5", "0:10:0"):
         with pytest.raises(SeipError, match="neither a tilt in degrees nor a range"):
             tilts_of([text])
-    assert (tilt_in_words(0.0), tilt_in_words(math.radians(7.5))) == ("", ", tilted 7.5°")
+    assert (describe_tilt(0.0), describe_tilt(math.radians(7.5))) == ("", ", tilted 7.5°")
 
 
 def test_places_part_tilts_and_pieces_keep_each_pose_once():

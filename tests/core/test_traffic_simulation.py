@@ -13,7 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic import CATEGORIES, sumo
 from seip_addon.core.traffic.demand import MIX, MODELS, Demand, write_routes
-from seip_addon.core.traffic.floating_car_data import Window, read_floating_car_data, read_trajectories
+from seip_addon.core.traffic.floating_car_data import TimeAndPlace, read_floating_car_data, read_trajectories
 from seip_addon.core.traffic.street_network import DRIVING, PARKING, WALKING, read_network
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 
@@ -157,7 +157,10 @@ def test_without_sumo_the_cure_is_named(monkeypatch):
         sumo.find_sumo()
 
 
-def simulated(folder, map_path, seed=3, duration=60.0, bounds=None):
+JUNCTION = ROOT / "scenes" / "junction.xodr"
+
+
+def simulated(folder, map_path, seed=3, duration=30.0, bounds=None):
     folder.mkdir()
     scenario = sumo.Scenario(Demand(flow=500.0), sumo.SignalPlan(), seed, duration)
     return finish(sumo.simulate(map_path, folder, scenario, bounds))
@@ -168,19 +171,22 @@ def rows(path):
     return path.read_bytes().rpartition(b"-->")[2]
 
 
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return simulated(tmp_path_factory.mktemp("runs") / "run", JUNCTION)
+
+
 @needs_sumo
-def test_the_same_seed_gives_the_same_traffic(tmp_path):
-    path = ROOT / "scenes" / "junction.xodr"
-    one, same = (simulated(tmp_path / name, path) for name in ("one", "same"))
-    other = simulated(tmp_path / "other", path, seed=4)
+def test_the_same_seed_gives_the_same_traffic(tmp_path, run):
+    one, same = run, simulated(tmp_path / "same", JUNCTION)
+    other = simulated(tmp_path / "other", JUNCTION, seed=4)
     assert rows(one.floating_car_data) == rows(same.floating_car_data)
     assert rows(one.floating_car_data) != rows(other.floating_car_data)
 
 
 @needs_sumo
-def test_sumo_s_csv_says_what_its_xml_says(tmp_path):
-    files = simulated(tmp_path / "run", ROOT / "scenes" / "junction.xodr", duration=30.0)
-    arguments = ["--net-file", files.network, "--route-files", files.routes, "--end", 30, "--step-length", 0.1]
+def test_sumo_s_csv_says_what_its_xml_says(tmp_path, run):
+    arguments = ["--net-file", run.network, "--route-files", run.routes, "--end", 30, "--step-length", 0.1]
     forms = {}
     for name in ("f.xml", "f.csv", "f.xml.gz"):
         more = ["--fcd-output", tmp_path / name, "--precision", 3, "--no-warnings", "true", "--no-step-log", "true"]
@@ -199,9 +205,8 @@ def test_sumo_s_csv_says_what_its_xml_says(tmp_path):
 
 
 @needs_sumo
-def test_crossings_lie_on_the_painted_crosswalks_and_vehicles_stop_before_them(tmp_path):
-    files = simulated(tmp_path / "run", ROOT / "scenes" / "junction.xodr", duration=5.0)
-    root = ET.parse(files.network).getroot()  # noqa: S314  # written just now
+def test_crossings_lie_on_the_painted_crosswalks_and_vehicles_stop_before_them(run):
+    root = ET.parse(run.network).getroot()  # noqa: S314  # written just now
     crossings = [lane.get("shape") for edge in root.iter("edge") if edge.get("function") == "crossing" for lane in edge]
     assert len(crossings) == 4
     middles = np.array(
@@ -209,12 +214,13 @@ def test_crossings_lie_on_the_painted_crosswalks_and_vehicles_stop_before_them(t
     )
     distance = np.hypot(*middles.T)
     np.testing.assert_allclose(distance, 15.0 + 3.0, atol=0.1)  # arms begin at 15 m, crosswalks lie 1 to 5 m along
-    streets = read_network(files.network)
+    streets = read_network(run.network)
     ends = [np.hypot(*edge.of(DRIVING)[-1].line[-1]) for edge in streets.arms]
     assert len(ends) == 4
     assert min(ends) == pytest.approx(20.0, abs=0.3)
 
 
+@pytest.mark.slow
 @needs_sumo
 def test_town05_is_cut_to_the_scene(tmp_path):
     path = MAPS / "Town05.xodr"
@@ -224,7 +230,7 @@ def test_town05_is_cut_to_the_scene(tmp_path):
     streets = read_network(files.network)
     assert 10 <= len(streets.edges) <= 60
     assert len(streets.arms) >= 4
-    data = finish(read_floating_car_data(files.floating_car_data, window=Window(begin=20.0)))
+    data = finish(read_floating_car_data(files.floating_car_data, window=TimeAndPlace(begin=20.0)))
     types = finish(read_vehicle_types([files.routes]))
     trajectories, warnings = read_trajectories(data, types, np.zeros(3), "Town05")
     assert len(trajectories) > 20

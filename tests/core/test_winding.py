@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seip_addon.core.geometry.winding_number import Cells, enclosed, winding_number
+from seip_addon.core.geometry.winding_number import Blocks, enclosed, winding_number
 from seip_addon.core.site.obstruction import inside_any, post_blocked
 from seip_addon.core.site.scene_geometry import Mesh
 
@@ -49,6 +49,7 @@ def leaves(random, count):
     lost=st.sampled_from([0.0, 0.3]),
     shift=st.sampled_from([0.0, 1e4]),
 )
+@settings(max_examples=12)
 def test_it_is_what_the_winding_number_says(seed, count, times, lost, shift):
     random = np.random.default_rng(seed)
     triangles = np.concatenate([solids(random, count, times, lost), leaves(random, count), sheet(times)]) + shift
@@ -58,13 +59,14 @@ def test_it_is_what_the_winding_number_says(seed, count, times, lost, shift):
     assert (enclosed(points, triangles) == (number > 0.5))[clear].all()
 
 
-@given(seed=st.integers(0, 2**32 - 1), tolerance=st.sampled_from([1e-1, 1e-3, 1e-6]))
-@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), tolerance=st.sampled_from([1.0, 0.1, 0.01]))
+@settings(max_examples=12)
 def test_no_error_is_above_its_bound(seed, tolerance):
     random = np.random.default_rng(seed)
     triangles = np.concatenate([solids(random, 10, 3, 0.3), leaves(random, 500), sheet(5)])
-    points = random.uniform(-40, 40, (40, 3))
-    found, bound = Cells.of(triangles).winding_number(points, tolerance)
+    points = random.uniform(-40, 40, (25, 3))
+    blocks = Blocks.of(triangles)
+    found, bound = np.transpose([blocks.winding_number(point, tolerance) for point in points])
     assert (np.abs(found - winding_number(points, triangles)) <= bound + 1e-9).all()
     assert bound.max() > 0
 

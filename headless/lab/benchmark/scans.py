@@ -27,10 +27,10 @@ from seip_addon.core.scans import (
 )
 from seip_addon.core.scans.frame import STATIC
 from seip_addon.core.scans.motion import rotations
-from seip_addon.core.scans.scanner import Scan, Scanner, Shape, Surface
+from seip_addon.core.scans.scanner import ReflectiveSurface, Scan, Scanner
 from seip_addon.core.site.site import Site
 from seip_addon.core.traffic import RoadUser, Snapshot, Trajectories
-from seip_addon.core.traffic.bodies import fitted_body
+from seip_addon.core.traffic.bodies import Body, fitted_body
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 SENSORS, ROAD_USERS = 4, 40
@@ -112,14 +112,14 @@ class Rescan:
     ----------
     simulation : Simulation
         Whose frames are to be made otherwise.
-    bodies : sequence of Shape
+    bodies : sequence of Body
         Of each road user.
     engine : {"bvh", "embree"}
     """
 
     simulation: Simulation
     static: StaticScene
-    bodies: Sequence[Shape]
+    bodies: Sequence[Body]
     engine: Engine
 
     def frame(self, number: int, snapshot: Snapshot) -> Frame:
@@ -167,8 +167,8 @@ def driving(site: Site) -> Trajectories:
 
 
 def combined(
-    static: StaticScene, bodies: Sequence[Shape], snapshot: Snapshot, engine: Engine
-) -> tuple[Surface, Integer]:
+    static: StaticScene, bodies: Sequence[Body], snapshot: Snapshot, engine: Engine
+) -> tuple[ReflectiveSurface, Integer]:
     """Put the road users of an instant among what stands still; return that, and which road user each triangle is."""
     placed = [
         position + bodies[user].triangles @ attitude.T
@@ -180,10 +180,10 @@ def combined(
     owner += [np.full(len(bodies[user].triangles), user) for user in snapshot.user]
     reflectivity = [static.reflectivity, *(bodies[user].reflectivity for user in snapshot.user)]
     caster = make_ray_caster(np.concatenate([static.triangles, *placed]), engine)
-    return Surface(caster, np.concatenate(reflectivity)), np.concatenate(owner)
+    return ReflectiveSurface(caster, np.concatenate(reflectivity)), np.concatenate(owner)
 
 
-def full_scan(scanner: Scanner, surface: Surface, owner: Integer, users: int) -> Scan:
+def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, users: int) -> Scan:
     """Cast every ray of a sensor against everything."""
     model, rays = scanner.sensor.model, len(scanner.directions)
     distance, intensity = np.full(rays, np.inf), np.zeros(rays)

@@ -84,6 +84,6 @@ def turned(vectors: Float, matrix: Float) -> Float:
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=1)
 
 
-def tilt_in_words(tilt: float) -> str:
+def describe_tilt(tilt: float) -> str:
     """Return a tilt as words to be put after a height: empty for a sensor that hangs upright."""
     return f", tilted {np.degrees(tilt):.3g}°" if tilt else ""

@@ -1,9 +1,8 @@
-"""Point-in-mesh test by generalised winding number, with a hierarchy of cells."""
+"""Point-in-mesh test by generalised winding number."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +11,10 @@ from ..arrays import Boolean, Float, Integer
 
 _BITS = 16
 """Of each coordinate, for the order of triangles in space."""
-_FAN = 8
-"""Children of a cell."""
 _SMALLEST = 16
-"""Triangles at most in the smallest cells."""
-_AT_ONCE = 128
-"""Points looked at together: their pairs with cells fit into memory."""
-_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6)
-"""Of the error of one far cell; points that the first leaves in doubt go on to the next."""
+"""Triangles of a block at least."""
+_TOLERANCES = (0.1, 0.01, 0.001, 0.0)
+"""Of the errors of all far blocks together; a point that the first leaves in doubt is looked at with the next."""
 
 
 def enclosed(points: Float, triangles: Float) -> Boolean:
@@ -37,23 +32,24 @@ def enclosed(points: Float, triangles: Float) -> Boolean:
 
     Notes
     -----
-    Triangles are put into cells within cells, and what lies in a far cell counts
-    by its moments, as in the fast winding numbers of Barill et al. (2018), here
-    with a bound on the error of each. A point whose winding number is nearer to a
-    half than all its errors together is looked at with smaller ones, and in the end
-    with none.
+    Triangles are put into blocks, and a far block counts by its moments, as in the
+    fast winding numbers of Barill et al. (2018), here with a bound on the error of
+    each. A point whose winding number is nearer to a half than all its errors
+    together is looked at with smaller ones, and in the end with none.
     """
-    inside = np.zeros(len(points), dtype=bool)
-    doubtful = np.arange(len(points))
-    if not len(points) or not len(triangles):
-        return inside
-    cells = Cells.of(triangles)
+    if not len(triangles):
+        return np.zeros(len(points), dtype=bool)
+    blocks = Blocks.of(triangles)
+    return np.array([_encloses(blocks, point) for point in points], dtype=bool)
+
+
+def _encloses(blocks: Blocks, point: Float) -> bool:
+    number = 0.0
     for tolerance in _TOLERANCES:
-        number, error = cells.winding_number(points[doubtful], tolerance)
-        inside[doubtful] = np.abs(number) > 0.5
-        doubtful = doubtful[np.abs(np.abs(number) - 0.5) <= error]
-    inside[doubtful] = np.abs(winding_number(points[doubtful], triangles)) > 0.5
-    return inside
+        number, error = blocks.winding_number(point, tolerance)
+        if abs(abs(number) - 0.5) > error:
+            break
+    return abs(number) > 0.5
 
 
 def winding_number(points: Float, triangles: Float) -> Float:
@@ -94,132 +90,76 @@ def _shares(triangles: Float) -> Float:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
-    """The cells of one size, c of them, and the moments of the surface s in each about its centroid.
+class Blocks:
+    """Triangles in b blocks of k neighbours each, and the moments of the surface s in each about its centroid.
 
     Parameters
     ----------
-    centre : (c, 3) float64, metres
+    triangles : (b, k, 3, 3) float64, metres
+    centre : (b, 3) float64, metres
         The centroid.
-    reach : (c,) float64, metres
-        From there to the farthest corner at most.
-    size : (c,) float64, square metres
-        ∫ ds.
-    area : (c, 3) float64, square metres
+    reach : (b,) float64, metres
+        From there to the farthest corner.
+    area : (b, 3) float64, square metres
         ∫ n ds, n the unit normal.
-    moment : (c, 3, 3) float64, cubic metres
+    moment : (b, 3, 3) float64, cubic metres
         ∫ n uᵀ ds, u the place from the centroid.
-    spread : (c,) float64, metres to the fourth
+    spread : (b,) float64, metres to the fourth
         ∫ |u|² ds.
     """
 
+    triangles: Float
     centre: Float
     reach: Float
-    size: Float
     area: Float
     moment: Float
     spread: Float
 
     @classmethod
-    def of(cls, triangles: Float) -> Level:
-        """Take each triangle (c, 3, 3) for a cell."""
-        centre = triangles.sum(axis=1) / 3
-        a, b, c = np.moveaxis(triangles - centre[:, None], 1, 0)
-        area = np.cross(b - a, c - a) / 2
-        size = np.sqrt(_square(area))
-        squares = np.stack([_square(corner) for corner in (a, b, c)])
+    def of(cls, triangles: Float) -> Blocks:
+        """Put triangles (m, 3, 3) into blocks, some √m of them: more take longer to go through, fewer hold more."""
+        size = max(_SMALLEST, math.isqrt(len(triangles)) // 8)
+        # Triangles without area fill the last block.
+        filling = np.broadcast_to(triangles[-1:, :1], (-len(triangles) % size, 3, 3))
+        ordered = triangles[_order(triangles.sum(axis=1))]
+        blocks = np.concatenate([ordered, filling]).reshape(-1, size, 3, 3)
+        a, b, c = np.moveaxis(blocks, 2, 0)
+        normal = np.cross(b - a, c - a) / 2
+        weight = np.linalg.norm(normal, axis=2)
+        middle = blocks.mean(axis=2)
+        safe = weight + np.finfo(np.float64).tiny  # blocks without area have a middle too
+        centre = (middle * safe[:, :, None]).sum(axis=1) / safe.sum(axis=1)[:, None]
+        corners, middle = blocks - centre[:, None, None], middle - centre[:, None]
+        squares = (corners**2).sum(axis=(2, 3)) + 9 * (middle**2).sum(axis=2)
         return cls(
+            triangles=blocks,
             centre=centre,
-            reach=np.sqrt(squares.max(axis=0)),
-            size=size,
-            area=area,
-            moment=np.zeros((len(triangles), 3, 3)),
-            spread=size * squares.sum(axis=0) / 12,
+            reach=np.linalg.norm(corners, axis=3).max(axis=(1, 2)),
+            area=normal.sum(axis=1),
+            moment=np.einsum("bki,bkj->bij", normal, middle),
+            spread=(weight * squares).sum(axis=1) / 12,
         )
 
-    def joined(self, count: int) -> Level:
-        """Make one cell of each ``count`` that follow each other, by the parallel axis theorem."""
+    def winding_number(self, point: Float, tolerance: float) -> tuple[float, float]:
+        """Return the winding number of a point (3,) and a bound of its error.
 
-        def total(values: Float) -> Float:
-            summed: Float = values.reshape(-1, count, *values.shape[1:]).sum(axis=1)
-            return summed
-
-        weight = self.size + np.finfo(np.float64).tiny  # cells without area have a middle too
-        centre = total(self.centre * weight[:, None]) / total(weight)[:, None]
-        offset = self.centre - np.repeat(centre, count, axis=0)
-        reach = np.sqrt(_square(offset)) + self.reach
-        return Level(
-            centre=centre,
-            reach=reach.reshape(-1, count).max(axis=1),
-            size=total(self.size),
-            area=total(self.area),
-            moment=total(self.moment + self.area[:, :, None] * offset[:, None, :]),
-            spread=total(self.spread + self.size * _square(offset)),
-        )
-
-
-def _square(vectors: Float) -> Float:
-    """Return the squared lengths (n,) of vectors (n, 3)."""
-    squares: Float = np.einsum("ni,ni->n", vectors, vectors)
-    return squares
-
-
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """Cells within cells.
-
-    Parameters
-    ----------
-    levels : tuple of Level
-        From the one cell about everything to the smallest; those in cell i are the `_FAN` from i * `_FAN` on.
-    triangles : (c, k, 3, 3) float64, metres
-        Of the smallest cells.
-    """
-
-    levels: tuple[Level, ...]
-    triangles: Float
-
-    @classmethod
-    def of(cls, triangles: Float) -> Cells:
-        """Sort triangles (n, 3, 3) into cells."""
-        depth = max(0, math.ceil(math.log(len(triangles) / _SMALLEST, _FAN)))
-        missing = -len(triangles) % _FAN**depth
-        # Triangles without area fill the last cells.
-        filled = np.concatenate([triangles, np.broadcast_to(triangles[-1:, :1], (missing, 3, 3))])
-        ordered = filled[_order(filled.sum(axis=1))]
-        levels = [Level.of(ordered).joined(len(ordered) // _FAN**depth)]
-        for _ in range(depth):
-            levels.append(levels[-1].joined(_FAN))
-        return cls(tuple(reversed(levels)), ordered.reshape(_FAN**depth, -1, 3, 3))
-
-    def winding_number(self, points: Float, tolerance: float) -> tuple[Float, Float]:
-        """Return the winding numbers (n,) of points (n, 3) and bounds (n,) of their errors."""
-        blocks = range(0, len(points), _AT_ONCE)
-        found = [self._sums(points[start : start + _AT_ONCE], tolerance) for start in blocks]
-        number, error = np.concatenate([np.empty((2, 0)), *found], axis=1)
-        return number, error
-
-    def _sums(self, points: Float, tolerance: float) -> Float:
-        sums = np.zeros((2, len(points)))
-        for point, terms in self._terms(points, tolerance):
-            sums += [np.bincount(point, term, len(points)) for term in terms]
-        return sums
-
-    def _terms(self, points: Float, tolerance: float) -> Iterator[tuple[Integer, tuple[Float, Float]]]:
-        """Yield points and what cells add to their winding numbers and errors.
-
-        First the largest cells that are far enough, then the triangles of the smallest that are not.
+        Blocks whose error is bounded by their part of the tolerance count by their moments, the triangles of the others
+        one by one.
+        The share of a small surface is ∫ n·v / |v|³ ds / 4π, v its place from the point: of its Taylor series about
+        the centroid the first two terms are taken. No third derivative of 1 / |v|, along whatever unit vectors, is
+        above 6 / |v|⁴.
         """
-        point, cell = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
-        for depth, level in enumerate(self.levels):
-            if depth:
-                point, cell = np.repeat(point, _FAN), (cell[:, None] * _FAN + np.arange(_FAN)).ravel()
-            error = _error(level, cell, points[point])
-            far = error <= tolerance
-            yield point[far], (_far_share(level, cell[far], points[point[far]]), error[far])
-            point, cell = point[~far], cell[~far]
-        share = _shares(self.triangles[cell] - points[point][:, None, None]).sum(axis=1)
-        yield point, (share, np.zeros(len(point)))
+        away = self.centre - point
+        distance = np.linalg.norm(away, axis=1)
+        nearest = distance - self.reach
+        error = np.full(len(away), np.inf)
+        np.divide(3 / (4 * np.pi) * self.spread, nearest**4, out=error, where=nearest > 0)
+        far = error * len(away) <= tolerance
+        away, distance, moment = away[far], distance[far], self.moment[far]
+        linear = np.trace(moment, axis1=1, axis2=2) - 3 * np.einsum("ki,kij,kj->k", away, moment, away) / distance**2
+        share = ((self.area[far] * away).sum(axis=1) + linear) / distance**3 / (4 * np.pi)
+        number = share.sum() + _shares(self.triangles[~far] - point).sum()
+        return float(number), float(error[far].sum())
 
 
 def _order(places: Float) -> Integer:
@@ -229,28 +169,3 @@ def _order(places: Float) -> Integer:
     steps = ((places - low) / step).astype(np.int64)
     bits = [((steps >> bit) & 1) @ (1, 2, 4) << 3 * bit for bit in range(_BITS)]
     return np.argsort(sum(bits), kind="stable")
-
-
-def _far_share(level: Level, cell: Integer, points: Float) -> Float:
-    """Return what cells (k,) add to the winding numbers of points (k, 3), one each, by their moments.
-
-    The share of a small surface is ∫ n·v / |v|³ ds / 4π, v its place from the point; this has the first two terms of
-    its Taylor series about the cell's centre.
-    """
-    away = level.centre[cell] - points
-    distance = np.linalg.norm(away, axis=1)
-    moment = level.moment[cell]
-    linear = np.trace(moment, axis1=1, axis2=2) - 3 * np.einsum("ki,kij,kj->k", away, moment, away) / distance**2
-    share: Float = ((level.area[cell] * away).sum(axis=1) + linear) / distance**3 / (4 * np.pi)
-    return share
-
-
-def _error(level: Level, cell: Integer, points: Float) -> Float:
-    """Return bounds (k,) of the error of `_far_share`; infinite where the point may be within the cell.
-
-    No third derivative of 1 / |v|, along whatever unit vectors, is above 6 / |v|⁴.
-    """
-    nearest = np.linalg.norm(level.centre[cell] - points, axis=1) - level.reach[cell]
-    bound = np.full(len(cell), np.inf)
-    np.divide(3 / (4 * np.pi) * level.spread[cell], nearest**4, out=bound, where=nearest > 0)
-    return bound

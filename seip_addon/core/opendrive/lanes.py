@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from .road_map import Frame, Lane, LaneSection, Road
+from .road_map import Lane, LaneSection, Road, RoadFrame
 from .sampling import sample
 
 _SMALLEST_TRIANGLE = 1e-9  # square metres
@@ -155,7 +155,7 @@ def _edges(road: Road, section: LaneSection, s: Float) -> Float:
 
 
 def _side_edges(
-    road: Road, frame: Frame, lanes: tuple[Lane, ...], s: Float, side: float
+    road: Road, frame: RoadFrame, lanes: tuple[Lane, ...], s: Float, side: float
 ) -> Iterator[tuple[Float, Float]]:
     """Yield the inner and outer edge, (k, 3) each, of the lanes of one side from the centre outwards."""
     centre = t = road.lane_offset(s)

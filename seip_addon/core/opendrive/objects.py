@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..geometry.orientation import orientation
 from .road_map import Corner, Repeat, Road, RoadMap, RoadObject
 from .sampling import sample
 
@@ -147,7 +148,7 @@ def _place(road: Road, original: RoadObject, thing: RoadObject) -> PlacedObject:
     """Return an object in map coordinates; ``original`` says where the corners on the road were meant."""
     position = _point(road, thing.s, thing.t, thing.z_offset)
     yaw = float(road.frame(np.array([thing.s])).heading[0]) + thing.heading
-    turn = _rotation(yaw, thing.pitch, thing.roll)
+    turn = orientation(yaw, thing.pitch, thing.roll)
 
     def foot(corner: Corner) -> Float:
         if not corner.on_road:
@@ -216,15 +217,3 @@ def _point(road: Road, s: float, t: float, up: float) -> Float:
 def _lifted(points: Float, height: Float) -> Float:
     """Return points (k, 3) lifted straight up by (k,) metres."""
     return np.asarray(points + height[:, None] * np.array([0.0, 0.0, 1.0]))
-
-
-def _rotation(yaw: float, pitch: float, roll: float) -> Float:
-    """Return the matrix of the turns about z, then the new y, then the new x (ISO 8855)."""
-    (cy, cp, cr), (sy, sp, sr) = np.cos([yaw, pitch, roll]), np.sin([yaw, pitch, roll])
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )

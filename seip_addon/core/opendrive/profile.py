@@ -83,7 +83,7 @@ NONE = profile([])
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class LateralShape:
     """Height of the road surface across the road, at stations along it and blended linearly in between.
 
     Before the first and after the last station the shape stays as it is there;
@@ -114,10 +114,10 @@ class Shape:
         return heights
 
 
-def shape(records: list[tuple[float, float, tuple[float, float, float, float]]]) -> Shape:
+def lateral_shape(records: list[tuple[float, float, tuple[float, float, float, float]]]) -> LateralShape:
     """Return the shape of ``(s, t, (a, b, c, d))`` records in any order."""
     stations = sorted({s for s, _, _ in records})
-    return Shape(
+    return LateralShape(
         np.array(stations, dtype=np.float64),
         tuple(profile([(t, cubic) for s, t, cubic in records if s == station]) for station in stations),
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
-from .profile import NONE, Profile, Shape, profile, shape
+from .profile import NONE, LateralShape, Profile, lateral_shape, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
@@ -29,7 +29,6 @@ from .road_map import (
     Road,
     RoadMap,
     RoadObject,
-    RoadPlace,
     RoadSignal,
 )
 
@@ -112,7 +111,8 @@ def _road(node: Node) -> Road:
             _object(child.within(f"object {child.text('id', '')}")) for child in node.children("objects", "object")
         ),
         signals=tuple(
-            _signal(child.within(f"signal {child.text('id', '')}")) for child in node.children("signals", "signal")
+            _signal(child.within(f"signal {child.text('id', '')}"), node.text("id"))
+            for child in node.children("signals", "signal")
         ),
     )
 
@@ -182,9 +182,9 @@ def _crossfall(road: Node, side: str) -> Profile:
     return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
 
 
-def _shape(road: Node) -> Shape:
+def _shape(road: Node) -> LateralShape:
     nodes = road.children("lateralProfile", "shape")
-    return shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
+    return lateral_shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
 
 
 def _cubic(node: Node) -> tuple[float, float, float, float]:
@@ -309,30 +309,24 @@ def _repeat(node: Node, thing: RoadObject) -> Repeat:
     )
 
 
-def _signal(node: Node) -> RoadSignal:
+def _signal(node: Node, road_id: str) -> RoadSignal:
     turned = math.pi if node.text("orientation", "none") == "-" else 0.0
+    on_map = node.child("positionInertial")
+    elsewhere = None if on_map else node.child("positionRoad")
+    stands = elsewhere or node
     return RoadSignal(
+        road_id=elsewhere.text("roadId") if elsewhere else road_id,
         id=node.text("id", ""),
         name=node.text("name", ""),
         kind=node.text("type", ""),
         dynamic=node.flag("dynamic"),
-        s=node.number("s"),
-        t=node.number("t"),
-        z_offset=node.number("zOffset", 0.0),
-        heading=turned + node.number("hOffset", 0.0),
-        place=_signal_place(node, turned),
+        s=stands.number("s"),
+        t=stands.number("t"),
+        z_offset=stands.number("zOffset", 0.0),
+        heading=turned + stands.number("hOffset", 0.0),
+        place=_map_place(on_map) if on_map else None,
     )
 
 
-def _signal_place(signal: Node, turned: float) -> RoadPlace | MapPlace | None:
-    if node := signal.child("positionInertial"):
-        return MapPlace(node.number("x"), node.number("y"), node.number("z"), node.number("hdg", 0.0))
-    if node := signal.child("positionRoad"):
-        return RoadPlace(
-            node.text("roadId"),
-            node.number("s"),
-            node.number("t"),
-            node.number("zOffset", 0.0),
-            turned + node.number("hOffset", 0.0),
-        )
-    return None
+def _map_place(node: Node) -> MapPlace:
+    return MapPlace(node.number("x"), node.number("y"), node.number("z"), node.number("hdg", 0.0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Float
-from .profile import Profile, Shape
+from .profile import LateralShape, Profile
 from .reference_line import ReferenceLine
 
 MIDDLE_STEP = 10.0
@@ -124,17 +124,6 @@ class RoadObject:
 
 
 @dataclass(frozen=True)
-class RoadPlace:
-    """Another road on which a signal stands, and where (metres, radians)."""
-
-    road_id: str
-    s: float
-    t: float
-    z_offset: float
-    heading: float
-
-
-@dataclass(frozen=True)
 class MapPlace:
     """Where a signal stands in map coordinates (metres, radians)."""
 
@@ -146,11 +135,17 @@ class MapPlace:
 
 @dataclass(frozen=True)
 class RoadSignal:
-    """A signal as the file gives it, in road coordinates (metres, radians).
+    """A signal as the file gives it, in the coordinates of the road on which it stands (metres, radians).
 
-    ``place`` is where it really stands, if that is not where it applies.
+    Parameters
+    ----------
+    road_id : str
+        The road on which it stands, which need not be the one that it applies to.
+    place : MapPlace or None
+        Where it stands, if the file says that in map coordinates.
     """
 
+    road_id: str
     id: str
     name: str
     kind: str
@@ -159,7 +154,7 @@ class RoadSignal:
     t: float
     z_offset: float
     heading: float
-    place: RoadPlace | MapPlace | None
+    place: MapPlace | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +174,7 @@ class Road:
     superelevation, left_crossfall, right_crossfall : Profile
         Radians over metres along the road. A road with superelevation above
         zero falls to the right; crossfall above zero falls outwards.
-    shape : Shape
+    shape : LateralShape
         Height of the surface above the plane that these make.
     sections : tuple of LaneSection
         In order along the road.
@@ -194,7 +189,7 @@ class Road:
     superelevation: Profile
     left_crossfall: Profile
     right_crossfall: Profile
-    shape: Shape
+    shape: LateralShape
     lane_offset: Profile
     sections: tuple[LaneSection, ...]
     objects: tuple[RoadObject, ...]
@@ -205,11 +200,11 @@ class Road:
         """Length of the reference line in plan, metres."""
         return self.reference_line.end
 
-    def frame(self, s: Float) -> Frame:
+    def frame(self, s: Float) -> RoadFrame:
         """Return the axes of the road at ``s``, (k,) metres along it; beyond an end those of the end."""
         s = np.clip(s, 0.0, self.length)
         x, y, heading = self.reference_line(s)
-        return Frame(
+        return RoadFrame(
             origin=np.stack([x, y, self.elevation(s)], axis=-1),
             heading=heading,
             pitch=np.arctan(self.elevation.slope(s)),
@@ -223,7 +218,7 @@ class Road:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class RoadFrame:
     """The moving axes of a road at k places.
 
     Superelevation turns the road about its reference line, which itself climbs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from shapely import Point
@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from .road_map import MapPlace, Road, RoadMap, RoadPlace, RoadSignal
+from .road_map import Road, RoadMap, RoadSignal
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,28 +58,15 @@ def placed_signals(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tu
     return tuple(signal for signal in signals if area is None or Point(signal.position[:2]).intersects(area))
 
 
-def _placed(road: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSignal:
-    match signal.place:
-        case None:
-            return _on_road(road, signal)
-        case MapPlace(x, y, z, heading):
-            return replace(_on_road(road, signal), position=np.array([x, y, z]), yaw=heading)
-        case RoadPlace(road_id, s, t, z_offset, heading):
-            if road_id not in roads:
-                raise SeipError(
-                    f"road {road.id}: signal {signal.id} stands on road {road_id}, which is not there; correct the map"
-                )
-            return _on_road(roads[road_id], replace(signal, s=s, t=t, z_offset=z_offset, heading=heading))
-
-
-def _on_road(road: Road, signal: RoadSignal) -> PlacedSignal:
-    s, t = np.array([signal.s]), np.array([signal.t])
-    return PlacedSignal(
-        road_id=road.id,
-        id=signal.id,
-        name=signal.name,
-        kind=signal.kind,
-        dynamic=signal.dynamic,
-        position=road.place(s, t)[0] + np.array([0.0, 0.0, signal.z_offset]),
-        yaw=float(road.frame(s).heading[0]) + signal.heading,
-    )
+def _placed(owner: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSignal:
+    if signal.road_id not in roads:
+        raise SeipError(
+            f"road {owner.id}: signal {signal.id} stands on road {signal.road_id}, which is not there; correct the map"
+        )
+    if signal.place is not None:
+        position, yaw = np.array([signal.place.x, signal.place.y, signal.place.z]), signal.place.heading
+    else:
+        road, s = roads[signal.road_id], np.array([signal.s])
+        position = road.place(s, np.array([signal.t]))[0] + np.array([0.0, 0.0, signal.z_offset])
+        yaw = float(road.frame(s).heading[0]) + signal.heading
+    return PlacedSignal(signal.road_id, signal.id, signal.name, signal.kind, signal.dynamic, position, yaw)

@@ -17,8 +17,8 @@ from ..progress import Progress
 from ..storage.files import digest, save_json
 from ..storage.source_digest import source_digest
 from ..traffic import Trajectories
+from ..traffic.bodies import Body
 from .frame import Frame, Labels
-from .scanner import Shape
 from .sensor import MountedSensor
 from .simulation import ScanSettings, Simulation
 from .static_scene import StaticScene
@@ -39,7 +39,7 @@ class Run:
         Map coordinates of the local origin.
     trajectories : Trajectories
         In local axes.
-    bodies : sequence of Shape
+    bodies : sequence of Body
         Of each road user.
     times : (n,) float64, seconds
     settings : ScanSettings
@@ -52,7 +52,7 @@ class Run:
     origin: Float
     sensors: Sequence[MountedSensor]
     trajectories: Trajectories
-    bodies: Sequence[Shape]
+    bodies: Sequence[Body]
     times: Float
     settings: ScanSettings
     versions: Mapping[str, str]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,19 +27,7 @@ _LEVEL = 1e-12  # a ray of less slope than this is off by less than the margin a
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
 
-class Shape(Protocol):
-    """What a road user looks like, in its own axes: forward, left, up, from the middle of its underside."""
-
-    @property
-    def triangles(self) -> Float:
-        """Corners, (n, 3, 3) float64, metres."""
-
-    @property
-    def reflectivity(self) -> Float:
-        """Of each triangle, (n,) float64, 0 to 1."""
-
-
-class Surface:
+class ReflectiveSurface:
     """Triangles that rays are cast against, and how they reflect.
 
     Parameters
@@ -64,7 +51,7 @@ class Surface:
         return reflected
 
 
-class SolidShape(Surface):
+class BodySurface(ReflectiveSurface):
     """A road user's surface in its own axes, with its bounding box.
 
     Parameters
@@ -113,23 +100,23 @@ class SolidShape(Surface):
 
 
 @dataclass(frozen=True, eq=False)
-class Traffic:
+class MovingTraffic:
     """What moves during a revolution; k road users.
 
     Parameters
     ----------
-    shapes : sequence of SolidShape
+    shapes : sequence of BodySurface
         Of each, in the same order.
     hulls : (k, m, 3) float64, metres
         Points about each way, in site axes.
     """
 
     motions: Sequence[Motion]
-    shapes: Sequence[SolidShape]
+    shapes: Sequence[BodySurface]
     hulls: Float
 
     @classmethod
-    def of(cls, motions: Sequence[Motion], shapes: Sequence[SolidShape]) -> Traffic:
+    def of(cls, motions: Sequence[Motion], shapes: Sequence[BodySurface]) -> MovingTraffic:
         """Bound the ways of road users, given the shape of each."""
         hulls = [shape.hull(motion) for motion, shape in zip(motions, shapes, strict=True)]
         most = max(map(len, hulls), default=0)
@@ -178,7 +165,7 @@ class Scanner:
 
     Parameters
     ----------
-    ground : Surface
+    ground : ReflectiveSurface
         All that stands still, in site axes.
 
     Attributes
@@ -191,7 +178,7 @@ class Scanner:
         How many scanners may scan at once to advantage.
     """
 
-    def __init__(self, sensor: MountedSensor, ground: Surface) -> None:
+    def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface) -> None:
         self.sensor, self._model = sensor, sensor.model
         self._windows = BeamWindows(sensor.model)
         pattern = BeamPattern(sensor.model)
@@ -219,7 +206,7 @@ class Scanner:
         """Seconds after the beginning of the revolution at which each azimuth step is taken, (azimuth_count,)."""
         return np.arange(self._steps) / (self._steps * self._model.rotation_rate)
 
-    def scan(self, traffic: Traffic, users: int) -> Scan:
+    def scan(self, traffic: MovingTraffic, users: int) -> Scan:
         """Return what the rays end on with traffic that is one of so many road users."""
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
         reflected = np.empty(len(distance))
@@ -242,7 +229,7 @@ class Scanner:
         """Tell which distances the sensor can measure."""
         return (distance >= self._model.min_range) & (distance <= self._model.max_range)
 
-    def _hits(self, traffic: Traffic) -> Iterator[tuple[Motion, _Hits]]:
+    def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:
         """Return what the rays meet of each road user if nothing else is there; of one that stood still, as before."""
         stood, self._stood = self._stood, {}
         if not traffic.motions:
@@ -257,7 +244,7 @@ class Scanner:
                 self._stood[motion.user] = motion, hits
             yield motion, hits
 
-    def _meet(self, shape: SolidShape, motion: Motion, ray: Integer) -> _Hits:
+    def _meet(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:
         """Cast rays against one road user, in its axes."""
         directions = self.directions.take(ray, axis=0)
         if motion.stays:
@@ -271,7 +258,7 @@ class Scanner:
         start = origin[:, 0] if motion.stays else origin[:, met].T
         return self._cast(shape, start, directions[:, met].T, ray[met])
 
-    def _cast(self, surface: Surface, origin: Float, directions: Float, ray: Integer) -> _Hits:
+    def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer) -> _Hits:
         distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
         hit = np.flatnonzero(triangle >= 0)
         return _Hits(ray[hit], distance[hit], surface.reflected(directions[hit], triangle[hit]))

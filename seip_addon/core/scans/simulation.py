@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,11 @@ from ..lidar import measured_returns
 from ..progress import Progress
 from ..settings import setting
 from ..traffic import Snapshot, Trajectories
+from ..traffic.bodies import Body
 from ..visibility.ray_casting import Engine, make_ray_caster
 from .frame import Frame, Labels
 from .motion import moving, rotations, still
-from .scanner import Scan, Scanner, Shape, SolidShape, Surface, Traffic, by_user
+from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, by_user
 from .sensor import MountedSensor
 from .static_scene import StaticScene
 
@@ -51,7 +53,7 @@ class Simulation:
 
     Parameters
     ----------
-    shapes : sequence of SolidShape
+    shapes : sequence of BodySurface
         Of each road user.
     """
 
@@ -60,7 +62,7 @@ class Simulation:
         static: StaticScene,
         scanners: Sequence[Scanner],
         trajectories: Trajectories,
-        shapes: Sequence[SolidShape],
+        shapes: Sequence[BodySurface],
         settings: ScanSettings,
     ) -> None:
         self.scanners = scanners
@@ -98,14 +100,15 @@ class Simulation:
             _returns(scanner, scan, sensor, self._random(sensor, number), rolling=self._settings.rolling_shutter)
             for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
         ]
-        merged = {part.name: np.concatenate([getattr(one, part.name) for one in parts]) for part in fields(_Returns)}
-        return Frame(time=snapshot.time, labels=self._labels(snapshot, scans, parts), **merged)
+        merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        labels = self._labels(snapshot, scans, [part["instance"] for part in parts])
+        return Frame(time=snapshot.time, labels=labels, **merged)
 
     def scans(self, snapshot: Snapshot) -> list[Scan]:
         """Return what the rays of each sensor end on, without noise or losses."""
         rolling = self._settings.rolling_shutter
         motions = moving(self._trajectories, snapshot, self._revolution) if rolling else still(snapshot)
-        traffic = Traffic.of(motions, [self._shapes[motion.user] for motion in motions])
+        traffic = MovingTraffic.of(motions, [self._shapes[motion.user] for motion in motions])
         with ThreadPoolExecutor(min(len(self.scanners), self._threads)) as pool:
             return list(pool.map(lambda scanner: scanner.scan(traffic, len(self._trajectories)), self.scanners))
 
@@ -117,7 +120,7 @@ class Simulation:
         seed = np.random.SeedSequence(entropy, spawn_key=(sensor, frame))
         return np.random.Generator(np.random.SFC64(seed))
 
-    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], parts: Sequence[_Returns]) -> Labels:
+    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], instances: Sequence[NDArray[np.int32]]) -> Labels:
         most = len(self._trajectories)
         users = [self._trajectories.users[number] for number in snapshot.user]
         size = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
@@ -133,7 +136,7 @@ class Simulation:
             yaw=(snapshot.yaw + math.pi) % (2 * math.pi) - math.pi,
             pitch=snapshot.pitch,
             speed=snapshot.speed,
-            points=np.stack([by_user(part.instance, most)[snapshot.user] for part in parts], axis=1),
+            points=np.stack([by_user(instance, most)[snapshot.user] for instance in instances], axis=1),
             visibility=(met / np.maximum(could, 1))[snapshot.user],
             inside=self._static.inside(centre),
         )
@@ -143,7 +146,7 @@ def prepare(
     static: StaticScene,
     sensors: Sequence[MountedSensor],
     trajectories: Trajectories,
-    bodies: Sequence[Shape],
+    bodies: Sequence[Body],
     settings: ScanSettings,
 ) -> Generator[Progress, None, Simulation]:
     """Cast against what stands still, once for all frames.
@@ -152,7 +155,7 @@ def prepare(
     ----------
     trajectories : Trajectories
         In the scene's local axes.
-    bodies : sequence of Shape
+    bodies : sequence of Body
         Of each road user. Those who share an array of triangles share its tree.
 
     Yields
@@ -171,8 +174,8 @@ def prepare(
         raise SeipError(f"the seed must be a whole number from 0, not {settings.seed}")
     distinct = {id(body.triangles): body.triangles for body in bodies}
     trees = {key: make_ray_caster(triangles, settings.engine) for key, triangles in distinct.items()}
-    shapes = [SolidShape(trees[id(body.triangles)], body.reflectivity) for body in bodies]
-    ground = Surface(make_ray_caster(static.triangles, settings.engine), static.reflectivity)
+    shapes = [BodySurface(trees[id(body.triangles)], body.reflectivity) for body in bodies]
+    ground = ReflectiveSurface(make_ray_caster(static.triangles, settings.engine), static.reflectivity)
     scanners = []
     for number, sensor in enumerate(sensors):
         yield Progress(number, len(sensors), "what stands still")
@@ -222,21 +225,10 @@ _SLACK = 1e-6
 """Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Returns:
-    """The points of one sensor, as in `Frame`."""
-
-    points: NDArray[np.float32]
-    sensor: NDArray[np.int16]
-    delay: NDArray[np.float32]
-    intensity: NDArray[np.float32]
-    instance: NDArray[np.int32]
-
-
 def _returns(
     scanner: Scanner, scan: Scan, number: int, random: np.random.Generator | None, *, rolling: bool
-) -> _Returns:
-    """Return what a sensor measures of a scan, noisy and incomplete where a generator is given."""
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a `Frame` for one sensor's scan, noisy and incomplete where a generator is given."""
     sensor = scanner.sensor
     if random is None:
         ray = np.flatnonzero(scanner.in_range(scan.distance))
@@ -247,10 +239,10 @@ def _returns(
     points *= measured.astype(np.float32)[:, None]
     points += sensor.xyz.astype(np.float32)
     delay = scanner.delay[ray % sensor.model.azimuth_count] if rolling else np.zeros(len(ray))
-    return _Returns(
-        points=points,
-        sensor=np.full(len(ray), number, dtype=np.int16),
-        delay=delay.astype(np.float32),
-        intensity=scan.intensity[ray].astype(np.float32),
-        instance=scan.instance[ray],
-    )
+    return {
+        "points": points,
+        "sensor": np.full(len(ray), number, dtype=np.int16),
+        "delay": delay.astype(np.float32),
+        "intensity": scan.intensity[ray].astype(np.float32),
+        "instance": scan.instance[ray],
+    }

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..opendrive import LaneSurface
-from .road_surface import GROUPS, cut_along
+from .road_surface import by_road, cut_along, in_groups
 
 JOINT, LEAST_JOINT = 0.3, 0.5
 """Ends of roads within so many metres, along so many metres of their width, lead into each other."""
@@ -36,7 +36,7 @@ class _End:
 
 
 @dataclass(frozen=True, eq=False)
-class _Street:
+class _ApproachRoad:
     """A road by its driving lanes: the range of s, its two ends, and whether an approach goes along it."""
 
     start: float
@@ -63,30 +63,28 @@ def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: 
     tuple of LaneSurface
         Cut at the distance.
     """
-    driving = [lane for lane in surfaces if GROUPS.get(lane.lane_type) == "driving"]
-    by_road: dict[str, list[LaneSurface]] = {}
-    for lane in driving:
-        by_road.setdefault(lane.road_id, []).append(lane)
+    driving = in_groups(surfaces, ["driving"])
+    roads = by_road(driving)
     inside = {lane.road_id for lane in driving if lane.junction_id == junction_id}
     if not inside:
         return ()
-    streets = {road: _street(lanes) for road, lanes in by_road.items()}
+    streets = {road: _street(lanes) for road, lanes in roads.items()}
     away = _distances(streets, inside, distance)
     return tuple(
         piece
         for road, street in streets.items()
         if road in inside or street.leads_on
-        for lane in by_road[road]
+        for lane in roads[road]
         for piece in _pieces(lane, street, [away[road, 0], away[road, 1]], distance)
     )
 
 
-def _street(lanes: Sequence[LaneSurface]) -> _Street:
+def _street(lanes: Sequence[LaneSurface]) -> _ApproachRoad:
     start, stop = min(lane.s[0] for lane in lanes), max(lane.s[-1] for lane in lanes)
     first = _end([(lane, 0) for lane in lanes if lane.s[0] == start])
     last = _end([(lane, -1) for lane in lanes if lane.s[-1] == stop])
     turn = math.acos(float(np.clip(first.along @ last.along, -1.0, 1.0)))
-    return _Street(start, stop, (first, last), lanes[0].junction_id is None or turn < STRAIGHT_ON)
+    return _ApproachRoad(start, stop, (first, last), lanes[0].junction_id is None or turn < STRAIGHT_ON)
 
 
 def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
@@ -98,7 +96,7 @@ def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
     return _End(shapely.multilinestrings(across[:, :, :2]), float(across[:, :, 2].mean()), along)
 
 
-def _joints(streets: Mapping[str, _Street]) -> dict[Key, list[Key]]:
+def _joints(streets: Mapping[str, _ApproachRoad]) -> dict[Key, list[Key]]:
     """Return for each end those that it leads into."""
     keys = [(road, which) for road in streets for which in (0, 1)]
     ends = [streets[road].ends[which] for road, which in keys]
@@ -111,7 +109,7 @@ def _joints(streets: Mapping[str, _Street]) -> dict[Key, list[Key]]:
     return joints
 
 
-def _distances(streets: Mapping[str, _Street], inside: set[str], most: float) -> dict[Key, float]:
+def _distances(streets: Mapping[str, _ApproachRoad], inside: set[str], most: float) -> dict[Key, float]:
     """Return how far each end of a road is from a junction, metres along the roads; infinity beyond ``most``."""
     away = {(road, which): math.inf for road in streets for which in (0, 1)}
     joints = _joints(streets)
@@ -132,7 +130,7 @@ def _distances(streets: Mapping[str, _Street], inside: set[str], most: float) ->
     return away
 
 
-def _pieces(lane: LaneSurface, street: _Street, away: Sequence[float], distance: float) -> Iterator[LaneSurface]:
+def _pieces(lane: LaneSurface, street: _ApproachRoad, away: Sequence[float], distance: float) -> Iterator[LaneSurface]:
     """Yield what of a lane lies within the distance of the junction, from either end of its road."""
     from_start, from_stop = street.start + distance - away[0], street.stop - distance + away[1]
     ranges = [(-math.inf, math.inf)] if from_start >= from_stop else [(-math.inf, from_start), (from_stop, math.inf)]

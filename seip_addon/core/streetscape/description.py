@@ -6,11 +6,9 @@ coordinates in metres; headings are degrees in the file and radians here.
 
 from __future__ import annotations
 
-import difflib
 import math
-import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from shapely.validation import explain_validity
 from ..arrays import Float
 from ..errors import SeipError
 from ..site.scene_geometry import DEFAULT_WEIGHT
+from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
@@ -171,33 +170,18 @@ def read_site_description(path: Path) -> SiteDescription:
         value of the wrong kind, or a shape that is none.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        written = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no UTF-8 text"
         raise SeipError(f"cannot read the site description {path}: {reason}") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise SeipError(f"{path} is not valid TOML: {error}") from error
-    table = _Table(content, str(path))
-    map_name = table.text("map", None)
-    description = SiteDescription(
-        name=table.text("name", "") or "",
-        map=None if map_name is None else path.parent / map_name,
-        near=table.point("near"),
-        junction=table.text("junction", None),
-        radius=table.optional("radius", most=LARGEST_RADIUS),
-        approaches=table.optional("approaches", most=LARGEST_RADIUS),
-        region=table.region("region"),
-        level=table.texts("level"),
-        weighted_regions=tuple(_weighted_region(row) for row in table.rows("weighted_region")),
-        buildings=tuple(_building(row) for row in table.rows("building")),
-        trees=tuple(_trees(row) for row in table.rows("tree")),
-        walls=tuple(_wall(row) for row in table.rows("wall")),
-        street_lights=tuple(_poles(row, height=8.0, arm=1.5) for row in table.rows("street_light")),
-        signal_poles=tuple(_poles(row, height=6.0, arm=5.0) for row in table.rows("signal_pole")),
-        forbidden_areas=tuple(_area(row) for row in table.rows("forbidden_area")),
-        mandatory_areas=tuple(_area(row) for row in table.rows("mandatory_area")),
-    )
-    table.finish()
+    keys = _PLACE | {name: Key(_tables(name), ()) for name in _THINGS}
+    values = read_table(parse_toml(written, str(path)), str(path), keys)
+    for name, (make, own) in _THINGS.items():
+        numbered = enumerate(values.pop(name), start=1)
+        values[f"{name}s"] = tuple(_thing(table, f"{path}, {name} {number}", make, own) for number, table in numbered)
+    if values["map"] is not None:
+        values["map"] = path.parent / values["map"]
+    description = SiteDescription(**values)
     if description.near is not None and description.junction is not None:
         raise SeipError(f"{path}: give either near or junction, not both")
     if description.radius is not None and description.approaches is not None:
@@ -222,14 +206,8 @@ def describe_place(
         The map, or a site description that names it.
     site : Path, optional
         Site description to go with a map.
-    near : (x, y), metres, optional
-        Middle of the place, map coordinates.
-    junction : str, optional
-        Id or name of the junction in the middle of the place.
-    radius : float, metres, optional
-        Of the region of interest.
-    approaches : float, metres, optional
-        How far the region follows the approaches of the junction.
+    near, junction, radius, approaches
+        As in `SiteDescription`.
 
     Raises
     ------
@@ -264,204 +242,136 @@ def _described(source: Path, site: Path | None) -> SiteDescription:
     return replace(SiteDescription() if site is None else read_site_description(site), map=source)
 
 
-def _weighted_region(table: _Table) -> WeightedRegion:
-    polygon = table.polygon("polygon", needed=False)
-    junction = table.text("junction", None)
-    if (polygon is None) == (junction is None):
-        raise SeipError(f"{table.where}: give either polygon or junction")
-    name = table.text("name", f"Junction {junction}" if junction is not None else "Weighted region")
-    region = WeightedRegion(name or "", table.number("weight", DEFAULT_WEIGHT, above=0.0), polygon, junction)
-    table.finish()
-    return region
+def _thing(table: dict[str, Any], where: str, make: Callable[..., Any], keys: Mapping[str, Key]) -> Any:  # noqa: ANN401
+    values = read_table(table, where, keys)
+    try:
+        return make(**values)
+    except ValueError as error:
+        raise SeipError(f"{where}: {error}") from error
 
 
-def _building(table: _Table) -> Building:
-    outline = table.polygon("outline")
-    assert outline is not None  # noqa: S101  # for the type checker: a needed polygon is there
-    building = Building(
-        outline, table.number("height", None, above=0.0, most=HIGHEST), table.number("base", 0.0, most=HIGHEST)
-    )
-    table.finish()
-    return building
-
-
-def _trees(table: _Table) -> Trees:
-    height = table.number("height", 8.0, above=0.0, most=HIGHEST)
-    trees = Trees(table.positions(), height, table.number("crown_diameter", 0.6 * height, above=0.0))
-    table.finish()
-    return trees
-
-
-def _wall(table: _Table) -> Wall:
-    line = table.line("line")
-    wall = Wall(line, table.number("height", 2.0, above=0.0, most=HIGHEST), table.number("thickness", 0.25, above=0.0))
-    table.finish()
-    return wall
-
-
-def _poles(table: _Table, *, height: float, arm: float) -> Poles:
-    degrees = table.number("heading", math.nan)
-    poles = Poles(
-        table.positions(),
-        table.number("height", height, above=0.0, most=HIGHEST),
-        table.number("arm", arm, least=0.0),
-        None if math.isnan(degrees) else math.radians(degrees),
-    )
-    table.finish()
-    return poles
-
-
-def _area(table: _Table) -> Area:
-    polygon = table.polygon("polygon")
-    assert polygon is not None  # noqa: S101  # for the type checker: a needed polygon is there
-    area = Area(table.text("name", "Area") or "Area", polygon)
-    table.finish()
-    return area
-
-
-@dataclass
-class _Table:
-    """One TOML table: values are taken by key, and what is left at the end is a mistake."""
-
-    content: dict[str, Any]
-    where: str
-    known: list[str] = field(default_factory=list)
-
-    def _take(self, key: str) -> Any:  # noqa: ANN401  # TOML holds values of any kind
-        self.known.append(key)
-        return self.content.get(key)
-
-    def _wrong(self, key: str, wish: str) -> SeipError:
-        return SeipError(f"{self.where}: {key} must be {wish}")
-
-    def text(self, key: str, default: str | None) -> str | None:
-        value = self._take(key)
-        if value is None:
-            return default
-        if not isinstance(value, str) or not value:
-            raise self._wrong(key, "a text in quotes")
+def _tables(key: str) -> Reader:
+    def read(value: Any) -> list[dict[str, Any]]:  # noqa: ANN401  # TOML holds values of any kind
+        if not isinstance(value, list) or not all(isinstance(row, dict) for row in value):
+            raise ValueError(f"must be tables, each of which begins with [[{key}]]")
         return value
 
-    def optional(self, key: str, *, most: float) -> float | None:
-        value = self.number(key, math.nan, above=0.0, most=most)
-        return None if math.isnan(value) else value
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        value = self._take(key)
-        values = value if isinstance(value, list) else [] if value is None else [value]
-        if not all(isinstance(one, str) and one for one in values):
-            raise self._wrong(key, "a text in quotes, or a list of them")
-        return tuple(values)
-
-    def number(
-        self,
-        key: str,
-        default: float | None,
-        *,
-        above: float = -math.inf,
-        least: float = -math.inf,
-        most: float = LARGEST,
-    ) -> float:
-        value = self._take(key)
-        if value is None:
-            if default is None:
-                close = difflib.get_close_matches(key, set(self.content) - set(self.known), n=1, cutoff=0.6)
-                raise SeipError(f"{self.where}: {key} is missing{f' (is {close[0]!r} a slip?)' if close else ''}")
-            return default
-        if not _is_number(value):
-            raise self._wrong(key, "a number below 1e9")
-        if abs(value) > most:
-            raise self._wrong(key, f"at most {most:g}, not {value:g}")
-        if not (value > above and value >= least):
-            raise self._wrong(
-                key, f"{'above' if above > -math.inf else 'at least'} {max(above, least):g}, not {value:g}"
-            )
-        return float(value)
-
-    def point(self, key: str) -> tuple[float, float] | None:
-        value = self._take(key)
-        if value is None:
-            return None
-        if not _is_point(value):
-            raise self._wrong(key, "a point [x, y]")
-        return float(value[0]), float(value[1])
-
-    def line(self, key: str) -> Float:
-        value = self._take(key)
-        if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):
-            raise self._wrong(key, "a list of at least two points [[x, y], [x, y]]")
-        return np.array(value, dtype=np.float64)
-
-    def polygon(self, key: str, *, needed: bool = True) -> Polygon | None:
-        value = self._take(key)
-        if value is None and not needed:
-            return None
-        return self._ring(key, value)
-
-    def region(self, key: str) -> MultiPolygon | None:
-        value = self._take(key)
-        if value is None:
-            return None
-        several = isinstance(value, list) and bool(value) and not _is_point(value[0])
-        rings = value if several else [value]
-        region = MultiPolygon([self._ring(key, ring) for ring in rings])
-        low_x, low_y, high_x, high_y = region.bounds
-        if max(high_x - low_x, high_y - low_y) > 2 * LARGEST_RADIUS:
-            raise self._wrong(key, f"at most {2 * LARGEST_RADIUS:g} m across")
-        return region
-
-    def positions(self) -> Float:
-        """Return (n, 2) positions: one, or a row from one point to another at a spacing."""
-        position, start, stop = self.point("position"), self.point("from"), self.point("to")
-        spacing = self.number("spacing", math.nan, above=0.0)
-        is_row = start is not None and stop is not None and not math.isnan(spacing)
-        if position is not None and start is None and stop is None and math.isnan(spacing):
-            return np.array([position])
-        if position is not None or not is_row:
-            raise SeipError(f"{self.where}: give either position = [x, y] or a row with from, to and spacing")
-        ends = np.array([start, stop])
-        length = float(np.hypot(*(ends[1] - ends[0])))
-        if length / spacing > LONGEST_ROW:
-            raise SeipError(
-                f"{self.where}: this row has {length / spacing:.3g} places; make it {LONGEST_ROW:,} at most"
-            )
-        gaps = int(length / spacing + 1e-9)
-        along = np.arange(gaps + 1) * (spacing / length if length > 0 else 0.0)
-        row: Float = ends[0] + along[:, None] * (ends[1] - ends[0])
-        return row
-
-    def rows(self, key: str) -> Iterator[_Table]:
-        value = self._take(key)
-        if value is None:
-            return
-        if not isinstance(value, list) or not all(isinstance(row, dict) for row in value):
-            raise SeipError(f"{self.where}: write each {key} as a table that begins with [[{key}]]")
-        for number, row in enumerate(value, start=1):
-            yield _Table(row, f"{self.where}, {key} {number}")
-
-    def finish(self) -> None:
-        """Raise an error for the first key that nobody asked for."""
-        for key in self.content:
-            if key not in self.known:
-                close = difflib.get_close_matches(key, self.known, n=3, cutoff=0.5) or sorted(self.known)
-                raise SeipError(f"{self.where}: unknown key {key!r}; did you mean {' or '.join(close)}?")
-
-    def _ring(self, key: str, value: Any) -> Polygon:  # noqa: ANN401  # as _take
-        if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):
-            raise self._wrong(key, "a list of at least three points [[x, y], [x, y], [x, y]]")
-        polygon = Polygon(value)
-        if not polygon.is_valid or polygon.area == 0.0:
-            reason = explain_validity(polygon) if not polygon.is_valid else "no area"
-            raise self._wrong(key, f"the outline of an area that does not cross itself ({reason})")
-        if polygon.length > LARGEST:
-            raise self._wrong(key, f"an outline of at most {LARGEST:g} m, not {polygon.length:.3g} m")
-        return polygon
+    return read
 
 
-def _is_number(value: object) -> bool:
-    # Whole numbers of any length are valid TOML; no coordinate on Earth reaches this.
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e9
+def _texts(value: object) -> tuple[str, ...]:
+    values = value if isinstance(value, list) else [value]
+    if not all(isinstance(one, str) and one for one in values):
+        raise ValueError("must be a text in quotes, or a list of them")
+    return tuple(values)
 
 
 def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
+
+
+def _point(value: Any) -> tuple[float, float]:  # noqa: ANN401  # TOML holds values of any kind
+    if not _is_point(value):
+        raise ValueError("must be a point [x, y]")
+    return float(value[0]), float(value[1])
+
+
+def _line(value: object) -> Float:
+    if not isinstance(value, list) or len(value) < 2 or not all(map(_is_point, value)):
+        raise ValueError("must be a list of at least two points [[x, y], [x, y]]")
+    return np.array(value, dtype=np.float64)
+
+
+def _outline(value: object) -> Polygon:
+    if not isinstance(value, list) or len(value) < 3 or not all(map(_is_point, value)):
+        raise ValueError("must be a list of at least three points [[x, y], [x, y], [x, y]]")
+    polygon = Polygon(value)
+    if not polygon.is_valid or polygon.area == 0.0:
+        reason = explain_validity(polygon) if not polygon.is_valid else "no area"
+        raise ValueError(f"must be the outline of an area that does not cross itself ({reason})")
+    if polygon.length > LARGEST:
+        raise ValueError(f"must be an outline of at most {LARGEST:g} m, not {polygon.length:.3g} m")
+    return polygon
+
+
+def _region(value: object) -> MultiPolygon:
+    rings = value if isinstance(value, list) and value and not _is_point(value[0]) else [value]
+    region = MultiPolygon([_outline(ring) for ring in rings])
+    low_x, low_y, high_x, high_y = region.bounds
+    if max(high_x - low_x, high_y - low_y) > 2 * LARGEST_RADIUS:
+        raise ValueError(f"must be at most {2 * LARGEST_RADIUS:g} m across")
+    return region
+
+
+def _weighted_region(name: str | None, weight: float, polygon: Polygon | None, junction: str | None) -> WeightedRegion:
+    if (polygon is None) == (junction is None):
+        raise ValueError("give either polygon or junction")
+    usual = f"Junction {junction}" if junction is not None else "Weighted region"
+    return WeightedRegion(name or usual, weight, polygon, junction)
+
+
+def _trees(height: float, crown_diameter: float | None, **row: Any) -> Trees:  # noqa: ANN401  # `_ROW`
+    crown_diameter = 0.6 * height if crown_diameter is None else crown_diameter
+    return Trees(_positions(row), height, crown_diameter)
+
+
+def _poles(height: float, arm: float, heading: float | None, **row: Any) -> Poles:  # noqa: ANN401  # `_ROW`
+    return Poles(_positions(row), height, arm, None if heading is None else math.radians(heading))
+
+
+def _positions(row: Mapping[str, Any]) -> Float:
+    """Return (n, 2) positions: one, or a row from one point to another at a spacing."""
+    given = {key for key, value in row.items() if value is not None}
+    if given == {"position"}:
+        return np.array([row["position"]])
+    if given != {"from", "to", "spacing"}:
+        raise ValueError("give either position = [x, y] or a row with from, to and spacing")
+    ends, spacing = np.array([row["from"], row["to"]]), row["spacing"]
+    length = float(np.hypot(*(ends[1] - ends[0])))
+    if length / spacing > LONGEST_ROW:
+        raise ValueError(f"this row has {length / spacing:.3g} places; make it {LONGEST_ROW:,} at most")
+    gaps = int(length / spacing + 1e-9)  # a row ends on its last whole step in spite of rounding
+    along = np.arange(gaps + 1) * (spacing / length if length > 0 else 0.0)
+    positions: Float = ends[0] + along[:, None] * (ends[1] - ends[0])
+    return positions
+
+
+_SIZE = number(above=0.0, most=LARGEST)
+_HEIGHT = number(above=0.0, most=HIGHEST)
+_EXTENT = Key(number(above=0.0, most=LARGEST_RADIUS), None)
+_ROW = {"position": Key(_point, None), "from": Key(_point, None), "to": Key(_point, None), "spacing": Key(_SIZE, None)}
+_POLE = _ROW | {"heading": Key(number(most=LARGEST), None)}
+_ARM = number(least=0.0, most=LARGEST)
+_AREA = {"name": Key(text, "Area"), "polygon": Key(_outline)}
+
+_PLACE = {
+    "name": Key(text, ""),
+    "map": Key(text, None),
+    "near": Key(_point, None),
+    "junction": Key(text, None),
+    "radius": _EXTENT,
+    "approaches": _EXTENT,
+    "region": Key(_region, None),
+    "level": Key(_texts, ()),
+}
+"""Keys of the file itself."""
+
+_THINGS: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
+    "weighted_region": (
+        _weighted_region,
+        {
+            "name": Key(text, None),
+            "weight": Key(_SIZE, DEFAULT_WEIGHT),
+            "polygon": Key(_outline, None),
+            "junction": Key(text, None),
+        },
+    ),
+    "building": (Building, {"outline": Key(_outline), "height": Key(_HEIGHT), "base": Key(number(most=HIGHEST), 0.0)}),
+    "tree": (_trees, _ROW | {"height": Key(_HEIGHT, 8.0), "crown_diameter": Key(_SIZE, None)}),
+    "wall": (Wall, {"line": Key(_line), "height": Key(_HEIGHT, 2.0), "thickness": Key(_SIZE, 0.25)}),
+    "street_light": (_poles, _POLE | {"height": Key(_HEIGHT, 8.0), "arm": Key(_ARM, 1.5)}),
+    "signal_pole": (_poles, _POLE | {"height": Key(_HEIGHT, 6.0), "arm": Key(_ARM, 5.0)}),
+    "forbidden_area": (Area, _AREA),
+    "mandatory_area": (Area, _AREA),
+}
+"""What is made of each kind of table in the file, and the keys of such a table; ``buildings`` holds all of them."""

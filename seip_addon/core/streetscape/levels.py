@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..opendrive import LaneSurface
-from .road_surface import GROUPS, SEAM
+from .road_surface import SEAM, by_road, group, is_near
 from .terrain import Terrain
 
 JOINED = 1.0
@@ -91,7 +91,7 @@ def split_levels(
         road of ``level`` is not here.
     """
     shapely.prepare(around)
-    near = [lane for lane in surfaces if lane.lane_type in GROUPS and _is_near(lane, around)]
+    near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]
     roads = _roads(near, around)
     _check_level(level, roads)
     crossings = _crossings(roads) if roads else ()
@@ -119,7 +119,7 @@ def split_levels(
 
 
 @dataclass(frozen=True, eq=False)
-class _Plan:
+class _RoadArea:
     """A road within the place: its outline in plan and its heights, (low, high) and everywhere."""
 
     outline: BaseGeometry
@@ -132,32 +132,24 @@ class _Plan:
         return sum(self.heights) / 2
 
 
-def _is_near(lane: LaneSurface, around: BaseGeometry) -> bool:
-    points = np.concatenate([lane.left, lane.right])[:, :2]
-    return bool(around.intersects(shapely.box(*points.min(axis=0), *points.max(axis=0))))
-
-
-def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _Plan]:
-    by_road: dict[str, list[LaneSurface]] = {}
-    for lane in lanes:
-        by_road.setdefault(lane.road_id, []).append(lane)
+def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _RoadArea]:
     roads = {}
-    for road, own in by_road.items():
+    for road, own in by_road(lanes).items():
         outline = shapely.union_all([shapely.make_valid(lane.polygon) for lane in own]).intersection(around)
         if outline.area > 0:
             triangles = np.concatenate([lane.triangles for lane in own])
             heights = (float(triangles[:, :, 2].min()), float(triangles[:, :, 2].max()))
-            roads[road] = _Plan(outline, heights, Terrain(triangles))
+            roads[road] = _RoadArea(outline, heights, Terrain(triangles))
     return roads
 
 
-def _check_level(level: Sequence[str], roads: Mapping[str, _Plan]) -> None:
+def _check_level(level: Sequence[str], roads: Mapping[str, _RoadArea]) -> None:
     for road in level:
         if road not in roads:
             raise SeipError(f"no road {road!r} at this place: the level is named by the id of a road that lies on it")
 
 
-def _pairs(roads: Mapping[str, _Plan], distance: float) -> list[tuple[str, str]]:
+def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, str]]:
     """Return the pairs of roads that come so near to each other in plan, metres."""
     names = list(roads)
     outlines = [roads[name].outline for name in names]
@@ -165,7 +157,7 @@ def _pairs(roads: Mapping[str, _Plan], distance: float) -> list[tuple[str, str]]
     return [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True) if a < b]
 
 
-def _crossings(roads: Mapping[str, _Plan]) -> tuple[Crossing, ...]:
+def _crossings(roads: Mapping[str, _RoadArea]) -> tuple[Crossing, ...]:
     """Return where roads lie above each other, the greatest overlap of each two."""
     found = []
     for one, other in _pairs(roads, 0.0):
@@ -184,7 +176,7 @@ def _crossings(roads: Mapping[str, _Plan]) -> tuple[Crossing, ...]:
     return tuple(found)
 
 
-def _joined(roads: Mapping[str, _Plan]) -> dict[str, set[str]]:
+def _joined(roads: Mapping[str, _RoadArea]) -> dict[str, set[str]]:
     """Return for each road those that meet it in plan and in height."""
     joined: dict[str, set[str]] = {road: set() for road in roads}
     for one, other in _pairs(roads, SEAM):
@@ -217,14 +209,16 @@ def _hops(joined: Mapping[str, set[str]], start: Iterable[str]) -> dict[str, flo
     return hops
 
 
-def _lies_with_others(plan: _Plan, roads: Mapping[str, _Plan], crossings: Iterable[Crossing], others: set[str]) -> bool:
+def _lies_with_others(
+    plan: _RoadArea, roads: Mapping[str, _RoadArea], crossings: Iterable[Crossing], others: set[str]
+) -> bool:
     """Return whether a road lies nearer in height to the other road of the nearest crossing than to the studied one."""
     crossing = min(crossings, key=lambda one: float(plan.outline.distance(shapely.Point(one.place))))
     away = {road: abs(roads[road].middle - plan.middle) for road in (crossing.above, crossing.below)}
     return min(away, key=lambda road: away[road]) in others
 
 
-def _next_to(road: str, roads: Mapping[str, _Plan], reached: Iterable[str]) -> str:
+def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) -> str:
     """Return the nearest road at about the height of one that is joined to none here; empty where there is none."""
     own = roads[road]
     for other in sorted(reached, key=lambda name: (float(own.outline.distance(roads[name].outline)), name)):

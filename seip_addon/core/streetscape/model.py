@@ -16,21 +16,17 @@ from ..opendrive import (
     LaneSurface,
     PlacedObject,
     RoadMap,
-    find_junction,
-    junction_area,
     lane_surfaces,
-    nearest_junctions,
     placed_objects,
     placed_signals,
 )
 from ..progress import Progress
 from ..site.obstruction import BARE, can_hide
-from ..site.scene_geometry import ASSUMED, DEFAULT_WEIGHT, DESCRIBED
+from ..site.scene_geometry import ASSUMED, DESCRIBED
 from . import road_surface, street_furniture
-from .approaches import approach_lanes
-from .degrees import in_metres, looks_like_degrees
-from .description import DEFAULT_RADIUS, Poles, SiteDescription, WeightedRegion
-from .levels import APART, Levels, split_levels
+from .degrees import in_metres
+from .description import Poles, SiteDescription
+from .levels import APART, Levels
 from .map_furniture import (
     CROWN_SHARE,
     arm_heading,
@@ -42,6 +38,7 @@ from .map_furniture import (
     tree_part,
 )
 from .parts import Part, Role
+from .place import MARGIN, Place, shifted
 from .road_surface import Roadside
 from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
@@ -49,15 +46,11 @@ from .terrain import Terrain
 STAGES = 6
 """Pieces of work that a model is made in once the map's lanes are known."""
 ROADS_PER_STEP = 20
-MARGIN = 40.0
-"""How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
 CANDIDATE_MARGIN = 15.0
 """How far outside the region of interest (metres) a new post may stand."""
 VERGE_STRIP = (0.8, 2.3)
 """Where new posts may stand beside a road without pavements: metres from the carriageway."""
 VERGE_BELOW = 0.03
-NEAR_CROSSING = 10.0
-"""Roads this near to the middle of the place (metres) may each be the one that is meant."""
 GARDEN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
 FARTHEST_GARDEN = 300.0
@@ -65,7 +58,7 @@ FARTHEST_GARDEN = 300.0
 VERGE_SPACING = 12.0
 VEIL_SPACING = 4.0
 """As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
-VEILS = {
+AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
     Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
     Role.FORBIDDEN_AREAS: (0.05, "forbidden veil"),
@@ -117,7 +110,7 @@ class SiteModel:
 
 
 @dataclass(frozen=True, eq=False)
-class _Street:
+class _Surroundings:
     """What everything else of a site stands on and leans against, in local axes."""
 
     origin: Float
@@ -157,16 +150,15 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     description, place_notes = in_metres(description, road_map, surfaces)
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
-    centre = _centre(road_map, surfaces, description)
-    within = _within(road_map, surfaces, description, centre)
-    levels = _levels(road_map, surfaces, description, centre, within)
-    surfaces = levels.studied
-    region = _region(road_map, surfaces, description, centre, within)
-    origin = _origin(surfaces, centre)
+    place = Place(road_map, surfaces, description)
+    levels = place.levels()
+    place = replace(place, surfaces=levels.studied)
+    region = place.region()
+    origin = _origin(place)
     yield next(stages)
-    street = _street(surfaces, origin, _shifted(region, -origin))
+    street = _surroundings(place.surfaces, origin, shifted(region, -origin))
     yield next(stages)
-    around = _shifted(street.extent, origin)
+    around = shifted(street.extent, origin)
     placed = local_objects(placed_objects(road_map, area=around), origin)
     away = levels.other_roads()
     hung = [
@@ -184,7 +176,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     yield next(stages)
     carriageway = _surface_parts(street)
     yield next(stages)
-    weighted = _weighted_areas(road_map, surfaces, description, centre)
+    weighted = place.weighted_areas()
     parts = [
         *carriageway,
         *pavement,
@@ -235,104 +227,6 @@ def _all_lanes(road_map: RoadMap) -> Generator[Progress, None, tuple[LaneSurface
     return tuple(surfaces)
 
 
-def _centre(road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription) -> Float:
-    """Return the middle (x, y) of the place in map coordinates."""
-    if description.near is not None:
-        return np.array(description.near, dtype=np.float64)
-    if description.junction is not None:
-        junction = find_junction(road_map, surfaces, description.junction)
-        centre = _junction_driving_area(surfaces, junction.id).centroid
-    elif description.region is not None:
-        centre = description.region.centroid
-    else:
-        raise SeipError(
-            "no place is named: give --near X Y or --junction ID, or near, junction or region in the site file"
-        )
-    return np.array([centre.x, centre.y])
-
-
-def _within(
-    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
-) -> BaseGeometry:
-    """Return the area in map coordinates in which the region of interest lies."""
-    if description.region is not None:
-        return description.region
-    if description.along is None:
-        return shapely.Point(centre).buffer(description.radius or DEFAULT_RADIUS, quad_segs=32)
-    lanes = _approach_lanes(road_map, surfaces, description)
-    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
-
-
-def _approach_lanes(
-    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription
-) -> tuple[LaneSurface, ...]:
-    assert description.junction is not None  # noqa: S101  # for the type checker: approaches are a junction's
-    junction = find_junction(road_map, surfaces, description.junction)
-    return approach_lanes(surfaces, junction.id, description.along or 0.0)
-
-
-def _region(
-    road_map: RoadMap,
-    surfaces: Sequence[LaneSurface],
-    description: SiteDescription,
-    centre: Float,
-    within: BaseGeometry,
-) -> BaseGeometry:
-    """Return the region of interest in map coordinates."""
-    shapely.prepare(within)
-    lanes = surfaces if description.along is None else _approach_lanes(road_map, surfaces, description)
-    driving = road_surface.in_groups((lane for lane in lanes if lane.lane_type in road_surface.GROUPS), ["driving"])
-    shift = np.array([*centre, 0.0])  # outlines need small coordinates for their grids
-    near = road_surface.local_strips(driving, shift, _shifted(within, -shift)) if driving else ()
-    if near:
-        region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(_shifted(within, -shift)))
-        if not region.is_empty:
-            return _shifted(region, shift)
-    where = f"within {description.radius or DEFAULT_RADIUS:g} m of ({centre[0]:g}, {centre[1]:g})"
-    if description.along is not None:
-        where = f"in junction {description.junction!r}"
-    elif description.region is not None:
-        where = "within the region"
-    x, y = centre.tolist()
-    given = description.near is not None and not (x.is_integer() and y.is_integer())
-    degrees = given and looks_like_degrees((x, y))
-    hint = " (give metres of the map, not latitude and longitude)" if degrees else ""
-    raise SeipError(f"there is no driving lane {where}{hint}{_nearest(road_map, surfaces, centre)}")
-
-
-def _nearest(road_map: RoadMap, surfaces: Sequence[LaneSurface], centre: Float) -> str:
-    """Return the junctions next to a place, as the end of a sentence."""
-    names = []
-    x, y = centre.tolist()
-    for junction, _ in nearest_junctions(road_map, surfaces, x, y, 3):
-        middle = junction_area(surfaces, junction.id).centroid
-        names.append(f"{junction.id} at ({middle.x:.0f}, {middle.y:.0f})")
-    if names:
-        return f"; the nearest junctions are {', '.join(names)}"
-    x_low, y_low, x_high, y_high = shapely.total_bounds([lane.polygon for lane in surfaces])
-    return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
-
-
-def _levels(
-    road_map: RoadMap,
-    surfaces: Sequence[LaneSurface],
-    description: SiteDescription,
-    centre: Float,
-    within: BaseGeometry,
-) -> Levels:
-    """Return the lanes on the level of the place, and those that cross above or below."""
-    around = within.convex_hull.buffer(MARGIN, quad_segs=16)
-    if description.near is None and description.junction is not None:
-        junction = find_junction(road_map, surfaces, description.junction).id
-        anchors = {lane.road_id for lane in surfaces if lane.junction_id == junction}
-    else:
-        driving = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
-        away = shapely.distance([lane.polygon for lane in driving], shapely.Point(centre))
-        least = max(away.min(initial=np.inf), NEAR_CROSSING)
-        anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
-    return split_levels(surfaces, around, anchors, description.level)
-
-
 def _level_notes(levels: Levels) -> Iterator[str]:
     roads = levels.other_roads()
     for crossing in levels.crossings:
@@ -340,7 +234,7 @@ def _level_notes(levels: Levels) -> Iterator[str]:
         yield f"{crossing}: road {away} is on another level, in the way but not studied"
 
 
-def _other_level_parts(others: Sequence[LaneSurface], street: _Street) -> tuple[list[Part], BaseGeometry]:
+def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
     """Return the roads of other levels, above and below, and the area in plan of those below."""
     lanes = road_surface.local_strips(others, street.origin, street.extent)
     if not lanes:
@@ -355,7 +249,7 @@ def _other_level_parts(others: Sequence[LaneSurface], street: _Street) -> tuple[
     return parts, outline(triangles[~above], road_surface.GRID)
 
 
-def _on_level(part: Part, street: _Street) -> Part:
+def _on_level(part: Part, street: _Surroundings) -> Part:
     """Return a part of the map; a pole that stands on another level carries no sensor."""
     x, y, z = part.foot
     if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > APART:
@@ -363,23 +257,23 @@ def _on_level(part: Part, street: _Street) -> Part:
     return part
 
 
-def _origin(surfaces: Sequence[LaneSurface], centre: Float) -> Float:
+def _origin(place: Place) -> Float:
     """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
-    points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in surfaces])
-    nearest = points[np.argmin(np.hypot(*(points[:, :2] - centre).T))]
-    return np.round([*centre, nearest[2]])
+    points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
+    nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
+    return np.round([*place.centre, nearest[2]])
 
 
-def _street(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Street:
+def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
     extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
-    return _Street(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
+    return _Surroundings(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
 
 
-def _surface_parts(street: _Street) -> list[Part]:
+def _surface_parts(street: _Surroundings) -> list[Part]:
     groups = {road_surface.group(lane) for lane in street.lanes}
     return [
         Part(
@@ -392,7 +286,7 @@ def _surface_parts(street: _Street) -> list[Part]:
     ]
 
 
-def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
+def _pavement_parts(street: _Surroundings, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
     own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
     if len(own) == 0:
@@ -424,7 +318,7 @@ def _pavement_parts(street: _Street, below: BaseGeometry) -> tuple[list[Part], t
     return parts, tuple(notes)
 
 
-def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> Part:
+def _verge_strip(street: _Surroundings, sides: BaseGeometry, below: BaseGeometry) -> Part:
     """Return the verge along sides of the carriageway.
 
     There is none where the map ends and the road goes on, nor beside a bridge.
@@ -436,7 +330,7 @@ def _verge_strip(street: _Street, sides: BaseGeometry, below: BaseGeometry) -> P
     return _area_part("Verge strip", near, Role.CANDIDATE_AREAS, street)
 
 
-def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry) -> Part:
+def _verge_part(street: _Surroundings, furniture: Sequence[Part], below: BaseGeometry) -> Part:
     """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
@@ -449,7 +343,7 @@ def _verge_part(street: _Street, furniture: Sequence[Part], below: BaseGeometry)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
-def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
+def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
     quads = road_surface.markings(street.lanes)
     if stop_lines:
         quads = np.concatenate([quads, road_surface.stop_lines(street.lanes)])
@@ -457,32 +351,15 @@ def _marking_part(street: _Street, *, stop_lines: bool) -> Part:
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
 
 
-def _region_part(street: _Street) -> Part:
+def _region_part(street: _Surroundings) -> Part:
     return _area_part("Region of interest", street.region, Role.REGION, street)
 
 
-def _weighted_areas(
-    road_map: RoadMap, surfaces: Sequence[LaneSurface], description: SiteDescription, centre: Float
-) -> list[tuple[str, BaseGeometry, float]]:
-    """Return name, area and weight of the weighted regions, map coordinates.
-
-    Where none is described it is the box of the junction nearest to the middle.
-    """
-    if description.weighted_regions:
-        return [
-            (weighted.name, _weighted_area(road_map, surfaces, weighted), weighted.weight)
-            for weighted in description.weighted_regions
-        ]
-    x, y = centre.tolist()
-    nearest = nearest_junctions(road_map, surfaces, x, y, 1)
-    return [(f"Junction {found.id}", _central_box(surfaces, found.id), DEFAULT_WEIGHT) for found, _ in nearest]
-
-
 def _weighted_parts(
-    areas: Sequence[tuple[str, BaseGeometry, float]], street: _Street, *, described: bool
+    areas: Sequence[tuple[str, BaseGeometry, float]], street: _Surroundings, *, described: bool
 ) -> Iterator[Part]:
     for name, area, weight in areas:
-        local = _shifted(area, -street.origin)
+        local = shifted(area, -street.origin)
         if local.intersects(street.region):
             yield _area_part(name, local, Role.WEIGHTED_REGIONS, street, weight=weight)
         elif described:
@@ -491,36 +368,19 @@ def _weighted_parts(
             )
 
 
-def _weighted_area(road_map: RoadMap, surfaces: Sequence[LaneSurface], weighted: WeightedRegion) -> BaseGeometry:
-    if weighted.junction is None:
-        return weighted.polygon
-    return _central_box(surfaces, find_junction(road_map, surfaces, weighted.junction).id)
-
-
-def _central_box(surfaces: Sequence[LaneSurface], junction_id: str) -> BaseGeometry:
-    """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
-    return shapely.minimum_rotated_rectangle(_junction_driving_area(surfaces, junction_id))
-
-
-def _junction_driving_area(surfaces: Sequence[LaneSurface], junction_id: str) -> BaseGeometry:
-    inside = [lane for lane in surfaces if road_surface.GROUPS.get(lane.lane_type) == "driving"]
-    area = junction_area(inside, junction_id)
-    return junction_area(surfaces, junction_id) if area.is_empty else area
-
-
-def _area_parts(description: SiteDescription, street: _Street) -> list[Part]:
+def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
     kinds = (
         (description.forbidden_areas, Role.FORBIDDEN_AREAS),
         (description.mandatory_areas, Role.MANDATORY_AREAS),
     )
     return [
-        _area_part(area.name, _shifted(area.polygon, -street.origin), role, street)
+        _area_part(area.name, shifted(area.polygon, -street.origin), role, street)
         for areas, role in kinds
         for area in areas
     ]
 
 
-def _described_parts(description: SiteDescription, street: _Street) -> list[Part]:
+def _described_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
     """Return what the site description adds, standing on the ground."""
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
@@ -541,7 +401,7 @@ def _described_parts(description: SiteDescription, street: _Street) -> list[Part
     return parts
 
 
-def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]:
+def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
         yield pole_part(f"Street light {number}", shape, foot, heading, DESCRIBED)
@@ -551,28 +411,26 @@ def _pole_parts(description: SiteDescription, street: _Street) -> Iterator[Part]
         yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading, DESCRIBED)
 
 
-def _pole_places(rows: Sequence[Poles], street: _Street) -> Iterator[tuple[Float, float, Poles]]:
+def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple[Float, float, Poles]]:
     """Yield foot, heading of the arm and row of each post."""
     for row in rows:
         for foot in _on_ground(row.positions, street):
             yield foot, arm_heading(foot[:2], street.carriageway) if row.heading is None else row.heading, row
 
 
-def _on_ground(plan: Float, street: _Street) -> Float:
+def _on_ground(plan: Float, street: _Surroundings) -> Float:
     local = plan - street.origin[:2]
     return np.column_stack([local, street.terrain.height(local)])
 
 
-def _area_part(name: str, area: BaseGeometry, role: Role, street: _Street, *, weight: float | None = None) -> Part:
+def _area_part(
+    name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None
+) -> Part:
     """Return an area in plan as a veil over the ground."""
-    above, material = VEILS[role]
+    above, material = AREA_OVERLAYS[role]
     triangles = street.terrain.drape(area, spacing=VEIL_SPACING, above=above)
     return Part(name, _solid(triangles, material), (role,), weight=weight)
 
 
 def _solid(faces: Float, material: str) -> street_furniture.Solid:
     return street_furniture.from_faces(faces, material)
-
-
-def _shifted(area: BaseGeometry, by: Float) -> BaseGeometry:
-    return shapely.transform(area, lambda xy: xy + by[:2])

@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from ..arrays import Float
+from ..arrays import Float, Integer
 from ..geometry.plan import closed, outline, without
 from ..opendrive import LaneSurface
 from .terrain import Terrain, cut
@@ -155,7 +155,7 @@ def local_strips(surfaces: Iterable[LaneSurface], origin: Float, area: BaseGeome
     """
     shapely.prepare(area)
     moved = (_moved(surface, origin) for surface in surfaces if surface.lane_type in GROUPS)
-    near = _with_kerbs([surface for surface in moved if _near(surface, area)])
+    near = _with_kerbs([surface for surface in moved if is_near(surface, area)])
     trimmed = (_trimmed(_densified(surface), area) for surface in near)
     return tuple(surface for surface in trimmed if len(surface.left) > 1)
 
@@ -172,14 +172,28 @@ def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | No
     return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
 
 
-def group(surface: LaneSurface) -> str:
-    """Return the group of a lane's type."""
-    return GROUPS[surface.lane_type]
+def group(surface: LaneSurface) -> str | None:
+    """Return the group of a lane's type, None for one without a surface."""
+    return GROUPS.get(surface.lane_type)
 
 
 def in_groups(surfaces: Iterable[LaneSurface], groups: Sequence[str]) -> tuple[LaneSurface, ...]:
     """Return the lanes of some groups."""
     return tuple(surface for surface in surfaces if group(surface) in groups)
+
+
+def by_road(surfaces: Iterable[LaneSurface]) -> dict[str, list[LaneSurface]]:
+    """Return the lanes of each road, by its id."""
+    roads: dict[str, list[LaneSurface]] = {}
+    for surface in surfaces:
+        roads.setdefault(surface.road_id, []).append(surface)
+    return roads
+
+
+def is_near(surface: LaneSurface, area: BaseGeometry) -> bool:
+    """Return whether the bounding box of a lane meets an area in plan."""
+    points = np.concatenate([surface.left, surface.right])[:, :2]
+    return bool(area.intersects(shapely.box(*points.min(axis=0), *points.max(axis=0))))
 
 
 def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
@@ -189,13 +203,8 @@ def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
 
 def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
     """Return the area without parts and holes smaller than ``least`` square metres."""
-    parts = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and part.area >= least]
-    return shapely.union_all(
-        [
-            shapely.Polygon(part.exterior, [hole for hole in part.interiors if shapely.Polygon(hole).area >= least])
-            for part in parts
-        ]
-    )
+    parts = [part for part in shapely.get_parts(area) if part.area >= least]
+    return _without_holes(shapely.geometrycollections(parts), least=least)
 
 
 def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
@@ -334,11 +343,6 @@ def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
     return dataclasses.replace(surface, left=surface.left - origin, right=surface.right - origin)
 
 
-def _near(surface: LaneSurface, area: BaseGeometry) -> bool:
-    points = np.concatenate([surface.left, surface.right])[:, :2]
-    return bool(area.intersects(shapely.box(*points.min(axis=0), *points.max(axis=0))))
-
-
 def _densified(surface: LaneSurface) -> LaneSurface:
     steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
     pieces = np.maximum(1, np.ceil(steps / LONGEST_STEP).astype(int))
@@ -348,8 +352,12 @@ def _densified(surface: LaneSurface) -> LaneSurface:
 
 
 def _at_rows(points: Float, rows: Float) -> Float:
-    known = np.arange(len(points))
-    return np.column_stack([np.interp(rows, known, points[:, axis]) for axis in range(3)])
+    return _interpolated(rows, np.arange(len(points)), points)
+
+
+def _interpolated(at: Float, known: Float | Integer, points: Float) -> Float:
+    """Return points (k, 3) between points (n, 3) that lie at ascending places (n,), at others (k,)."""
+    return np.column_stack([np.interp(at, known, points[:, axis]) for axis in range(3)])
 
 
 def _trimmed(surface: LaneSurface, area: BaseGeometry) -> LaneSurface:
@@ -389,7 +397,7 @@ def _dashes(path: Float) -> list[Float]:
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     begins = np.arange(0.0, travelled[-1] - DASH, DASH + GAP)
     ends = np.stack([begins, begins + DASH], axis=1).reshape(-1)
-    return list(np.column_stack([np.interp(ends, travelled, path[:, axis]) for axis in range(3)]).reshape(-1, 2, 3))
+    return list(_interpolated(ends, travelled, path).reshape(-1, 2, 3))
 
 
 def _ribbon(path: Float) -> Float:
@@ -407,11 +415,12 @@ def _ribbon(path: Float) -> Float:
 def _bar(left: Float, right: Float) -> Float:
     """Return the stop line (1, 4, 3) before the end of a lane between two edges (n, 3)."""
     near, far = STOP_LINE_SETBACK, STOP_LINE_SETBACK + STOP_LINE_WIDTH
-    corners = [_before_end(right, far), _before_end(right, near), _before_end(left, near), _before_end(left, far)]
-    bar: Float = np.array([corners]) + np.array([0.0, 0.0, MARKING_ABOVE])
+    corners = np.concatenate([_before_end(right, [far, near]), _before_end(left, [near, far])])
+    bar: Float = corners[None] + np.array([0.0, 0.0, MARKING_ABOVE])
     return bar
 
 
-def _before_end(path: Float, distance: float) -> Float:
+def _before_end(path: Float, distances: Sequence[float]) -> Float:
+    """Return points (k, 3) some metres before the end of a path (n, 3)."""
     left_over = np.cumsum(np.linalg.norm(np.diff(path[::-1], axis=0), axis=1))
-    return np.array([np.interp(distance, [0.0, *left_over], path[::-1, axis]) for axis in range(3)])
+    return _interpolated(np.array(distances), np.array([0.0, *left_over]), path[::-1])

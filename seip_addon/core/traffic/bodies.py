@@ -1,19 +1,20 @@
-"""What road users look like to a LiDAR, and to people: closed bodies of few triangles."""
+"""Bodies of road users: closed meshes of few triangles, stretched to a road user's size."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..arrays import Float, Text
 from ..errors import SeipError
-from .body_parts import Part
-from .people_shapes import bicycle, motorcycle, pedestrian
 from .trajectories import CATEGORIES, RoadUser
-from .vehicle_shapes import bus, car, truck, van
+
+MESHES = Path(__file__).parent / "body_meshes"
+"""Wavefront OBJ files, ``CATEGORY.obj`` or ``CATEGORY.MODEL.obj``; the README there says what they may hold."""
 
 REFLECTIVITY: Mapping[str, float] = {
     "glass": 0.05,  # nearly all goes through or is mirrored away
@@ -43,18 +44,6 @@ COLOURS = (
 
 PAINTED = ("paint", "cloth")
 """Materials that have the road user's reflectivity; in a body a colour follows: ``paint red``."""
-
-_TWO_WHEELERS_AND_PEOPLE: Mapping[str, Callable[[], list[Part]]] = {
-    "motorcycle": motorcycle,
-    "bicycle": bicycle,
-    "pedestrian": pedestrian,
-}
-_VEHICLES: Mapping[str, Callable[[float, float, float], list[Part]]] = {
-    "car": car,
-    "van": van,
-    "truck": truck,
-    "bus": bus,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +106,7 @@ def colour_of(paint: float) -> str:
 
 @functools.cache
 def _painted(category: str, length: float, width: float, height: float, paint: float) -> Body:
-    triangles, material = _shape(category, length, width, height)
+    triangles, material = _stretched(category, length, width, height)
     painted = np.isin(material, PAINTED)
     reflectivity = np.array([paint if own else REFLECTIVITY[name] for name, own in zip(material, painted, strict=True)])
     named = np.where(painted, np.char.add(material, f" {colour_of(paint)}"), material)
@@ -127,22 +116,67 @@ def _painted(category: str, length: float, width: float, height: float, paint: f
 
 
 @functools.cache
-def _shape(category: str, length: float, width: float, height: float) -> tuple[Float, Text]:
-    """Return the triangles of a category and size, and their materials before any paint."""
-    if category in _VEHICLES:
-        parts = _VEHICLES[category](length, width, height)
-    else:
-        parts = _TWO_WHEELERS_AND_PEOPLE[category]()
-    triangles = _fitted(np.concatenate([part.triangles for part in parts]), np.array([length, width, height]))
-    material = np.repeat([part.material for part in parts], [len(part.triangles) for part in parts])
-    for array in (triangles, material):
-        array.flags.writeable = False
-    return triangles, material
+def _stretched(category: str, length: float, width: float, height: float) -> tuple[Float, Text]:
+    """Return the mesh of the model nearest in size, stretched to a size over the middle of its underside.
 
-
-def _fitted(triangles: Float, size: Float) -> Float:
-    """Return triangles (n, 3, 3) stretched to a size, over the middle of their underside."""
+    The nearest is that whose length, width and height have to be stretched least, by the sum of squared logarithms.
+    """
+    size = np.array([length, width, height])
+    triangles, material = min(
+        _models(category), key=lambda model: float((np.log(size / np.ptp(model[0], axis=(0, 1))) ** 2).sum())
+    )
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     share = (triangles - low) / (high - low)
-    fitted: Float = (share - [0.5, 0.5, 0.0]) * size
-    return fitted
+    stretched: Float = (share - [0.5, 0.5, 0.0]) * size
+    stretched.flags.writeable = False
+    return stretched, material
+
+
+@functools.cache
+def _models(category: str) -> list[tuple[Float, Text]]:
+    """Return the triangles (n, 3, 3) and materials (n,) of every model of a category."""
+    paths = sorted(path for path in MESHES.glob("*.obj") if path.name.split(".")[0] == category)
+    if not paths:
+        raise SeipError(f"{MESHES} holds no mesh of a {category}; install the add-on again")
+    return [read_mesh(path) for path in paths]
+
+
+def read_mesh(path: Path) -> tuple[Float, Text]:
+    """Read the mesh of a body from a Wavefront OBJ file.
+
+    Returns
+    -------
+    triangles : (n, 3, 3) float64, metres
+    material : (n,) str
+
+    Raises
+    ------
+    SeipError
+        It is no mesh of triangles with a length, width and height, or names an unknown material.
+    """
+    vertices: list[list[float]] = []
+    faces: list[list[int]] = []
+    material: list[str] = []
+    name = ""
+    try:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            match line.split():
+                case ["v", x, y, z, *_]:
+                    vertices.append([float(x), float(y), float(z)])
+                case ["usemtl", name]:
+                    name = name.replace("_", " ")
+                case ["f", *corners]:
+                    faces.append([int(corner.split("/")[0]) - 1 for corner in corners])
+                    material.append(name)
+        if not all(len(set(face)) == 3 and min(face) >= 0 for face in faces):
+            raise SeipError(f"{path.name}: not all faces are triangles; export it triangulated")
+        triangles = np.array(vertices)[np.array(faces)]
+    except (OSError, ValueError, IndexError) as error:
+        raise SeipError(f"{path.name} is no Wavefront OBJ mesh ({error}); export it again") from error
+    if not (np.isfinite(triangles).all() and np.ptp(triangles, axis=(0, 1)).min() > 0.0):
+        raise SeipError(f"{path.name} has no length, width and height; correct its vertices")
+    unknown = set(material) - REFLECTIVITY.keys() - set(PAINTED)
+    if unknown:
+        known = ", ".join(sorted({*REFLECTIVITY, *PAINTED}))
+        raise SeipError(f"{path.name}: unknown material {min(unknown)!r}; known are {known}")
+    return triangles, np.array(material)

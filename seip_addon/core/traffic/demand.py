@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import SeipError
 from ..storage.files import whole_file
-from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, Edge, Lane, StreetNetwork
+from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 
 _LONGEST_ROUTE = 40  # edges; in a network without ends a vehicle leaves after so many
 _LONGEST_WALK = 150.0  # metres in plan from one pavement to another
@@ -25,7 +25,7 @@ _FIRST_BAY = 35.0  # metres from where the street begins
 _FOR_EVER = 1e6  # seconds
 
 
-class Model(NamedTuple):
+class RoadUserModel(NamedTuple):
     """A model of road user: its vClass, guiShape, size in metres, share within its category, and top speed in m/s."""
 
     v_class: str
@@ -39,39 +39,39 @@ class Model(NamedTuple):
 
 MODELS = {
     "car": {
-        "city_car": Model("passenger", "passenger/hatchback", 3.57, 1.63, 1.49, 0.12),
-        "supermini": Model("passenger", "passenger/hatchback", 4.06, 1.75, 1.45, 0.22),
-        "compact": Model("passenger", "passenger/hatchback", 4.28, 1.79, 1.48, 0.22),
-        "estate": Model("passenger", "passenger/wagon", 4.69, 1.83, 1.52, 0.12),
-        "saloon": Model("passenger", "passenger/sedan", 4.87, 1.86, 1.45, 0.12),
-        "crossover": Model("passenger", "passenger", 4.48, 1.84, 1.64, 0.14),
-        "large_suv": Model("passenger", "passenger", 4.93, 1.98, 1.77, 0.06),
+        "city_car": RoadUserModel("passenger", "passenger/hatchback", 3.57, 1.63, 1.49, 0.12),
+        "supermini": RoadUserModel("passenger", "passenger/hatchback", 4.06, 1.75, 1.45, 0.22),
+        "compact": RoadUserModel("passenger", "passenger/hatchback", 4.28, 1.79, 1.48, 0.22),
+        "estate": RoadUserModel("passenger", "passenger/wagon", 4.69, 1.83, 1.52, 0.12),
+        "saloon": RoadUserModel("passenger", "passenger/sedan", 4.87, 1.86, 1.45, 0.12),
+        "crossover": RoadUserModel("passenger", "passenger", 4.48, 1.84, 1.64, 0.14),
+        "large_suv": RoadUserModel("passenger", "passenger", 4.93, 1.98, 1.77, 0.06),
     },
     "van": {
-        "small_van": Model("delivery", "delivery", 4.50, 1.86, 1.84, 0.35),
-        "delivery_van": Model("delivery", "delivery", 5.93, 2.02, 2.62, 0.45),
-        "long_van": Model("delivery", "delivery", 6.94, 2.04, 2.79, 0.20),
+        "small_van": RoadUserModel("delivery", "delivery", 4.50, 1.86, 1.84, 0.35),
+        "delivery_van": RoadUserModel("delivery", "delivery", 5.93, 2.02, 2.62, 0.45),
+        "long_van": RoadUserModel("delivery", "delivery", 6.94, 2.04, 2.79, 0.20),
     },
     "truck": {
-        "box_truck": Model("truck", "truck", 7.60, 2.45, 3.35, 0.6, 22.0),
-        "large_truck": Model("truck", "truck", 9.60, 2.55, 3.75, 0.4, 22.0),
+        "box_truck": RoadUserModel("truck", "truck", 7.60, 2.45, 3.35, 0.6, 22.0),
+        "large_truck": RoadUserModel("truck", "truck", 9.60, 2.55, 3.75, 0.4, 22.0),
     },
     "bus": {
-        "midibus": Model("bus", "bus", 9.50, 2.45, 3.00, 0.3, 18.0),
-        "city_bus": Model("bus", "bus", 12.00, 2.55, 3.10, 0.7, 18.0),
+        "midibus": RoadUserModel("bus", "bus", 9.50, 2.45, 3.00, 0.3, 18.0),
+        "city_bus": RoadUserModel("bus", "bus", 12.00, 2.55, 3.10, 0.7, 18.0),
     },
     "motorcycle": {
-        "scooter": Model("motorcycle", "moped", 1.92, 0.74, 1.68, 0.5, 16.0),
-        "motorcycle": Model("motorcycle", "motorcycle", 2.17, 0.83, 1.62, 0.5),
+        "scooter": RoadUserModel("motorcycle", "moped", 1.92, 0.74, 1.68, 0.5, 16.0),
+        "motorcycle": RoadUserModel("motorcycle", "motorcycle", 2.17, 0.83, 1.62, 0.5),
     },
     "bicycle": {
-        "city_bicycle": Model("bicycle", "bicycle", 1.82, 0.62, 1.78, 0.7, 5.5),
-        "cargo_bicycle": Model("bicycle", "bicycle", 2.50, 0.70, 1.75, 0.3, 4.8),
+        "city_bicycle": RoadUserModel("bicycle", "bicycle", 1.82, 0.62, 1.78, 0.7, 5.5),
+        "cargo_bicycle": RoadUserModel("bicycle", "bicycle", 2.50, 0.70, 1.75, 0.3, 4.8),
     },
     "pedestrian": {
-        "adult": Model("pedestrian", "pedestrian", 0.45, 0.55, 1.70, 0.6, 1.4),
-        "tall_adult": Model("pedestrian", "pedestrian", 0.48, 0.60, 1.84, 0.25, 1.5),
-        "child": Model("pedestrian", "pedestrian", 0.35, 0.42, 1.28, 0.15, 1.2),
+        "adult": RoadUserModel("pedestrian", "pedestrian", 0.45, 0.55, 1.70, 0.6, 1.4),
+        "tall_adult": RoadUserModel("pedestrian", "pedestrian", 0.48, 0.60, 1.84, 0.25, 1.5),
+        "child": RoadUserModel("pedestrian", "pedestrian", 0.35, 0.42, 1.28, 0.15, 1.2),
     },
 }
 """Sizes of what drives and walks in European cities, riders included; after makers' data sheets, rounded."""
@@ -139,7 +139,7 @@ def write_routes(
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-class _Entry(NamedTuple):
+class _Departure(NamedTuple):
     """An element of the route file and when it departs, seconds."""
 
     depart: float
@@ -155,7 +155,7 @@ def _type_lines() -> Iterator[str]:
                 yield _type_line(f"parked_{name}", PARKED_CLASS, model, ' minGap="0.5"')
 
 
-def _type_line(name: str, v_class: str, model: Model, more: str) -> str:
+def _type_line(name: str, v_class: str, model: RoadUserModel, more: str) -> str:
     length, width, height = model.length, model.width, model.height
     return (
         f'<vType id="{name}" vClass="{v_class}" guiShape="{model.shape}" length="{length}" width="{width}" '
@@ -163,7 +163,7 @@ def _type_line(name: str, v_class: str, model: Model, more: str) -> str:
     )
 
 
-def _pick(models: dict[str, Model], random: np.random.Generator) -> str:
+def _pick(models: dict[str, RoadUserModel], random: np.random.Generator) -> str:
     shares = np.array([model.share for model in models.values()])
     return str(random.choice(list(models), p=shares / shares.sum()))
 
@@ -178,13 +178,15 @@ def _departures(rate: float, random: np.random.Generator, duration: float) -> It
         yield round(time, 1)
 
 
-def _vehicle(number: str, depart: float, route: list[Edge], free: set[str], random: np.random.Generator) -> _Entry:
+def _vehicle(
+    number: str, depart: float, route: list[NetworkEdge], free: set[str], random: np.random.Generator
+) -> _Departure:
     categories, shares = list(MIX), np.array(list(MIX.values()))
     category = str(random.choice(categories, p=shares / shares.sum()))
     delivers = category in {"van", "truck"} and random.random() < _DELIVERING
     stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
     edges = " ".join(edge.id for edge in route)
-    return _Entry(
+    return _Departure(
         depart,
         f'<vehicle id="{category}-{number}" type="{_pick(MODELS[category], random)}" depart="{depart}" '
         f'departLane="best" departSpeed="max"><route edges="{edges}"/>{stop}</vehicle>',
@@ -192,8 +194,8 @@ def _vehicle(number: str, depart: float, route: list[Edge], free: set[str], rand
 
 
 def _route(
-    network: StreetNetwork, arm: Edge, turns: tuple[float, float, float], random: np.random.Generator
-) -> list[Edge]:
+    network: StreetNetwork, arm: NetworkEdge, turns: tuple[float, float, float], random: np.random.Generator
+) -> list[NetworkEdge]:
     """Return a way through the network that turns at random, by the shares of what each junction offers."""
     share = dict(zip("lsr", turns, strict=True))
     route = [arm]
@@ -206,7 +208,7 @@ def _route(
     return route
 
 
-def _delivery(streets: list[Edge], random: np.random.Generator) -> str:
+def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
     """Return a stop in the outer lane of one of the streets that have another lane to pass by; empty without any."""
     streets = [edge for edge in streets if len(edge.of(DRIVING)) > 1 and edge.lanes[0].length > 2.0 * _FIRST_BAY]
     if not streets:
@@ -217,7 +219,7 @@ def _delivery(streets: list[Edge], random: np.random.Generator) -> str:
     return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP):.0f}"/>'
 
 
-def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[Edge, Lane, float]]:
+def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[NetworkEdge, NetworkLane, float]]:
     """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
 
     A row stands in the outer of several lanes of every second street on which vehicles leave the network.
@@ -232,7 +234,7 @@ def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[Edg
     return bays or list(_rows(network, random))
 
 
-def _parked(bays: list[tuple[Edge, Lane, float]], random: np.random.Generator) -> Iterator[_Entry]:
+def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.random.Generator) -> Iterator[_Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
     for number, (edge, lane, place) in enumerate(bays):
         text = (
@@ -240,10 +242,10 @@ def _parked(bays: list[tuple[Edge, Lane, float]], random: np.random.Generator) -
             f'departPos="{place:.1f}" departSpeed="0"><route edges="{edge.id}"/>'
             f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_FOR_EVER:.0f}"/></vehicle>'
         )
-        yield _Entry(0.0, text)
+        yield _Departure(0.0, text)
 
 
-def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple[Edge, Lane, float]]:
+def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
     for index in sorted(random.permutation(len(exits))[: (len(exits) + 1) // 2].tolist()):
         lane = exits[index].of(DRIVING)[0]
@@ -253,7 +255,7 @@ def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple
                 yield exits[index], lane, float(place)
 
 
-def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, duration: float) -> Iterator[_Entry]:
+def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, duration: float) -> Iterator[_Departure]:
     pavements = [
         (edge, lane) for edge in network.edges.values() for lane in edge.of(WALKING) if lane.length > _SHORTEST_PAVEMENT
     ]
@@ -270,7 +272,7 @@ def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, d
         goal = int(random.choice(np.flatnonzero(within)))
         (origin, first), (target, last) = pavements[start], pavements[goal]
         begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
-        yield _Entry(
+        yield _Departure(
             depart,
             f'<person id="pedestrian-{number}" type="{_pick(MODELS["pedestrian"], random)}" depart="{depart}" '
             f'departPos="{begin:.1f}"><walk from="{origin.id}" to="{target.id}" arrivalPos="{end:.1f}"/></person>',

@@ -68,7 +68,7 @@ class FloatingCarData:
     elsewhere: int = 0
 
 
-class Window(NamedTuple):
+class TimeAndPlace(NamedTuple):
     """What of a file to keep: seconds of the simulation, and a rectangle in map coordinates in metres."""
 
     begin: float = -math.inf
@@ -77,7 +77,7 @@ class Window(NamedTuple):
 
 
 def read_floating_car_data(
-    path: str | os.PathLike[str], net_offset: Float | None = None, window: Window | None = None
+    path: str | os.PathLike[str], net_offset: Float | None = None, window: TimeAndPlace | None = None
 ) -> Generator[Progress, None, FloatingCarData]:
     """Read floating car data, as XML or as csv (in either of SUMO's namings), packed with gzip or not.
 
@@ -87,7 +87,7 @@ def read_floating_car_data(
         ``.xml`` or ``.csv``, perhaps with ``.gz``.
     net_offset : (2,) float64, metres, optional
         Of the network: map = network − offset.
-    window : Window, optional
+    window : TimeAndPlace, optional
         What lies outside is not kept in memory.
 
     Returns
@@ -99,7 +99,7 @@ def read_floating_car_data(
     SeipError
         The file cannot be read, is something else or unfinished, its times run backwards, or a number makes no sense.
     """
-    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Window())
+    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or TimeAndPlace())
     suffixes = [suffix.lower() for suffix in Path(path).suffixes if suffix.lower() != ".gz"]
     if suffixes[-1:] == [".csv"]:
         yield from _read_csv(path, rows)
@@ -164,7 +164,7 @@ def read_trajectories(
     return trajectories, _missing_sizes(unknown, len(users))
 
 
-def some(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
     more = len(names) - _NAMED
     return ", ".join(short(name) for name in names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
@@ -196,7 +196,7 @@ def unwrapped(yaw: Float, first: Integer) -> Float:
 class _Rows:
     """Rows of a file as they come, in columns that stay small."""
 
-    def __init__(self, file: str, net_offset: Float, window: Window) -> None:
+    def __init__(self, file: str, net_offset: Float, window: TimeAndPlace) -> None:
         self._file = file
         self._window = window
         self._shift_x, self._shift_y = net_offset.tolist()
@@ -348,7 +348,7 @@ def _missing_sizes(unknown: list[str], count: int) -> tuple[str, ...]:
     if not unknown:
         return ()
     sentence = (
-        f"missing sizes: {len(unknown)} of {count} road users are of no known vehicle type ({some(unknown)}) and get "
+        f"missing sizes: {len(unknown)} of {count} road users are of no known vehicle type ({listed(unknown)}) and get "
         f"SUMO's default, for vehicles {CAR.length:g} × {CAR.width:g} × {CAR.height:g} m; name their route file"
     )
     return (sentence,)

@@ -12,7 +12,7 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..geometry.plan import LEAST_AREA, heights_over, plane_height, signed_area
 from ..site.scene_geometry import SceneGeometry, joined
-from .floating_car_data import some, unwrapped
+from .floating_car_data import listed, unwrapped
 from .smooth_walks import put_elsewhere
 from .trajectories import RoadUser, Trajectories
 
@@ -63,8 +63,8 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
         Nobody comes near the region of interest, or most who do are off the road there: it is another map's traffic.
     """
     local = trajectories.moved_to(geometry.origin)
-    roads = _Surface(joined(geometry.roads))
-    both = _Surface(joined((*geometry.roads, *geometry.ground)))
+    roads = _RoadSurface(joined(geometry.roads))
+    both = _RoadSurface(joined((*geometry.roads, *geometry.ground)))
     user = np.repeat(np.arange(len(local)), np.diff(local.first))
     walks = np.array([each.category == "pedestrian" for each in local.users], dtype=np.bool_)[user]
 
@@ -83,10 +83,10 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
     length = np.array([each.length for each in local.users])[user]
     pitch = np.where(walks, 0.0, _pitch(height, plan, z, local.yaw, length))
     fitted = replace(local, position=np.column_stack([plan, z]), pitch=pitch)
-    return RoadFit(_rounded(_only(fitted, user, on_road)), warnings)
+    return RoadFit(_rounded(_without_gaps(fitted, user, on_road)), warnings)
 
 
-class _Surface:
+class _RoadSurface:
     """Triangles (n, 3, 3) that road users can stand on."""
 
     def __init__(self, triangles: Float) -> None:
@@ -96,7 +96,7 @@ class _Surface:
     def height(self, plan: Float, hint: Float) -> Float:
         """Return the height (n,) of the surface at points (n, 2), nearest to a hint (n,); NaN off the road."""
         point, heights = heights_over(plan, self._triangles)
-        height = _one_each(len(plan), point, heights, hint)
+        height = _nearest_heights(len(plan), point, heights, hint)
         beside = np.flatnonzero(np.isnan(height))
         places = shapely.points(plan[beside])
         number, triangle = self._tree.query_nearest(places, max_distance=TOLERANCE)
@@ -104,11 +104,11 @@ class _Surface:
             shapely.get_point(shapely.shortest_line(self._tree.geometries[triangle], places[number]), 0)
         )
         heights = plane_height(self._triangles[triangle], nearest)
-        height[beside] = _one_each(len(beside), number, heights, hint[beside])
+        height[beside] = _nearest_heights(len(beside), number, heights, hint[beside])
         return height
 
 
-def _one_each(count: int, point: Integer, heights: Float, hint: Float) -> Float:
+def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) -> Float:
     """Of the heights found at points return for each the one nearest to its hint, or the highest where that is NaN."""
     wanted = np.where(np.isnan(hint[point]), np.inf, hint[point])
     badness = np.where(np.isinf(wanted), -heights, np.abs(heights - wanted))
@@ -146,19 +146,19 @@ def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Bo
     if mostly > visitors / 2.0:
         raise SeipError(
             f"FCD of another map: {mostly} of {visitors} road users in the region of interest are off the road, "
-            f"by more than {TOLERANCE:g} m ({some(astray)}); simulate on the scene's own map, and name its .net.xml "
+            f"by more than {TOLERANCE:g} m ({listed(astray)}); simulate on the scene's own map, and name its .net.xml "
             "where that has a netOffset"
         )
     if not astray:
         return ()
     sentence = (
         f"{len(astray)} of {visitors} road users leave the road by more than {TOLERANCE:g} m and are left out there: "
-        f"{some(astray)}"
+        f"{listed(astray)}"
     )
     return (sentence,)
 
 
-def _only(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajectories:
+def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajectories:
     """Keep some samples; what a gap separates becomes two road users, and a single sample none."""
     kept = np.flatnonzero(keep)
     user, time = user[kept], trajectories.time[kept]
@@ -177,7 +177,7 @@ def _only(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajector
     visit = np.arange(len(owner)) - np.searchsorted(owner, owner)
     return replace(
         trajectories,
-        users=tuple(_again(trajectories.users[a], b) for a, b in zip(owner.tolist(), visit.tolist(), strict=True)),
+        users=tuple(_visit(trajectories.users[a], b) for a, b in zip(owner.tolist(), visit.tolist(), strict=True)),
         first=first.astype(np.int64),
         time=trajectories.time[chosen],
         position=trajectories.position[chosen],
@@ -193,7 +193,7 @@ def _longest_gap(trajectories: Trajectories) -> float:
     return LONGEST_GAP * float(np.median(steps)) if len(steps) else 0.0
 
 
-def _again(user: RoadUser, visit: int) -> RoadUser:
+def _visit(user: RoadUser, visit: int) -> RoadUser:
     return user if visit == 0 else replace(user, name=f"{user.name}/{visit + 1}")
 
 

@@ -19,7 +19,7 @@ PARKED_CLASS = "custom1"
 
 
 @dataclass(frozen=True, eq=False)
-class Lane:
+class NetworkLane:
     """A lane: its number from the right, what it is for, its length in metres, and its middle line (k, 2)."""
 
     index: int
@@ -29,14 +29,14 @@ class Lane:
 
 
 @dataclass(frozen=True, eq=False)
-class Edge:
+class NetworkEdge:
     """A one-way street from one node to the next, with its lanes from the right."""
 
     id: str
     end: str
-    lanes: tuple[Lane, ...]
+    lanes: tuple[NetworkLane, ...]
 
-    def of(self, use: str) -> tuple[Lane, ...]:
+    def of(self, use: str) -> tuple[NetworkLane, ...]:
         """Return the lanes for a use, from the right."""
         return tuple(lane for lane in self.lanes if lane.use == use)
 
@@ -47,7 +47,7 @@ class StreetNetwork:
 
     Parameters
     ----------
-    edges : dict of str to Edge
+    edges : dict of str to NetworkEdge
         In the order of the file.
     onward : dict of str to list of (str, str)
         From an edge to which, and how it goes there: ``l``, ``s`` or ``r``.
@@ -55,26 +55,26 @@ class StreetNetwork:
         Where the nodes with traffic lights are.
     """
 
-    edges: dict[str, Edge]
+    edges: dict[str, NetworkEdge]
     onward: dict[str, list[tuple[str, str]]]
     signalised: dict[str, Float]
 
     @property
-    def arms(self) -> list[Edge]:
+    def arms(self) -> list[NetworkEdge]:
         """Edges on which vehicles come in: nothing leads to them, and they lead on."""
         entered = {edge for ways in self.onward.values() for edge, _ in ways}
         return [
             edge for edge in self.edges.values() if edge.of(DRIVING) and edge.id not in entered and self.leads_on(edge)
         ]
 
-    def leads_on(self, edge: Edge) -> bool:
+    def leads_on(self, edge: NetworkEdge) -> bool:
         """Return whether vehicles can drive on from an edge."""
         return bool(self.onward.get(edge.id))
 
 
 def read_network(path: str | os.PathLike[str]) -> StreetNetwork:
     """Read a SUMO network."""
-    edges: dict[str, Edge] = {}
+    edges: dict[str, NetworkEdge] = {}
     onward: dict[str, list[tuple[str, str]]] = {}
     signalised: dict[str, Float] = {}
     current: list[str] = []  # the edge whose lanes come now; none within a junction
@@ -83,10 +83,10 @@ def read_network(path: str | os.PathLike[str]) -> StreetNetwork:
         if tag == "edge":
             current[:] = [] if attributes.get("function") else [attributes["id"]]
             if current:
-                edges[attributes["id"]] = Edge(attributes["id"], attributes["to"], ())
+                edges[attributes["id"]] = NetworkEdge(attributes["id"], attributes["to"], ())
         elif tag == "lane" and current:
             edge = edges[current[0]]
-            edges[current[0]] = Edge(edge.id, edge.end, (*edge.lanes, _lane(attributes)))
+            edges[current[0]] = NetworkEdge(edge.id, edge.end, (*edge.lanes, _lane(attributes)))
         elif tag == "connection" and attributes["from"] in edges:
             way = (attributes["to"], attributes["dir"].lower())
             drives = edges[attributes["from"]].lanes[int(attributes["fromLane"])].use == DRIVING
@@ -100,9 +100,9 @@ def read_network(path: str | os.PathLike[str]) -> StreetNetwork:
     return StreetNetwork(edges, onward, signalised)
 
 
-def _lane(attributes: Attributes) -> Lane:
+def _lane(attributes: Attributes) -> NetworkLane:
     corners = [corner.split(",")[:2] for corner in attributes["shape"].split()]
-    return Lane(
+    return NetworkLane(
         index=int(attributes["index"]),
         use=_use(attributes),
         length=float(attributes["length"]),

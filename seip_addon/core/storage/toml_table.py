@@ -1,0 +1,101 @@
+"""TOML files of users, checked against the keys that their tables may have."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeGuard
+
+from ..errors import SeipError
+
+Reader = Callable[[Any], Any]
+"""Turns a value into what it stands for; a `ValueError` of it says what the value must be instead."""
+
+REQUIRED = object()
+"""The default of a key that must be there."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table: how its value is read, and what it is where it is left out."""
+
+    read: Reader
+    default: Any = REQUIRED
+
+
+def parse_toml(text: str, file: str) -> dict[str, Any]:
+    """Return the tables of a TOML file.
+
+    Raises
+    ------
+    SeipError
+        It is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise SeipError(f"{file} is not valid TOML: {error}") from error
+
+
+def read_table(content: Mapping[str, Any], where: str, keys: Mapping[str, Key]) -> dict[str, Any]:
+    """Return the values of a table, each key of ``keys`` with one.
+
+    Parameters
+    ----------
+    where : str
+        What people call the table: its file, and its number in it.
+
+    Raises
+    ------
+    SeipError
+        A key is missing, unknown (close ones are offered), or has a value of the wrong kind.
+    """
+    values = {}
+    for name, key in keys.items():
+        if name in content:
+            try:
+                values[name] = key.read(content[name])
+            except ValueError as error:
+                raise SeipError(f"{where}: {name} {error}") from error
+        elif key.default is REQUIRED:
+            close = difflib.get_close_matches(name, content.keys() - keys.keys(), n=1, cutoff=0.6)
+            raise SeipError(f"{where}: {name} is missing{f' (is {close[0]!r} a slip?)' if close else ''}")
+        else:
+            values[name] = key.default
+    for name in content:
+        if name not in keys:
+            close = difflib.get_close_matches(name, keys, n=3, cutoff=0.5) or sorted(keys)
+            raise SeipError(f"{where}: unknown key {name!r}; did you mean {' or '.join(close)}?")
+    return values
+
+
+def text(value: object) -> str:
+    """Read a text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ValueError("must be a text in quotes")
+    return value
+
+
+def number(*, above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Reader:
+    """Return a reader of numbers above or from a limit on, of an amount of at most ``most``."""
+
+    def read(value: object) -> float:
+        if not is_number(value):
+            raise ValueError("must be a number below 1e9")
+        if abs(value) > most:
+            raise ValueError(f"must be at most {most:g}, not {value:g}")
+        if not (value > above and value >= least):
+            raise ValueError(
+                f"must be {'above' if above >= least else 'at least'} {max(above, least):g}, not {value:g}"
+            )
+        return float(value)
+
+    return read
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a finite number of earthly size; whole numbers of any length are valid TOML."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e9

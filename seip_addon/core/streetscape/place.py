@@ -1,0 +1,150 @@
+"""The place of a map that is studied: its middle, its region of interest and its level, in map coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..opendrive import Junction, LaneSurface, RoadMap, find_junction, junction_area, nearest_junctions
+from ..site.scene_geometry import DEFAULT_WEIGHT
+from . import road_surface
+from .approaches import approach_lanes
+from .degrees import looks_like_degrees
+from .description import DEFAULT_RADIUS, SiteDescription
+from .levels import Levels, split_levels
+
+MARGIN = 40.0
+"""How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
+NEAR_CROSSING = 10.0
+"""Roads this near to the middle of the place (metres) may each be the one that is meant."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place of a map as a site description names it.
+
+    Parameters
+    ----------
+    surfaces : tuple of LaneSurface
+        The lanes of the map that count, map coordinates.
+    """
+
+    road_map: RoadMap
+    surfaces: Sequence[LaneSurface]
+    description: SiteDescription
+
+    @cached_property
+    def centre(self) -> Float:
+        """Middle of the place, (2,) metres."""
+        description = self.description
+        if description.near is not None:
+            return np.array(description.near, dtype=np.float64)
+        if description.junction is not None:
+            middle = self._driving_area(self._junction).centroid
+        elif description.region is not None:
+            middle = description.region.centroid
+        else:
+            raise SeipError(
+                "no place is named: give --near X Y or --junction ID, or near, junction or region in the site file"
+            )
+        return np.array([middle.x, middle.y])
+
+    @cached_property
+    def within(self) -> BaseGeometry:
+        """Area in which the region of interest lies."""
+        if self.description.region is not None:
+            return self.description.region
+        if self.description.along is None:
+            return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
+        return shapely.union_all([shapely.make_valid(lane.polygon) for lane in self._approach_lanes()]).convex_hull
+
+    def levels(self) -> Levels:
+        """Return the lanes on the level of the place, and those that cross above or below."""
+        around = self.within.convex_hull.buffer(MARGIN, quad_segs=16)
+        if self.description.near is None and self.description.junction is not None:
+            anchors = {lane.road_id for lane in self.surfaces if lane.junction_id == self._junction.id}
+        else:
+            driving = road_surface.in_groups(self.surfaces, ["driving"])
+            away = shapely.distance([lane.polygon for lane in driving], shapely.Point(self.centre))
+            least = max(away.min(initial=np.inf), NEAR_CROSSING)
+            anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
+        return split_levels(self.surfaces, around, anchors, self.description.level)
+
+    def region(self) -> BaseGeometry:
+        """Return the region of interest."""
+        shift = np.array([*self.centre, 0.0])  # outlines need small coordinates for their grids
+        within = shifted(self.within, -shift)
+        lanes = self.surfaces if self.description.along is None else self._approach_lanes()
+        driving = road_surface.in_groups(lanes, ["driving"])
+        near = road_surface.local_strips(driving, shift, within) if driving else ()
+        if near:
+            region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(within))
+            if not region.is_empty:
+                return shifted(region, shift)
+        raise self._no_driving_lane()
+
+    def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
+        """Return name, area and weight of the weighted regions.
+
+        Where none is described it is the box of the junction nearest to the middle.
+        """
+        described, (x, y) = self.description.weighted_regions, self.centre.tolist()
+        if not described:
+            nearest = nearest_junctions(self.road_map, self.surfaces, x, y, 1)
+            return [(f"Junction {found.id}", self._central_box(found), DEFAULT_WEIGHT) for found, _ in nearest]
+        return [
+            (one.name, one.polygon or self._central_box(self._found(one.junction or "")), one.weight)
+            for one in described
+        ]
+
+    @cached_property
+    def _junction(self) -> Junction:
+        return self._found(self.description.junction or "")
+
+    def _found(self, id_or_name: str) -> Junction:
+        return find_junction(self.road_map, self.surfaces, id_or_name)
+
+    def _approach_lanes(self) -> tuple[LaneSurface, ...]:
+        return approach_lanes(self.surfaces, self._junction.id, self.description.along or 0.0)
+
+    def _driving_area(self, junction: Junction) -> BaseGeometry:
+        area = junction_area(road_surface.in_groups(self.surfaces, ["driving"]), junction.id)
+        return junction_area(self.surfaces, junction.id) if area.is_empty else area
+
+    def _central_box(self, junction: Junction) -> BaseGeometry:
+        """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
+        return shapely.minimum_rotated_rectangle(self._driving_area(junction))
+
+    def _no_driving_lane(self) -> SeipError:
+        description, (x, y) = self.description, self.centre.tolist()
+        where = f"within {description.radius or DEFAULT_RADIUS:g} m of ({x:g}, {y:g})"
+        if description.along is not None:
+            where = f"in junction {description.junction!r}"
+        elif description.region is not None:
+            where = "within the region"
+        given = description.near is not None and not (x.is_integer() and y.is_integer())
+        hint = " (give metres of the map, not latitude and longitude)" if given and looks_like_degrees((x, y)) else ""
+        return SeipError(f"there is no driving lane {where}{hint}{self._nearest()}")
+
+    def _nearest(self) -> str:
+        """Return the junctions next to the place, as the end of a sentence."""
+        names, (x, y) = [], self.centre.tolist()
+        for junction, _ in nearest_junctions(self.road_map, self.surfaces, x, y, 3):
+            middle = junction_area(self.surfaces, junction.id).centroid
+            names.append(f"{junction.id} at ({middle.x:.0f}, {middle.y:.0f})")
+        if names:
+            return f"; the nearest junctions are {', '.join(names)}"
+        x_low, y_low, x_high, y_high = shapely.total_bounds([lane.polygon for lane in self.surfaces])
+        return f"; the map's roads lie between ({x_low:.0f}, {y_low:.0f}) and ({x_high:.0f}, {y_high:.0f})"
+
+
+def shifted(area: BaseGeometry, by: Float) -> BaseGeometry:
+    """Return an area moved in plan by metres, (2,) or (3,)."""
+    return shapely.transform(area, lambda xy: xy + by[:2])
