@@ -61,7 +61,7 @@ def full_scan(scene: bpy.types.Scene) -> np.ndarray:
 def test_moved_sensors_are_neither_exported_nor_kept_as_what_they_were(placed):
     move(placed)
     for operator in (bpy.ops.seip.export_result, bpy.ops.seip.keep_placement):
-        with pytest.raises(RuntimeError, match=r"By hand: S1 moved; S3 deleted\. Press Judge as They Hang"):
+        with pytest.raises(RuntimeError, match=r"By hand: S1 moved; S3 deleted\. Press Evaluate Moved Sensors"):
             operator()
 
 
