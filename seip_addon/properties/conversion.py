@@ -1,10 +1,36 @@
-"""Conversion of what a person typed into a property."""
+"""Conversion between Blender's properties and the settings of the core."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import bpy
+from bpy.props import BoolProperty, FloatProperty, IntProperty
+
+from ..core.settings import settings_of
+
+_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+_UNITS = {"m": {"unit": "LENGTH"}, "rad": {"subtype": "ANGLE"}}
+
+
+def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: ANN401 -- what Blender makes of a property
+    """Return the property of a field of a settings class, with its default, limits, unit and description.
+
+    Parameters
+    ----------
+    name : str
+        As the panel shows it.
+    **more
+        What Blender's property takes beside, or in place of that: soft limits, steps.
+    """
+    about, default = settings_of(kind)[field]
+    limits = {"min": about.minimum, "max": about.maximum}
+    given = {name: limit for name, limit in limits.items() if limit is not None}
+    description = about.help[0].upper() + about.help[1:]
+    return _KINDS[type(default)](
+        name=name, description=description, default=default, **(given | _UNITS.get(about.unit, {}) | more)
+    )
 
 
 def absolute(text: str) -> Path:

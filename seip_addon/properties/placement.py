@@ -9,10 +9,10 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from .. import selection
 from ..core.placement.goal import DEFAULT_COUNT, Goal
-from ..core.robustness.pose_errors import STEEPEST, WIDEST, PoseErrors
+from ..core.robustness.pose_errors import STEEPEST, PoseErrors
 from ..core.robustness.risk import Risk
 from ..core.workflows.robust import RobustnessSettings
-from .conversion import as_typed
+from .conversion import as_typed, of_setting
 
 TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
 """Share of the scenarios, the worst ones, that count, by objective."""
@@ -64,9 +64,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     central_weight: FloatProperty(
         name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
     )
-    min_distance: FloatProperty(
-        name="Minimum Distance", description="Between two sensors", unit="LENGTH", default=0.0, min=0.0
-    )
+    min_distance: of_setting(Goal, "min_distance", "Minimum Distance")
     objective: EnumProperty(
         name="Optimise for",
         description="Whether the placement trusts the map, or is chosen for what may go wrong",
@@ -77,23 +75,9 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("WORST", "Worst Case", "Coverage in the worst of the poses that were tried"),
         ),
     )
-    position_error: FloatProperty(
-        name="Position Error",
-        description="Standard deviation of x, of y and of the height",
-        unit="LENGTH",
-        default=PoseErrors().position,
-        min=0.0,
-        max=WIDEST,
-    )
-    tilt_error: FloatProperty(
-        name="Tilt Error",
-        description="Standard deviation of yaw, of pitch and of roll",
-        subtype="ANGLE",
-        default=PoseErrors().tilt,
-        min=0.0,
-        max=STEEPEST,
-    )
-    seen_by: IntProperty(name="Seen by", description="Sensors that must see a target", default=1, min=1, max=8)
+    position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
+    tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=STEEPEST)
+    seen_by: of_setting(Risk, "seen_by", "Seen by", max=8)
     failure: EnumProperty(
         name="Sensor Failure",
         description="Whether coverage is counted after one of the sensors has failed",

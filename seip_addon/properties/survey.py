@@ -11,10 +11,10 @@ from ..core.site.candidates import HIGHEST, CandidateSettings, heights_of, tilts
 from ..core.visibility.settings import VisibilitySettings
 from ..core.workflows.survey import SurveySettings
 from ..preferences import catalogue_files
-from .conversion import as_typed
+from .conversion import as_typed, of_setting
 
-_LAYOUT, _SIGHT, _SURVEY = CandidateSettings(), VisibilitySettings(), SurveySettings()
-_TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _LAYOUT.tilts)
+_CANDIDATES = CandidateSettings()
+_TILTS = " ".join(f"{math.degrees(tilt):g}" for tilt in _CANDIDATES.tilts)
 
 
 class SEIP_PG_sensor_type(bpy.types.PropertyGroup):
@@ -41,7 +41,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     heights: StringProperty(
         name="Heights (m)",
         description="Mounting heights above the ground in metres, like 3.5 5.4 8, or a range FROM:TO:STEP",
-        default=" ".join(f"{height:g}" for height in _LAYOUT.heights),
+        default=" ".join(f"{height:g}" for height in _CANDIDATES.heights),
     )
     tilts: StringProperty(
         name="Tilts (°)",
@@ -49,74 +49,14 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         "FROM:TO:STEP; 0 is upright, a negative tilt points up",
         default=_TILTS,
     )
-    grid: FloatProperty(
-        name="Target Spacing",
-        description="Distance between neighbouring targets on the road",
-        unit="LENGTH",
-        default=_SURVEY.grid_spacing,
-        min=0.05,
-        soft_max=10.0,
-        step=10,
-    )
-    delta: FloatProperty(
-        name="δ",
-        description="A return nearer than this to a target sees it",
-        unit="LENGTH",
-        default=_SIGHT.delta,
-        min=0.01,
-        max=100.0,
-        soft_max=5.0,
-        step=10,
-    )
-    min_intensity: FloatProperty(
-        name="Minimum Intensity",
-        description="Least intensity of a return that sees; at 0 every return counts",
-        subtype="FACTOR",
-        default=_SIGHT.min_intensity,
-        min=0.0,
-        max=1.0,
-    )
-    spacing: FloatProperty(
-        name="Spacing",
-        description="Least distance between two new posts on the pavement",
-        unit="LENGTH",
-        default=_LAYOUT.spacing,
-        min=0.1,
-        soft_max=50.0,
-        step=50,
-    )
-    setback: FloatProperty(
-        name="Setback",
-        description="Distance of new posts from the kerb",
-        unit="LENGTH",
-        default=_LAYOUT.setback,
-        min=0.0,
-        soft_max=5.0,
-        step=10,
-    )
-    clearance: FloatProperty(
-        name="Clearance",
-        description="Distance of new posts and their sensors from walls and other objects",
-        unit="LENGTH",
-        default=_LAYOUT.clearance,
-        min=0.0,
-        soft_max=5.0,
-        step=10,
-    )
-    bracket: FloatProperty(
-        name="Bracket",
-        description="How far from an existing pole's axis a sensor hangs",
-        unit="LENGTH",
-        default=_LAYOUT.bracket,
-        min=0.0,
-        soft_max=5.0,
-        step=10,
-    )
-    assumed_poles: BoolProperty(
-        name="Assumed Poles",
-        description="Let poles carry sensors that are assumed, since the map has none for its traffic lights",
-        default=_LAYOUT.assumed_poles,
-    )
+    grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
+    delta: of_setting(VisibilitySettings, "delta", "δ", min=0.01, soft_max=5.0, step=10)
+    min_intensity: of_setting(VisibilitySettings, "min_intensity", "Minimum Intensity", subtype="FACTOR")
+    spacing: of_setting(CandidateSettings, "spacing", "Spacing", soft_max=50.0, step=50)
+    setback: of_setting(CandidateSettings, "setback", "Setback", soft_max=5.0, step=10)
+    clearance: of_setting(CandidateSettings, "clearance", "Clearance", soft_max=5.0, step=10)
+    bracket: of_setting(CandidateSettings, "bracket", "Bracket", soft_max=5.0, step=10)
+    assumed_poles: of_setting(CandidateSettings, "assumed_poles", "Assumed Poles")
     engine: EnumProperty(
         name="Ray Caster",
         description="What casts the rays",
@@ -143,7 +83,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         description="For the search of a placement, in seconds",
         subtype="TIME_ABSOLUTE",
         unit="TIME_ABSOLUTE",
-        default=_SURVEY.time_limit,
+        default=SurveySettings().time_limit,
         min=1.0,
         soft_max=3600.0,
     )
@@ -169,7 +109,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         used = tuple(one.name for one in self.types if one.use)
         return SurveySettings(
             candidates=CandidateSettings(
-                sensors=used if len(self.types) else _LAYOUT.sensors,
+                sensors=used if len(self.types) else _CANDIDATES.sensors,
                 heights=heights_of(self.heights.split()),
                 tilts=tilts_of(self.tilts.split()),
                 spacing=as_typed(self.spacing),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from .. import live_scan
 from ..core.datasets import FORMATS, SPLITS
 from ..core.scans import ScanSettings
 from ..core.traffic.source import TrafficFiles
 from ..core.workflows.recording import RecordingSettings
-from .conversion import absolute, as_typed
+from .conversion import absolute, as_typed, of_setting
 
 
 def _follow(_own: object, _context: bpy.types.Context) -> None:
@@ -40,13 +40,11 @@ class SEIP_PG_traffic(bpy.types.PropertyGroup):
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     loaded: StringProperty(name="Loaded", description="What was found in the file, one fact a line")
-    seed: IntProperty(name="Seed", description="Of noise and lost returns", default=0, min=0)
+    seed: of_setting(ScanSettings, "seed", "Seed")
     noise: BoolProperty(
         name="Noise", description="Ranges are noisy and returns get lost, as in the sensors' data sheets", default=True
     )
-    rolling_shutter: BoolProperty(
-        name="Rolling Shutter", description="Traffic moves while a sensor turns", default=False
-    )
+    rolling_shutter: of_setting(ScanSettings, "rolling_shutter", "Rolling Shutter")
     follow: BoolProperty(
         name="Follow the Timeline",
         description="Scan again whenever the frame changes",

@@ -60,7 +60,7 @@ class Goal:
     central_weight: float | Literal["scene"] | None = setting(
         None, "one weight for all weighted regions", minimum=0.0, metavar="W"
     )
-    min_distance: float = setting(0.0, "between two sensors", unit="m", minimum=0.0, metavar="M")
+    min_distance: float = setting(0.0, "least distance between two sensors", unit="m", minimum=0.0, metavar="M")
     forbidden: tuple[str, ...] = setting((), "positions without sensor", option="forbid", metavar="POSITION")
     mandatory: tuple[str, ...] = setting((), "positions with a sensor", option="require", metavar="POSITION")
 

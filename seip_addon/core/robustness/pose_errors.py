@@ -48,7 +48,9 @@ class PoseErrors:
         Of pitch and of roll.
     """
 
-    position: float = setting(0.3, "of x and y", unit="m", maximum=WIDEST, option="position-error", metavar="M")
+    position: float = setting(
+        0.3, "standard deviation of x and of y", unit="m", maximum=WIDEST, option="position-error", metavar="M"
+    )
     height: float = setting(
         0.3, "as of the position if not given", unit="m", maximum=WIDEST, option="height-error", metavar="M"
     )
@@ -61,7 +63,12 @@ class PoseErrors:
         metavar="DEG",
     )
     tilt: float = setting(
-        math.radians(2.0), "of pitch and roll", unit="rad", maximum=STEEPEST, option="tilt-error", metavar="DEG"
+        math.radians(2.0),
+        "standard deviation of pitch and of roll",
+        unit="rad",
+        maximum=STEEPEST,
+        option="tilt-error",
+        metavar="DEG",
     )
 
     def __post_init__(self) -> None:

@@ -42,7 +42,7 @@ class ScanSettings:
     engine : {"auto", "bvh", "embree"}
     """
 
-    seed: int = setting(0, "of noise and lost returns", minimum=0)
+    seed: int = setting(0, "seed of noise and lost returns", minimum=0)
     noise: bool = True
     rolling_shutter: bool = setting(default=False, help="traffic moves while a sensor turns")
     engine: Engine = setting("auto", "ray caster")

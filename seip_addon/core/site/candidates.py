@@ -75,10 +75,18 @@ class CandidateSettings:
         metavar="DEG",
         read=lambda texts: tilts_of(texts),  # noqa: PLW0108 -- as above
     )
-    spacing: float = setting(4.0, "between posts on the pavement", unit="m", minimum=0.1, maximum=1000.0)
-    setback: float = setting(0.5, "of posts from the kerb", unit="m", minimum=0.0, maximum=100.0)
-    clearance: float = setting(0.3, "of posts from walls", unit="m", minimum=0.0, maximum=100.0)
-    bracket: float = setting(0.4, "of sensors from the axis of a pole", unit="m", minimum=0.0, maximum=100.0)
+    spacing: float = setting(4.0, "distance between new posts on the pavement", unit="m", minimum=0.1, maximum=1000.0)
+    setback: float = setting(0.5, "distance of new posts from the kerb", unit="m", minimum=0.0, maximum=100.0)
+    clearance: float = setting(
+        0.3,
+        "distance of new posts and their sensors from walls and other objects",
+        unit="m",
+        minimum=0.0,
+        maximum=100.0,
+    )
+    bracket: float = setting(
+        0.4, "distance of sensors from the axis of an existing pole", unit="m", minimum=0.0, maximum=100.0
+    )
     assumed_poles: bool = setting(
         default=False,
         help="let poles carry sensors that are assumed, since the map has none for its traffic lights",

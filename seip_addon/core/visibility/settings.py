@@ -23,8 +23,10 @@ class VisibilitySettings:
         Least intensity of such a return, for surfaces of reflectivity 1. At 0 every return counts.
     """
 
-    delta: float = setting(1.0, "a return closer than this sees a target", unit="m", maximum=WIDEST_DELTA)
-    min_intensity: float = setting(0.0, "least intensity of a return that sees", minimum=0.0, maximum=1.0)
+    delta: float = setting(1.0, "distance from a target within which a return sees it", unit="m", maximum=WIDEST_DELTA)
+    min_intensity: float = setting(
+        0.0, "least intensity of a return that sees; at 0 every return counts", minimum=0.0, maximum=1.0
+    )
 
     def __post_init__(self) -> None:
         if not 0 < self.delta <= WIDEST_DELTA:

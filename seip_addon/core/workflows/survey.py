@@ -67,7 +67,7 @@ class SurveySettings:
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
-    grid_spacing: float = setting(1.0, "spacing of the targets", unit="m", option="grid")
+    grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="TOML")
     engine: Engine = setting("auto", "ray caster")
     solver: str = setting("auto", "auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi")
