@@ -13,24 +13,15 @@ from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sentence import draw_sentence
-from .sidebar import Sidebar
+from .sidebar import RowList, Sidebar, settings_column
 
 
-class SEIP_UL_rules(bpy.types.UIList):
+class SEIP_UL_rules(RowList, bpy.types.UIList):
     """Positions with a demand of their own."""
 
     bl_idname = "SEIP_UL_rules"
 
-    def draw_item(  # as Blender calls it
-        self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        _data: object,
-        item: bpy.types.PropertyGroup,
-        _icon: int,
-        _active_data: object,
-        _active_property: str,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a position and what must be there."""
         row = layout.row()
         row.label(text=item.name, icon="CHECKMARK" if item.rule == "MANDATORY" else "CANCEL")
@@ -47,9 +38,7 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         """Draw the goal and the button."""
         scene = context.scene
         goal = scene.seip.goal
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = settings_column(self.layout)
         row = layout.row()
         row.use_property_split = False  # else there is no room for three words
         row.prop(goal, "limit", expand=True)
@@ -78,9 +67,7 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw what the placement is chosen for."""
         goal = context.scene.seip.goal
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = settings_column(self.layout)
         layout.prop(goal, "objective")
         if goal.objective == "PLANNED":
             layout.prop(goal, "pose_errors")
@@ -121,9 +108,7 @@ class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the solver and its time."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = settings_column(self.layout)
         layout.prop(context.scene.seip.survey, "solver")
         limits = layout.column(align=True)
         row = limits.row(align=True)

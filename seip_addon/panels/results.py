@@ -9,26 +9,17 @@ from ..operators import results
 from ..session import FollowedSensors, session
 from .run_button import draw_run
 from .sentence import draw_sentence
-from .sidebar import Sidebar
+from .sidebar import RowList, Sidebar
 
 
-class SEIP_UL_chosen(bpy.types.UIList):
+class SEIP_UL_chosen(RowList, bpy.types.UIList):
     """The sensors of the placement."""
 
     bl_idname = "SEIP_UL_chosen"
 
-    def draw_item(  # as Blender calls it
-        self,
-        context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        _data: object,
-        item: bpy.types.PropertyGroup,
-        _icon: int,
-        _active_data: object,
-        _active_property: str,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a sensor: label, type, height, place and what it sees."""
-        record = parsed_record(context.scene.seip.result.record)
+        record = parsed_record(bpy.context.scene.seip.result.record)
         sensor = next((one for one in record["sensors"] if one["id"] == item.name), None)
         if sensor is None:
             layout.label(text=item.name)
@@ -38,42 +29,24 @@ class SEIP_UL_chosen(bpy.types.UIList):
         row.label(text=f"{sensor['coverage_alone']:.1%}")
 
 
-class SEIP_UL_ranked(bpy.types.UIList):
+class SEIP_UL_ranked(RowList, bpy.types.UIList):
     """Candidates by their worth."""
 
     bl_idname = "SEIP_UL_ranked"
 
-    def draw_item(  # as Blender calls it
-        self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        _data: object,
-        item: bpy.types.PropertyGroup,
-        _icon: int,
-        _active_data: object,
-        _active_property: str,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a candidate and its worth."""
         row = layout.split(factor=0.75)
         row.label(text=item.name)
         row.label(text=f"{item.share:.2%}")
 
 
-class SEIP_UL_kept(bpy.types.UIList):
+class SEIP_UL_kept(RowList, bpy.types.UIList):
     """Placements that were kept."""
 
     bl_idname = "SEIP_UL_kept"
 
-    def draw_item(  # as Blender calls it
-        self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        _data: object,
-        item: bpy.types.PropertyGroup,
-        _icon: int,
-        _active_data: object,
-        _active_property: str,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a name that can be changed."""
         layout.prop(item, "name", text="", emboss=False)
 

@@ -14,27 +14,18 @@ from ..operators.sensors import (
     SEIP_OT_list_sensor_types,
     SEIP_OT_preview_beams,
 )
-from ..properties.survey import SEIP_PG_sensor_type, SEIP_PG_survey
 from ..session import session
 from ..viewport import beam_preview
 from .sentence import draw_sentence
-from .sidebar import Sidebar
+from .sidebar import RowList, Sidebar, settings_column
 
 
-class SEIP_UL_sensor_types(bpy.types.UIList):
+class SEIP_UL_sensor_types(RowList, bpy.types.UIList):
     """Sensor types of the catalogue."""
 
     bl_idname = "SEIP_UL_sensor_types"
 
-    def draw_item(
-        self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        _data: SEIP_PG_survey,
-        item: SEIP_PG_sensor_type,
-        _icon: int,
-        _active_data: SEIP_PG_survey,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw whether a type is used, its key, and its main figures."""
         model = session.sensor_types.get(item.name)
         row = layout.row(align=True)
@@ -79,9 +70,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
             row.operator(SEIP_OT_list_sensor_types.bl_idname, text="", icon="FILE_REFRESH")
             if not any(one.use for one in survey.types):
                 draw_sentence(layout, "Use at least one type.", icon="ERROR", alert=True)
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = settings_column(layout)
         column.prop(survey, "heights")
         column.prop(survey, "tilts")
 
@@ -140,9 +129,7 @@ class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
         """Draw the button and what the colours mean."""
         shown = beam_preview.is_shown()
         layout = self.layout
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = settings_column(layout)
         column.prop(context.scene.seip.survey, "preview_height")
         text = "Hide Beams" if shown else "Show Beams"
         layout.operator(SEIP_OT_preview_beams.bl_idname, text=text, icon="LIGHT_SPOT", depress=shown)

@@ -1,6 +1,8 @@
-"""Mixin that places a panel in the sidebar."""
+"""Mixins of the sidebar's panels and lists."""
 
 from __future__ import annotations
+
+import bpy
 
 
 class Sidebar:
@@ -9,3 +11,32 @@ class Sidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "SEIP"
+
+
+class RowList:
+    """A mixin: a list whose rows are drawn by `draw_row`."""
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: object,
+        item: bpy.types.PropertyGroup,
+        _icon: int,
+        _active_data: object,
+        _active_property: str,
+    ) -> None:
+        """Draw a row."""
+        self.draw_row(layout, item)
+
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
+        """Draw a row."""
+        raise NotImplementedError
+
+
+def settings_column(layout: bpy.types.UILayout, heading: str = "") -> bpy.types.UILayout:
+    """Return a column of settings: names on the left, values on the right."""
+    column = layout.column(heading=heading)
+    column.use_property_split = True
+    column.use_property_decorate = False
+    return column

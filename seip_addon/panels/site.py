@@ -18,11 +18,10 @@ from ..operators.site import (
     missing_for_build,
     why_no_role,
 )
-from ..properties.site import SEIP_PG_problem, SEIP_PG_site
 from ..scene import roles
 from .run_button import draw_run
 from .sentence import draw_sentence
-from .sidebar import Sidebar
+from .sidebar import RowList, Sidebar, settings_column
 
 
 class SEIP_PT_site(Sidebar, bpy.types.Panel):
@@ -56,9 +55,7 @@ class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
         if missing:
             draw_sentence(layout, missing, icon="INFO")
             return
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = settings_column(layout)
         column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
         if site.is_described():
             draw_sentence(layout, "The place is the one that the description names.")
@@ -105,9 +102,7 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, thing: bpy.
     box = layout.box()
     box.label(text=thing.name, icon="OBJECT_DATA")
     draw_sentence(box, ", ".join(role.value for role in held).capitalize() or "No role")
-    column = box.column()
-    column.use_property_split = True
-    column.use_property_decorate = False
+    column = settings_column(box)
     column.enabled = thing.is_editable
     if Role.WEIGHTED_REGIONS in held:
         column.prop(thing, "seip_region_weight")
@@ -115,20 +110,12 @@ def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, thing: bpy.
         column.prop(thing, "seip_pole_rule")
 
 
-class SEIP_UL_problems(bpy.types.UIList):
+class SEIP_UL_problems(RowList, bpy.types.UIList):
     """Problems that the check found."""
 
     bl_idname = "SEIP_UL_problems"
 
-    def draw_item(
-        self,
-        _context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        _data: SEIP_PG_site,
-        item: SEIP_PG_problem,
-        _icon: int,
-        _active_data: SEIP_PG_site,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw one."""
         layout.label(text=item.name or item.text, icon="CANCEL" if item.is_error else "ERROR", translate=False)
 

@@ -17,7 +17,7 @@ from ..operators.traffic import (
 from ..session import session
 from .run_button import draw_run
 from .sentence import draw_sentence
-from .sidebar import Sidebar
+from .sidebar import Sidebar, settings_column
 
 
 class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
@@ -59,9 +59,7 @@ class SEIP_PT_scan(Sidebar, bpy.types.Panel):
         """Draw how scans are made, and the last."""
         traffic = context.scene.seip.traffic
         layout = self.layout
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = settings_column(layout)
         column.prop(traffic, "noise")
         column.prop(traffic, "seed")
         column.prop(traffic, "rolling_shutter")
@@ -87,9 +85,7 @@ class SEIP_PT_dataset(Sidebar, bpy.types.Panel):
         """Draw what is written where."""
         traffic = context.scene.seip.traffic
         layout = self.layout
-        column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column = settings_column(layout)
         column.prop(traffic, "folder")
         column.prop(traffic, "whole")
         if not traffic.whole:

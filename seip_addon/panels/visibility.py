@@ -10,7 +10,7 @@ from ..operators.visibility import SEIP_OT_compute_visibility, SEIP_OT_estimate_
 from ..session import session
 from .run_button import draw_run, in_words
 from .sentence import draw_sentence
-from .sidebar import Sidebar
+from .sidebar import Sidebar, settings_column
 
 
 class SEIP_PT_visibility(Sidebar, bpy.types.Panel):
@@ -23,9 +23,7 @@ class SEIP_PT_visibility(Sidebar, bpy.types.Panel):
         """Draw settings, what they will take, and the button."""
         scene = context.scene
         survey = scene.seip.survey
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = settings_column(self.layout)
         column = layout.column()
         for name in ("grid", "delta"):
             column.prop(survey, name)
@@ -45,9 +43,7 @@ class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings that mostly stay as they are."""
         survey = context.scene.seip.survey
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = settings_column(self.layout)
         column = layout.column(heading="Positions")
         for name in ("spacing", "setback", "clearance", "bracket", "assumed_poles"):
             column.prop(survey, name)
