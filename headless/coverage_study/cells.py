@@ -161,10 +161,6 @@ def coverage_study(
     effort : float, units of work
         As for `placement.solve`.
 
-    Returns
-    -------
-    CoverageStudy
-
     Raises
     ------
     SeipError
