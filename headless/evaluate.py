@@ -59,7 +59,7 @@ def main(argv: list[str]) -> None:
     detectors = [one.detector for one in trained]
     for name, sentences in case_study.suitability_by_configuration(simulator, models, detectors, study.traffic).items():
         session.warn(f"{name}: {sentence}" for sentence in sentences)
-    outcomes = watch.run("outcome", case_study.evaluate_all(simulator, models, detectors, study.traffic))
+    outcomes = watch.run("evaluation", case_study.evaluate_all(simulator, models, detectors, study.traffic))
     claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
     site = study.surveyed.layout.site
