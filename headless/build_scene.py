@@ -45,13 +45,12 @@ def main(argv: list[str]) -> None:
         finish(build_scene(new_file(), model, map_path.name), report)
     save_blend(asked.output)
     for note in model.notes:
-        sys.stdout.write(f"note: {note}\n")
-    for warning in model.warnings:
-        sys.stdout.write(f"warning: {warning}\n")
+        session.say(f"note: {note}")
+    session.warn(model.warnings)
     x, y, z = model.origin + 0.0  # no negative zero
-    sys.stdout.write(
+    session.say(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
-        f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})\n"
+        f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )
 
 

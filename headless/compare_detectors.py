@@ -48,7 +48,7 @@ LOOKS = 5
 
 
 def main(argv: list[str]) -> None:
-    """Train and judge every setting, and write the chart and its figures."""
+    """Train and evaluate every setting, and write the chart and its figures."""
     options = _parser().parse_args(argv)
     study = evaluate.prepare_study(options)
     models = [
@@ -60,12 +60,12 @@ def main(argv: list[str]) -> None:
         )
         for (family, name), network in SETTINGS.items()
     ]
-    works = [_lesson(study, model, options.device) for model in models]
+    works = [_trained(study, model, options.device) for model in models]
     with deterministic(1):
         trained = study.surveyed.stopwatch.run("training", side_by_side(works, case_study.SIDE_BY_SIDE))
     detectors = [detector for detector, _ in trained]
     judging = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
-    outcomes = study.surveyed.stopwatch.run("outcome", judging)
+    outcomes = study.surveyed.stopwatch.run("evaluation", judging)
     settings = [
         DetectorSetting(
             name=name,
@@ -92,7 +92,7 @@ def main(argv: list[str]) -> None:
         )
 
 
-def _lesson(
+def _trained(
     study: evaluate.DetectionStudy, model: case_study.ModelConfiguration, device: str
 ) -> Generator[Progress, None, tuple[Detector, float]]:
     """Simulate what a detector learns from, and train it; return it with the processor's seconds of the training."""

@@ -18,7 +18,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.claims import save_claims
-from headless.coverage_study import NUMBERS
+from headless.coverage_study.cells import NUMBERS
 from headless.detection import case_study, study_results
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
@@ -43,7 +43,9 @@ def main(argv: list[str]) -> None:
     study = prepare_study(options)
     watch, simulator, folder = study.surveyed.stopwatch, study.simulator, options.output
     network = NetworkSettings()
-    training_set = learn_from(study, network)
+    grid = grid_of(study.surveyed.layout.geometry, network.pillar)
+    steps = case_study.simulate_training_set(simulator, study.configurations, study.traffic, grid, network.most_points)
+    training_set = watch.run("simulation", steps)
     models = case_study.model_configurations(
         study.configurations,
         network,
@@ -57,7 +59,7 @@ def main(argv: list[str]) -> None:
     detectors = [one.detector for one in trained]
     for name, sentences in case_study.suitability_by_configuration(simulator, models, detectors, study.traffic).items():
         session.warn(f"{name}: {sentence}" for sentence in sentences)
-    outcomes = watch.run("outcome", case_study.evaluate_all(simulator, models, detectors, study.traffic))
+    outcomes = watch.run("evaluation", case_study.evaluate_all(simulator, models, detectors, study.traffic))
     claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
     site = study.surveyed.layout.site
@@ -116,15 +118,6 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
     simulator = Simulator(static_scene(surveyed.layout.geometry), scans, surveyed.layout.site.name)
     return DetectionStudy(surveyed, traffic, configurations, simulator)
-
-
-def learn_from(study: DetectionStudy, network: NetworkSettings) -> case_study.TrainingSet:
-    """Simulate what a network learns from, on its own pillars."""
-    grid = grid_of(study.surveyed.layout.geometry, network.pillar)
-    steps = case_study.simulate_training_set(
-        study.simulator, study.configurations, study.traffic, grid, network.most_points
-    )
-    return study.surveyed.stopwatch.run("simulation", steps)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

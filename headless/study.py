@@ -15,8 +15,9 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session, survey
 from headless.claims import save_claims
-from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, coverage_claims, coverage_study
+from headless.coverage_study.cells import NUMBERS, WEIGHT_SHOWN, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
+from headless.coverage_study.claims import coverage_claims
 from headless.coverage_study.tables import save_study_table
 from headless.options import new_parser
 

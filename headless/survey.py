@@ -125,10 +125,6 @@ def survey(
         Called with the site and the models before any ray is cast: refuses what the site cannot do.
     refine : callable, optional
         Finds the spacings of targets and candidates.
-
-    Returns
-    -------
-    Survey
     """
     settings = _settings(options)
     settings.models()  # refuses unknown types before the scene is read

@@ -156,10 +156,6 @@ def coverage_study(
     limits : SolverLimits
         For each cell.
 
-    Returns
-    -------
-    CoverageStudy
-
     Raises
     ------
     SeipError

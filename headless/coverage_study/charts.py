@@ -14,7 +14,7 @@ from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-from . import NUMBERS, WEIGHTS, CoverageStudy
+from .cells import NUMBERS, WEIGHTS, CoverageStudy
 
 HEIGHT, PANEL_WIDTH, FEWEST_PANELS = 4.2, 3.65, 3  # inches, inches, panels that a chart is wide at least
 BESIDE = 0.09  # of the step between two heights, from one type to the next

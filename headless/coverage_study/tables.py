@@ -8,7 +8,7 @@ import os
 from seip_addon.core.results.headings import tilt_degrees
 from seip_addon.core.storage.files import whole_file
 
-from . import Case, CoverageStudy, EmptyCell
+from .cells import Case, CoverageStudy, EmptyCell
 
 COLUMNS = (
     "sensor",

@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
-from headless.coverage_study import NUMBERS, Case, Cell, solve_cell
+from headless.coverage_study.cells import NUMBERS, Case, Cell, solve_cell
 
 import numpy as np
 
@@ -35,9 +35,8 @@ from .average_precision import Evaluation, average_precision_interval, balanced_
 from .breakdown import false_positives
 from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
-from .detections import Detections
 from .detector import Detector
-from .frame_results import FrameResult, frame_result
+from .frame_results import Detections, FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
 from .kitti import kitti

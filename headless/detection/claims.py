@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from headless.claims import UNDECIDED, Claim, judge_above, judge_all, judge_within
-from headless.coverage_study import NUMBERS
+from headless.coverage_study.cells import NUMBERS
 
 import numpy as np
 

@@ -13,10 +13,31 @@ from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.scans.frame import Frame
 
 from .cloud_in_plan import CloudInPlan
-from .detections import Detections
 
 NEIGHBOURHOOD = 3.0
 """Radius in metres of the circle around a box in which the density of returns is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """Boxes that a detector finds in one cloud, in any order; k boxes.
+
+    Parameters
+    ----------
+    boxes : (k, 7) float64
+        x, y, z of the middle, length, width, height (metres), yaw (radians, counter-clockwise from +x).
+    score : (k,) float64, 0 to 1
+    category : (k,) int64
+        Index into the detector's classes.
+    """
+
+    boxes: Float
+    score: Float
+    category: Integer
+
+    def __len__(self) -> int:
+        """Return the number of boxes."""
+        return len(self.score)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
@@ -137,17 +138,15 @@ class SampledRecording:
 
     def __init__(self, recording: Recording, grid: PillarGrid, most_points: int) -> None:
         self.recording, self.grid, self.most_points = recording, grid, most_points
-        self._made: dict[int, TrainingSample] = {}
+        self.get = functools.cache(self._sample)
 
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.recording.frames)
 
-    def get(self, frame: int) -> TrainingSample:
+    def _sample(self, frame: int) -> TrainingSample:
         """Return the sample of a frame."""
-        if frame not in self._made:
-            self._made[frame] = sample_of(self.recording.frames[frame], self.grid, self.most_points)
-        return self._made[frame]
+        return sample_of(self.recording.frames[frame], self.grid, self.most_points)
 
 
 def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -> TrainingSample:

@@ -18,7 +18,7 @@ class TrainingTargets:
     Parameters
     ----------
     boxes : (k, 7) float32 Tensor
-        As in `detections.Detections`.
+        As in `frame_results.Detections`.
     category : (k,) int64 Tensor
     learnt : (k,) bool Tensor
         Whether it has points enough to be asked for; where it is, nothing counts otherwise.

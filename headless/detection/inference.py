@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from .detections import Detections
 from .detector import Detector
+from .frame_results import Detections
 from .pillars import fill_pillars
 from .rotated_boxes import in_plan, suppress
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,14 +27,8 @@ from .matching import Rule, must_be_found, of_its_kind, overlaps
 POINTS = 41
 
 
-@dataclass(frozen=True)
-class Kitti:
-    """KITTI's figures.
-
-    Parameters
-    ----------
-    ap40, ap11 : float, 0 to 1
-    """
+class Kitti(NamedTuple):
+    """KITTI's average precisions, 0 to 1: over 40 points of recall, and over 11."""
 
     ap40: float
     ap11: float

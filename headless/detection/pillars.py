@@ -170,10 +170,6 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
         x, y, z (metres), intensity.
     most : int
         Points that a pillar keeps.
-
-    Returns
-    -------
-    Pillars
     """
     chosen, pillar = _choose(points, grid, most)
     kept = points[chosen]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 
-from headless.coverage_study import Case
+from headless.coverage_study.cells import Case
 
 import numpy as np
 

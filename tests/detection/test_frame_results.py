@@ -3,8 +3,7 @@
 import math
 
 from headless.detection.cloud_in_plan import CloudInPlan
-from headless.detection.detections import Detections
-from headless.detection.frame_results import NEIGHBOURHOOD, frame_result
+from headless.detection.frame_results import NEIGHBOURHOOD, Detections, frame_result
 
 import numpy as np
 import pytest

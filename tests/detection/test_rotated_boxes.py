@@ -59,12 +59,12 @@ def random_boxes(rng, count, *, reach=6.0):
     )
 
 
-def varied_pairs():
+def varied_pairs(count):
     """Random pairs, and beside them every kind of pair that trips up polygon clipping."""
     rng = np.random.default_rng(1)
-    a = random_boxes(rng, PAIRS)
-    b = random_boxes(rng, PAIRS)
-    kinds = np.arange(PAIRS) % 12
+    a = random_boxes(rng, count)
+    b = random_boxes(rng, count)
+    kinds = np.arange(count) % 12
     b[kinds == 1] = a[kinds == 1]  # identical
     b[kinds == 2] = a[kinds == 2] + [0, 0, 0, 0, math.pi]
     b[kinds == 3] = a[kinds == 3] + [0, 0, 0, 0, math.pi / 2]
@@ -94,8 +94,9 @@ def varied_pairs():
     return a, b, kinds
 
 
-def test_fifty_thousand_pairs_agree_with_shapely():
-    a, b, kinds = varied_pairs()
+@pytest.mark.parametrize("count", [3_000, pytest.param(PAIRS, marks=pytest.mark.slow)])
+def test_pairs_agree_with_shapely(count):
+    a, b, kinds = varied_pairs(count)
     ours = paired_iou(torch.from_numpy(a), torch.from_numpy(b)).numpy()
     wrong = np.abs(ours - by_shapely(a, b))
     assert wrong.max() < EXACT, f"{wrong.max()} in pairs of kind {kinds[wrong.argmax()]}"

@@ -52,7 +52,7 @@ def bytes_of(path):
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-@pytest.mark.parametrize(("head", "steps"), [("centre", 300), ("anchor", 400)])
+@pytest.mark.parametrize(("head", "steps"), [("centre", 300), pytest.param("anchor", 400, marks=pytest.mark.slow)])
 def test_a_frame_can_be_learnt_by_heart(head, steps):
     frame = street_frame(11, users=6, kinds=("car",))
     same, again = (sampled("frame", traffic, [frame]) for traffic in ("run 1", "run 1 by another name"))

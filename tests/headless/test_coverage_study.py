@@ -4,8 +4,9 @@ import csv
 from dataclasses import replace
 
 from headless.claims import save_claims
-from headless.coverage_study import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_claims, coverage_study
+from headless.coverage_study.cells import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
+from headless.coverage_study.claims import coverage_claims
 from headless.coverage_study.tables import save_study_table
 
 import numpy as np

@@ -3,7 +3,7 @@
 import csv
 
 from headless import study
-from headless.coverage_study import NUMBERS, WEIGHTS
+from headless.coverage_study.cells import NUMBERS, WEIGHTS
 
 import pytest
 from matplotlib.image import imread

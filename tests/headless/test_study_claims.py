@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from headless.coverage_study import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell, coverage_claims
+from headless.coverage_study.cells import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell
+from headless.coverage_study.claims import coverage_claims
 
 import pytest
 

@@ -9,16 +9,6 @@ from pathlib import Path
 from .sample import Sample, TrafficRun
 
 
-def no_notes(run: TrafficRun) -> tuple[str, ...]:  # noqa: ARG001  # a format without peculiarities
-    """Return nothing to note of a run."""
-    return ()
-
-
-def no_index(folder: Path, splits: Mapping[str, Sequence[str]]) -> dict[str, bytes]:  # noqa: ARG001  # as no_notes
-    """Return no files for the dataset as a whole."""
-    return {}
-
-
 @dataclass(frozen=True)
 class Format:
     """A format of datasets.
@@ -46,5 +36,5 @@ class Format:
     name: str
     classes: Mapping[str, str]
     sample_files: Callable[[Sample], Mapping[str, Callable[[], bytes]]]
-    index_files: Callable[[Path, Mapping[str, Sequence[str]]], Mapping[str, bytes]] = no_index
-    notes: Callable[[TrafficRun], tuple[str, ...]] = no_notes
+    index_files: Callable[[Path, Mapping[str, Sequence[str]]], Mapping[str, bytes]] = lambda _folder, _splits: {}
+    notes: Callable[[TrafficRun], tuple[str, ...]] = lambda _run: ()
