@@ -13,7 +13,7 @@ from ..errors import SeipError
 from ..geometry.plan import LEAST_AREA, heights_over, plane_height, signed_area
 from ..site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
-from .smooth_walks import put_elsewhere
+from .smooth_walks import out_of_reach
 from .trajectories import RoadUser, Trajectories
 
 TOLERANCE = 1.0
@@ -164,7 +164,7 @@ def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> T
     user, time = user[kept], trajectories.time[kept]
     new = np.ones(len(kept), dtype=np.bool_)
     new[1:] = (np.diff(user) != 0) | (np.diff(kept) > 1) | (np.diff(time) > _longest_gap(trajectories))
-    new[1:] |= put_elsewhere(trajectories)[kept[1:] - 1]
+    new[1:] |= out_of_reach(trajectories)[kept[1:] - 1]
     begin = np.flatnonzero(new)
     end = np.append(begin[1:], len(kept))
     stays = end - begin > 1
