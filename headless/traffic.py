@@ -85,8 +85,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         files = _run(simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0)))
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
         window = TimeAndPlace(options.warm_up, end, road_bounds(geometry, MARGIN))
-        made = TrafficFiles(files.floating_car_data, (files.routes,), files.network)
-        read = _run(read_sumo(made, window, geometry.origin, source))
+        read = _run(read_sumo(files, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
     _warn((*read.warnings, *fit.warnings))
     simulated = fit.trajectories

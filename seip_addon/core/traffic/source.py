@@ -18,7 +18,7 @@ from .floating_car_data import TimeAndPlace, read_floating_car_data, read_trajec
 from .overlaps import find_overlaps
 from .road_fit import fit_to_road
 from .sumo_files import read_net_offset
-from .trajectories import CATEGORIES, Trajectories
+from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
 FAR = 500.0
@@ -57,20 +57,6 @@ class TrafficFiles:
     def trajectories(self) -> bool:
         """Whether they are trajectories already."""
         return self.path.suffix.lower() == ".npz"
-
-
-@dataclass(frozen=True, eq=False)
-class LoadedTraffic:
-    """Traffic in a scene's axes, and what a user should know of it.
-
-    Parameters
-    ----------
-    warnings : tuple of str
-        One sentence each.
-    """
-
-    trajectories: Trajectories
-    warnings: tuple[str, ...]
 
 
 def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Progress, None, LoadedTraffic]:
