@@ -13,7 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic import CATEGORIES, sumo
 from seip_addon.core.traffic.demand import MIX, MODELS, Demand, write_routes
-from seip_addon.core.traffic.floating_car_data import TimeAndPlace, read_floating_car_data, read_trajectories
+from seip_addon.core.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
 from seip_addon.core.traffic.street_network import DRIVING, PARKING, WALKING, read_network
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 
@@ -230,7 +230,7 @@ def test_town05_is_cut_to_the_scene(tmp_path):
     streets = read_network(files.net)
     assert 10 <= len(streets.edges) <= 60
     assert len(streets.arms) >= 4
-    data = finish(read_floating_car_data(files.path, window=TimeAndPlace(begin=20.0)))
+    data = finish(read_floating_car_data(files.path, window=Extent(begin=20.0)))
     types = finish(read_vehicle_types(files.routes))
     trajectories, warnings = read_trajectories(data, types, np.zeros(3), "Town05")
     assert len(trajectories) > 20
