@@ -34,7 +34,7 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.demand import Demand
-from seip_addon.core.traffic.floating_car_data import TimeAndPlace, listed
+from seip_addon.core.traffic.floating_car_data import Extent, listed
 from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
@@ -85,9 +85,8 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     with tempfile.TemporaryDirectory() as folder:
         files = _run(simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0)))
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
-        window = TimeAndPlace(options.warm_up, end, road_bounds(geometry, MARGIN))
-        made = TrafficFiles(files.floating_car_data, (files.routes,), files.network)
-        read = _run(read_sumo(made, window, geometry.origin, source))
+        window = Extent(options.warm_up, end, road_bounds(geometry, MARGIN))
+        read = _run(read_sumo(files, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
     session.warn((*read.warnings, *fit.warnings))
     simulated = fit.trajectories

@@ -21,7 +21,8 @@ from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.traffic import CATEGORIES, Trajectories
-from ..core.traffic.source import LoadedTraffic, TrafficFiles, load_traffic
+from ..core.traffic.source import TrafficFiles, load_traffic
+from ..core.traffic.trajectories import LoadedTraffic
 from ..core.workflows.recording import RecordingSettings, make_run, record, simulation_of
 from ..core.workflows.survey import surroundings
 from ..scene import contract

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
 
@@ -47,6 +47,7 @@ def test_lanes_are_ordered_from_left_to_right_and_share_their_edges(folder):
 
 
 @given(st.floats(-0.05, 0.05), st.floats(1.0, 60.0), st.floats(0.5, 8.0))
+@settings(max_examples=30)
 def test_a_lane_on_an_arc_has_the_area_of_its_ring(folder, curvature, length, width):
     (surface,) = surfaces(
         folder, road(geometry(f'<arc curvature="{curvature!r}"/>', length), section(lane(-1, width))), tolerance=1e-4
@@ -75,9 +76,7 @@ rises = st.tuples(st.floats(-0.1, 0.1), st.floats(-2e-3, 2e-3), st.floats(-3e-5,
 VANISHING = '<width sOffset="0" a="2.0" b="0.03125" c="0.0" d="-1.4824546509342596e-05"/>'
 
 
-@given(curves, widths, rises, st.sampled_from([0.005, 0.02, 0.1]))
-@example('<arc curvature="0"/>', VANISHING, "", 0.005)
-def test_chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
+def chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
     bent = road(geometry(shape, 80.0), section(lane(-1, None, inside=width)), elevation=elevation)
     (coarse,) = surfaces(folder, bent, tolerance=tolerance)
     (fine,) = surfaces(folder, bent, tolerance=tolerance / 100)
@@ -88,6 +87,23 @@ def test_chords_stay_within_the_tolerance(folder, shape, width, elevation, toler
             assert distance_to_line(near, true[number]) < 1.02 * tolerance
 
 
+bends = given(curves, widths, rises, st.sampled_from([0.005, 0.02, 0.1]))
+
+
+@bends
+@example('<arc curvature="0"/>', VANISHING, "", 0.005)
+@settings(max_examples=12)
+def test_chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
+    chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance)
+
+
+@pytest.mark.slow
+@bends
+@settings(max_examples=300)
+def test_chords_of_many_bends_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
+    chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance)
+
+
 def distance_to_line(line, point):
     """Distance in space from a point to a line of straight pieces."""
     start, step = line[:-1], np.diff(line, axis=0)
@@ -96,6 +112,7 @@ def distance_to_line(line, point):
 
 
 @given(st.floats(-math.pi, math.pi), st.sampled_from([0.0, 5.4e6]))
+@settings(max_examples=20)
 def test_moving_and_turning_the_map_moves_and_turns_its_lanes(folder, turn, far):
     shape = '<spiral curvStart="0.0" curvEnd="0.03"/>'
     (here,) = surfaces(folder, road(geometry(shape, 60.0)))

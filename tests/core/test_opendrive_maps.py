@@ -1,5 +1,6 @@
 """Real maps: all load, one has known figures, and another reader finds the same areas."""
 
+import functools
 import os
 from collections import Counter, defaultdict
 from pathlib import Path
@@ -22,6 +23,13 @@ FOLDER = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[3]
 NAMES = ["Town01", "Town05", "crest-curve", "parking_demo", "stationary_objects"]
 
 
+@functools.cache
+def loaded(name):
+    """A map and all its lanes; nobody changes them."""
+    road_map = read_map(map_file(name))
+    return road_map, map_lanes(road_map)
+
+
 def map_file(name):
     path = FOLDER / f"{name}.xodr"
     if not path.exists():
@@ -31,8 +39,7 @@ def map_file(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_real_map_has_sound_surfaces_objects_and_signals(name):
-    road_map = read_map(map_file(name))
-    surfaces = map_lanes(road_map)
+    road_map, surfaces = loaded(name)
     assert surfaces
     for surface in surfaces:
         normals = np.cross(*np.diff(surface.triangles, axis=1).swapaxes(0, 1))
@@ -49,7 +56,7 @@ def test_a_real_map_has_sound_surfaces_objects_and_signals(name):
     [("Town01", 22, 36), ("Town05", 0, 0), ("crest-curve", 9, 0), ("stationary_objects", 7, 1)],
 )
 def test_all_objects_and_signals_are_there(name, objects, signals):
-    road_map = read_map(map_file(name))
+    road_map, _ = loaded(name)
     assert (len(placed_objects(road_map)), len(placed_signals(road_map))) == (objects, signals)
 
 
@@ -65,7 +72,7 @@ def areas(named_polygons):
 
 
 def test_the_figures_of_town05():
-    road_map = read_map(map_file("Town05"))
+    road_map, surfaces = loaded("Town05")
     assert len(road_map.roads) == 259
     assert sum(road.junction_id is not None for road in road_map.roads) == 206
     assert len(road_map.junctions) == 21
@@ -79,14 +86,13 @@ def test_the_figures_of_town05():
         "shoulder": 200,
         "parking": 18,
     }
-    found = areas((surface.lane_type, surface.polygon) for surface in map_lanes(road_map))
+    found = areas((surface.lane_type, surface.polygon) for surface in surfaces)
     assert found["driving"] == pytest.approx((82_184, 71_979), rel=5e-3)
     assert found["sidewalk"][1] == pytest.approx(26_443, rel=5e-3)
 
 
 def test_the_junction_of_town05_near_the_origin():
-    road_map = read_map(map_file("Town05"))
-    surfaces = map_lanes(road_map)
+    road_map, surfaces = loaded("Town05")
     (junction, distance), *others = nearest_junctions(road_map, surfaces, -49.0, -1.0, 3)
     assert distance == 0.0
     assert all(further > 0 for _, further in others)
@@ -97,10 +103,8 @@ def test_the_junction_of_town05_near_the_origin():
 
 
 def test_the_lights_of_town01_stand_beside_the_carriageway():
-    road_map = read_map(map_file("Town01"))
-    carriageway = shapely.union_all(
-        [surface.polygon for surface in map_lanes(road_map) if surface.lane_type == "driving"]
-    )
+    road_map, surfaces = loaded("Town01")
+    carriageway = shapely.union_all([surface.polygon for surface in surfaces if surface.lane_type == "driving"])
     posts = [signal for signal in placed_signals(road_map) if signal.kind == "1000001"]
     assert len(posts) == 36
     assert all(signal.dynamic for signal in posts)

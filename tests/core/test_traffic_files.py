@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic.floating_car_data import (
-    TimeAndPlace,
+    Extent,
     listed,
     read_floating_car_data,
     read_trajectories,
@@ -137,7 +137,7 @@ def test_types_fall_back_to_what_sumo_assumes(tmp_path):
 
 def test_only_the_window_is_kept(tmp_path):
     path = written(tmp_path, "f.xml", FCD)
-    data = read(path, window=TimeAndPlace(begin=0.1, bounds=(0.0, 0.0, 50.0, 50.0)))
+    data = read(path, window=Extent(begin=0.1, bounds=(0.0, 0.0, 50.0, 50.0)))
     assert data.names == ("b",)
     assert data.elsewhere == 1  # a, at 112 m; the walker was there before
     assert data.time.tolist() == [0.2, 0.4]
@@ -234,7 +234,7 @@ def test_a_network_without_offset_is_refused(tmp_path, offset):
 
 
 def test_nobody_near_the_scene_is_refused(tmp_path):
-    data = read(written(tmp_path, "f.xml", FCD), window=TimeAndPlace(bounds=(1e6, 1e6, 2e6, 2e6)))
+    data = read(written(tmp_path, "f.xml", FCD), window=Extent(bounds=(1e6, 1e6, 2e6, 2e6)))
     with pytest.raises(SeipError, match=r"FCD of another map.* none of the 3 road users in f comes near"):
         read_trajectories(data, BUILT_IN, np.zeros(3), "f")
 
@@ -250,7 +250,7 @@ def test_what_lies_elsewhere_takes_no_memory(tmp_path):
             file.writelines(f'<timestep time="{number}">{row}</timestep>' for number in range(steps))
             file.write("</fcd-export>")
         tracemalloc.start()
-        data = read(path, window=TimeAndPlace(bounds=(-1, -1, 1.5, 1)))
+        data = read(path, window=Extent(bounds=(-1, -1, 1.5, 1)))
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         sizes.append(path.stat().st_size)

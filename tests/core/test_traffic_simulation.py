@@ -13,7 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic import CATEGORIES, sumo
 from seip_addon.core.traffic.demand import MIX, MODELS, Demand, write_routes
-from seip_addon.core.traffic.floating_car_data import TimeAndPlace, read_floating_car_data, read_trajectories
+from seip_addon.core.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
 from seip_addon.core.traffic.street_network import DRIVING, PARKING, WALKING, read_network
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 
@@ -180,13 +180,13 @@ def run(tmp_path_factory):
 def test_the_same_seed_gives_the_same_traffic(tmp_path, run):
     one, same = run, simulated(tmp_path / "same", JUNCTION)
     other = simulated(tmp_path / "other", JUNCTION, seed=4)
-    assert rows(one.floating_car_data) == rows(same.floating_car_data)
-    assert rows(one.floating_car_data) != rows(other.floating_car_data)
+    assert rows(one.path) == rows(same.path)
+    assert rows(one.path) != rows(other.path)
 
 
 @needs_sumo
 def test_sumo_s_csv_says_what_its_xml_says(tmp_path, run):
-    arguments = ["--net-file", run.network, "--route-files", run.routes, "--end", 30, "--step-length", 0.1]
+    arguments = ["--net-file", run.net, "--route-files", *run.routes, "--end", 30, "--step-length", 0.1]
     forms = {}
     for name in ("f.xml", "f.csv", "f.xml.gz"):
         more = ["--fcd-output", tmp_path / name, "--precision", 3, "--no-warnings", "true", "--no-step-log", "true"]
@@ -206,7 +206,7 @@ def test_sumo_s_csv_says_what_its_xml_says(tmp_path, run):
 
 @needs_sumo
 def test_crossings_lie_on_the_painted_crosswalks_and_vehicles_stop_before_them(run):
-    root = ET.parse(run.network).getroot()  # noqa: S314  # written just now
+    root = ET.parse(run.net).getroot()  # noqa: S314  # written just now
     crossings = [lane.get("shape") for edge in root.iter("edge") if edge.get("function") == "crossing" for lane in edge]
     assert len(crossings) == 4
     middles = np.array(
@@ -214,7 +214,7 @@ def test_crossings_lie_on_the_painted_crosswalks_and_vehicles_stop_before_them(r
     )
     distance = np.hypot(*middles.T)
     np.testing.assert_allclose(distance, 15.0 + 3.0, atol=0.1)  # arms begin at 15 m, crosswalks lie 1 to 5 m along
-    streets = read_network(run.network)
+    streets = read_network(run.net)
     ends = [np.hypot(*edge.of(DRIVING)[-1].line[-1]) for edge in streets.arms]
     assert len(ends) == 4
     assert min(ends) == pytest.approx(20.0, abs=0.3)
@@ -227,11 +227,11 @@ def test_town05_is_cut_to_the_scene(tmp_path):
     if not path.is_file():
         pytest.skip(f"no {path}")
     files = simulated(tmp_path / "town", path, duration=40.0, bounds=(-129.0, -81.0, 31.0, 79.0))
-    streets = read_network(files.network)
+    streets = read_network(files.net)
     assert 10 <= len(streets.edges) <= 60
     assert len(streets.arms) >= 4
-    data = finish(read_floating_car_data(files.floating_car_data, window=TimeAndPlace(begin=20.0)))
-    types = finish(read_vehicle_types([files.routes]))
+    data = finish(read_floating_car_data(files.path, window=Extent(begin=20.0)))
+    types = finish(read_vehicle_types(files.routes))
     trajectories, warnings = read_trajectories(data, types, np.zeros(3), "Town05")
     assert len(trajectories) > 20
     assert not warnings

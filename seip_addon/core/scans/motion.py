@@ -35,13 +35,13 @@ class Motion:
     attitude: Float
 
     @property
-    def stays(self) -> bool:
+    def is_still(self) -> bool:
         """Whether it is at one place in one attitude all the time."""
         return len(self.delay) == 1
 
     def same_as(self, other: Motion | None) -> bool:
         """Whether both stay, at one place and in one attitude."""
-        if other is None or not (self.stays and other.stays):
+        if other is None or not (self.is_still and other.is_still):
             return False
         return all(
             (one == two).all()

@@ -78,7 +78,7 @@ class BodySurface(ReflectiveSurface):
         placed: Float = motion.position[:, None] + corners @ motion.attitude.transpose(0, 2, 1)
         return placed.reshape(-1, 3)
 
-    def may_be_met(self, origin: Float, directions: Float, reach: float) -> Boolean:
+    def may_hit(self, origin: Float, directions: Float, reach: float) -> Boolean:
         """Tell which rays pass through the bounding box within so many metres, by its slabs (Kay and Kajiya 1986).
 
         Parameters
@@ -137,9 +137,9 @@ class Scan:
         That the ray's return is not lost.
     instance : (r,) int32
         Road user, or `STATIC`.
-    could : (u,) int64
+    unoccluded : (u,) int64
         For each of the trajectories' road users, how many rays would return from it with nothing else there.
-    met : (u,) int64
+    visible : (u,) int64
         How many of these do.
     """
 
@@ -147,8 +147,8 @@ class Scan:
     intensity: Float
     chance: NDArray[np.float32]
     instance: NDArray[np.int32]
-    could: Integer
-    met: Integer
+    unoccluded: Integer
+    visible: Integer
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ class Scanner:
             self._distance[hits.ray], reflected[hits.ray] = hits.distance, hits.reflected
         self._intensity = return_intensity(self._model, self._distance, reflected)
         self._chance = return_chance(sensor.model, self._distance, self._intensity).astype(np.float32)
-        self._stood: dict[int, tuple[Motion, _Hits]] = {}
+        self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
 
     @property
     def sees_nothing(self) -> bool:
@@ -211,9 +211,9 @@ class Scanner:
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
         reflected = np.empty(len(distance))
         instance = np.full(len(distance), STATIC, dtype=np.int32)
-        could = np.zeros(users, dtype=np.int64)
+        unoccluded = np.zeros(users, dtype=np.int64)
         for motion, hits in self._hits(traffic):
-            could[motion.user] = self.in_range(hits.distance).sum()
+            unoccluded[motion.user] = self.in_range(hits.distance).sum()
             nearest = hits.distance < distance[hits.ray]
             ray = hits.ray[nearest]
             distance[ray], reflected[ray] = hits.distance[nearest], hits.reflected[nearest]
@@ -222,8 +222,8 @@ class Scanner:
         far = distance[on_traffic]
         intensity[on_traffic] = return_intensity(self._model, far, reflected[on_traffic])
         chance[on_traffic] = return_chance(self._model, far, intensity[on_traffic])
-        met = by_user(instance[on_traffic[self.in_range(far)]], users)
-        return Scan(distance, intensity, chance, instance, could, met)
+        visible = returns_by_user(instance[on_traffic[self.in_range(far)]], users)
+        return Scan(distance, intensity, chance, instance, unoccluded, visible)
 
     def in_range(self, distance: Float) -> Boolean:
         """Tell which distances the sensor can measure."""
@@ -231,7 +231,7 @@ class Scanner:
 
     def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:
         """Return what the rays meet of each road user if nothing else is there; of one that stood still, as before."""
-        stood, self._stood = self._stood, {}
+        stood, self._still_hits = self._still_hits, {}
         if not traffic.motions:
             return
         hull, ray = self._windows.rays_towards((traffic.hulls - self.sensor.xyz) @ self.sensor.orientation)
@@ -239,24 +239,24 @@ class Scanner:
         for number, (motion, shape) in enumerate(zip(traffic.motions, traffic.shapes, strict=True)):
             before, hits = stood.get(motion.user, (None, None))
             if hits is None or not motion.same_as(before):
-                hits = self._meet(shape, motion, ray[first[number] : first[number + 1]])
-            if motion.stays:
-                self._stood[motion.user] = motion, hits
+                hits = self._cast_at(shape, motion, ray[first[number] : first[number + 1]])
+            if motion.is_still:
+                self._still_hits[motion.user] = motion, hits
             yield motion, hits
 
-    def _meet(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:
+    def _cast_at(self, shape: BodySurface, motion: Motion, ray: Integer) -> _Hits:
         """Cast rays against one road user, in its axes."""
         directions = self.directions.take(ray, axis=0)
-        if motion.stays:
+        if motion.is_still:
             origin = motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None]
             directions = motion.attitude[0].T @ directions.T
         else:
             position, attitude = motion.at(self.delay[ray % self._steps])
             origin = np.einsum("ni,nij->jn", self.sensor.xyz - position, attitude)
             directions = np.einsum("ni,nij->jn", directions, attitude)
-        met = np.flatnonzero(shape.may_be_met(origin, directions, self._model.max_range))
-        start = origin[:, 0] if motion.stays else origin[:, met].T
-        return self._cast(shape, start, directions[:, met].T, ray[met])
+        passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))
+        start = origin[:, 0] if motion.is_still else origin[:, passing].T
+        return self._cast(shape, start, directions[:, passing].T, ray[passing])
 
     def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer) -> _Hits:
         distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
@@ -264,6 +264,6 @@ class Scanner:
         return _Hits(ray[hit], distance[hit], surface.reflected(directions[hit], triangle[hit]))
 
 
-def by_user(instance: NDArray[np.int32], users: int) -> Integer:
+def returns_by_user(instance: NDArray[np.int32], users: int) -> Integer:
     """Return how many of some returns are from each of so many road users, (u,)."""
     return np.bincount(instance[instance != STATIC], minlength=users)

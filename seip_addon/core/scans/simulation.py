@@ -21,7 +21,7 @@ from ..traffic.bodies import Body
 from ..visibility.ray_casting import Engine, make_ray_caster
 from .frame import Frame, Labels
 from .motion import moving, rotations, still
-from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, by_user
+from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, returns_by_user
 from .sensor import MountedSensor
 from .static_scene import StaticScene
 
@@ -126,8 +126,8 @@ class Simulation:
         size = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
         up = rotations(snapshot.yaw, snapshot.pitch)[:, :, 2]
         centre = snapshot.position + up * size[:, 2:] / 2
-        could = np.sum([scan.could for scan in scans], axis=0)
-        met = np.sum([scan.met for scan in scans], axis=0)
+        unoccluded = np.sum([scan.unoccluded for scan in scans], axis=0)
+        visible = np.sum([scan.visible for scan in scans], axis=0)
         return Labels(
             user=snapshot.user,
             category=np.array([user.category for user in users], dtype=np.str_),
@@ -136,8 +136,8 @@ class Simulation:
             yaw=(snapshot.yaw + math.pi) % (2 * math.pi) - math.pi,
             pitch=snapshot.pitch,
             speed=snapshot.speed,
-            points=np.stack([by_user(instance, most)[snapshot.user] for instance in instances], axis=1),
-            visibility=(met / np.maximum(could, 1))[snapshot.user],
+            points=np.stack([returns_by_user(instance, most)[snapshot.user] for instance in instances], axis=1),
+            visibility=(visible / np.maximum(unoccluded, 1))[snapshot.user],
             inside=self._static.inside(centre),
         )
 

@@ -174,11 +174,11 @@ def read_site_description(path: Path) -> SiteDescription:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no UTF-8 text"
         raise SeipError(f"cannot read the site description {path}: {reason}") from error
-    keys = _PLACE | {name: Key(_tables(name), ()) for name in _THINGS}
+    keys = _PLACE | {name: Key(_tables(name), ()) for name in _LISTED}
     values = read_table(parse_toml(written, str(path)), str(path), keys)
-    for name, (make, own) in _THINGS.items():
+    for name, (make, own) in _LISTED.items():
         numbered = enumerate(values.pop(name), start=1)
-        values[f"{name}s"] = tuple(_thing(table, f"{path}, {name} {number}", make, own) for number, table in numbered)
+        values[f"{name}s"] = tuple(_listed(table, f"{path}, {name} {number}", make, own) for number, table in numbered)
     if values["map"] is not None:
         values["map"] = path.parent / values["map"]
     description = SiteDescription(**values)
@@ -242,7 +242,7 @@ def _described(source: Path, site: Path | None) -> SiteDescription:
     return replace(SiteDescription() if site is None else read_site_description(site), map=source)
 
 
-def _thing(table: dict[str, Any], where: str, make: Callable[..., Any], keys: Mapping[str, Key]) -> Any:  # noqa: ANN401
+def _listed(table: dict[str, Any], where: str, make: Callable[..., Any], keys: Mapping[str, Key]) -> Any:  # noqa: ANN401
     values = read_table(table, where, keys)
     try:
         return make(**values)
@@ -356,7 +356,7 @@ _PLACE = {
 }
 """Keys of the file itself."""
 
-_THINGS: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
+_LISTED: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
     "weighted_region": (
         _weighted_region,
         {

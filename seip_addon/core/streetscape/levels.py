@@ -99,7 +99,7 @@ def split_levels(
         return Levels(tuple(surfaces), (), ())
     joined = _joined(roads)
     start = set(level or anchors) & roads.keys()
-    others = _losers(crossings, joined, start)
+    others = _roads_farther_off(crossings, joined, start)
     winners = {road for crossing in crossings for road in (crossing.above, crossing.below)} | start
     to_level, to_others = _hops(joined, winners - others), _hops(joined, others)
     even = {road for road in roads if to_others[road] == to_level[road] < math.inf}
@@ -229,7 +229,7 @@ def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) 
     return ""
 
 
-def _losers(crossings: Iterable[Crossing], joined: Mapping[str, set[str]], start: set[str]) -> set[str]:
+def _roads_farther_off(crossings: Iterable[Crossing], joined: Mapping[str, set[str]], start: set[str]) -> set[str]:
     """Return of each two roads that cross the one that more joints part from the place."""
     hops = _hops(joined, start)
     losers = set()

@@ -117,7 +117,6 @@ class _Surroundings:
     lanes: tuple[LaneSurface, ...]
     region: BaseGeometry
     extent: BaseGeometry
-    carriageway: BaseGeometry
     roadside: Roadside
     terrain: Terrain
 
@@ -168,7 +167,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     ]
     others, lights = split_posts(placed, hung, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
-    things = [_on_level(part, street) for part in object_parts(others, street.carriageway)]
+    things = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
     other_levels, below = _other_level_parts(levels.others, street)
     furniture = [*things, *signals, *_described_parts(description, street)]
     yield next(stages)
@@ -270,7 +269,7 @@ def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGe
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
-    return _Surroundings(origin, lanes, region, extent, roadside.carriageway, roadside, Terrain(triangles))
+    return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles))
 
 
 def _surface_parts(street: _Surroundings) -> list[Part]:
@@ -292,7 +291,7 @@ def _pavement_parts(street: _Surroundings, below: BaseGeometry) -> tuple[list[Pa
     if len(own) == 0:
         verge = _verge_strip(street, street.roadside.sides(), below)
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)
-    corners = road_surface.corner_pavements(own, street.lanes, street.carriageway)
+    corners = road_surface.corner_pavements(own, street.lanes, street.roadside.carriageway)
     triangles = np.concatenate([own, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
@@ -415,7 +414,7 @@ def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple
     """Yield foot, heading of the arm and row of each post."""
     for row in rows:
         for foot in _on_ground(row.positions, street):
-            yield foot, arm_heading(foot[:2], street.carriageway) if row.heading is None else row.heading, row
+            yield foot, arm_heading(foot[:2], street.roadside.carriageway) if row.heading is None else row.heading, row
 
 
 def _on_ground(plan: Float, street: _Surroundings) -> Float:

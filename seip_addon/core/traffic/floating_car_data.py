@@ -68,8 +68,8 @@ class FloatingCarData:
     elsewhere: int = 0
 
 
-class TimeAndPlace(NamedTuple):
-    """What of a file to keep: seconds of the simulation, and a rectangle in map coordinates in metres."""
+class Extent(NamedTuple):
+    """What of a file to keep: a span of the simulation in seconds, and a rectangle of the map in metres."""
 
     begin: float = -math.inf
     end: float = math.inf
@@ -77,7 +77,7 @@ class TimeAndPlace(NamedTuple):
 
 
 def read_floating_car_data(
-    path: str | os.PathLike[str], net_offset: Float | None = None, window: TimeAndPlace | None = None
+    path: str | os.PathLike[str], net_offset: Float | None = None, window: Extent | None = None
 ) -> Generator[Progress, None, FloatingCarData]:
     """Read floating car data, as XML or as csv (in either of SUMO's namings), packed with gzip or not.
 
@@ -87,7 +87,7 @@ def read_floating_car_data(
         ``.xml`` or ``.csv``, perhaps with ``.gz``.
     net_offset : (2,) float64, metres, optional
         Of the network: map = network − offset.
-    window : TimeAndPlace, optional
+    window : Extent, optional
         What lies outside is not kept in memory.
 
     Returns
@@ -99,7 +99,7 @@ def read_floating_car_data(
     SeipError
         The file cannot be read, is something else or unfinished, its times run backwards, or a number makes no sense.
     """
-    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or TimeAndPlace())
+    rows = _Rows(Path(path).name, np.zeros(2) if net_offset is None else net_offset, window or Extent())
     suffixes = [suffix.lower() for suffix in Path(path).suffixes if suffix.lower() != ".gz"]
     if suffixes[-1:] == [".csv"]:
         yield from _read_csv(path, rows)
@@ -196,7 +196,7 @@ def unwrapped(yaw: Float, first: Integer) -> Float:
 class _Rows:
     """Rows of a file as they come, in columns that stay small."""
 
-    def __init__(self, file: str, net_offset: Float, window: TimeAndPlace) -> None:
+    def __init__(self, file: str, net_offset: Float, window: Extent) -> None:
         self._file = file
         self._window = window
         self._shift_x, self._shift_y = net_offset.tolist()

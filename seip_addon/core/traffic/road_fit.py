@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -13,8 +13,8 @@ from ..errors import SeipError
 from ..geometry.plan import LEAST_AREA, heights_over, plane_height, signed_area
 from ..site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
-from .smooth_walks import put_elsewhere
-from .trajectories import RoadUser, Trajectories
+from .smooth_walks import out_of_reach
+from .trajectories import LoadedTraffic, RoadUser, Trajectories
 
 TOLERANCE = 1.0
 """Metres in plan that the middle of a road user may be beside the road and still counts as on it.
@@ -32,15 +32,7 @@ _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
 """Of what is kept: a millimetre and a ten-thousandth of a radian, as fine as simulations write."""
 
 
-@dataclass(frozen=True, eq=False)
-class RoadFit:
-    """Trajectories on the road of a scene, and what a user should know of them (one sentence each)."""
-
-    trajectories: Trajectories
-    warnings: tuple[str, ...]
-
-
-def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
+def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTraffic:
     """Put road users on the road of a scene, and leave out where they are off it.
 
     Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
@@ -54,7 +46,7 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
 
     Returns
     -------
-    RoadFit
+    LoadedTraffic
         In the local axes of the scene, to the millimetre, with pitches.
 
     Raises
@@ -83,7 +75,7 @@ def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> RoadFit:
     length = np.array([each.length for each in local.users])[user]
     pitch = np.where(walks, 0.0, _pitch(height, plan, z, local.yaw, length))
     fitted = replace(local, position=np.column_stack([plan, z]), pitch=pitch)
-    return RoadFit(_rounded(_without_gaps(fitted, user, on_road)), warnings)
+    return LoadedTraffic(_rounded(_without_gaps(fitted, user, on_road)), warnings)
 
 
 class _RoadSurface:
@@ -164,7 +156,7 @@ def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> T
     user, time = user[kept], trajectories.time[kept]
     new = np.ones(len(kept), dtype=np.bool_)
     new[1:] = (np.diff(user) != 0) | (np.diff(kept) > 1) | (np.diff(time) > _longest_gap(trajectories))
-    new[1:] |= put_elsewhere(trajectories)[kept[1:] - 1]
+    new[1:] |= out_of_reach(trajectories)[kept[1:] - 1]
     begin = np.flatnonzero(new)
     end = np.append(begin[1:], len(kept))
     stays = end - begin > 1

@@ -16,7 +16,7 @@ FARTHEST_LEAP = 4.0
 """Metres beyond what its speed explains: who moves further than that between two samples was put somewhere else."""
 
 
-def put_elsewhere(trajectories: Trajectories) -> Boolean:
+def out_of_reach(trajectories: Trajectories) -> Boolean:
     """Return whether each of the n samples but the first, (n - 1,) bool, is out of reach from the one before.
 
     The speeds at both are believed up to half as much again. The first sample of a road user is compared with the last
@@ -24,8 +24,8 @@ def put_elsewhere(trajectories: Trajectories) -> Boolean:
     """
     step = np.hypot(*np.diff(trajectories.position[:, :2], axis=0).T)
     speed = np.maximum(trajectories.speed[1:], trajectories.speed[:-1])
-    out_of_reach: Boolean = step > 1.5 * speed * np.abs(np.diff(trajectories.time)) + FARTHEST_LEAP
-    return out_of_reach
+    leaps: Boolean = step > 1.5 * speed * np.abs(np.diff(trajectories.time)) + FARTHEST_LEAP
+    return leaps
 
 
 def smooth_walks(trajectories: Trajectories) -> Trajectories:
@@ -34,7 +34,7 @@ def smooth_walks(trajectories: Trajectories) -> Trajectories:
     At the ends of a walk, and where a pedestrian was put somewhere else, the window shrinks to what is there.
     """
     position, yaw = trajectories.position.copy(), trajectories.yaw.copy()
-    leaps = np.flatnonzero(put_elsewhere(trajectories)) + 1
+    leaps = np.flatnonzero(out_of_reach(trajectories)) + 1
     for user, begin, end in zip(trajectories.users, trajectories.first[:-1], trajectories.first[1:], strict=True):
         if user.category != "pedestrian" or end - begin < 3:
             continue

@@ -14,11 +14,11 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..progress import Progress
 from ..site.scene_geometry import SceneGeometry, joined
-from .floating_car_data import TimeAndPlace, read_floating_car_data, read_trajectories
+from .floating_car_data import Extent, read_floating_car_data, read_trajectories
 from .overlaps import find_overlaps
 from .road_fit import fit_to_road
 from .sumo_files import read_net_offset
-from .trajectories import CATEGORIES, Trajectories
+from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
 FAR = 500.0
@@ -59,20 +59,6 @@ class TrafficFiles:
         return self.path.suffix.lower() == ".npz"
 
 
-@dataclass(frozen=True, eq=False)
-class LoadedTraffic:
-    """Traffic in a scene's axes, and what a user should know of it.
-
-    Parameters
-    ----------
-    warnings : tuple of str
-        One sentence each.
-    """
-
-    trajectories: Trajectories
-    warnings: tuple[str, ...]
-
-
 def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Progress, None, LoadedTraffic]:
     """Read traffic for a scene.
 
@@ -84,7 +70,7 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
     if files.trajectories:
         yield Progress(0, 0, "trajectories")
         return LoadedTraffic(load_trajectories(files.path, geometry), ())
-    window = TimeAndPlace(files.begin, files.end, road_bounds(geometry, MARGIN))
+    window = Extent(files.begin, files.end, road_bounds(geometry, MARGIN))
     read = yield from read_sumo(files, window, geometry.origin, files.path.name)
     fit = fit_to_road(read.trajectories, geometry)
     overlaps = yield from overlap_warnings(fit.trajectories)
@@ -109,7 +95,7 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
 
 
 def read_sumo(
-    files: TrafficFiles, window: TimeAndPlace, origin: Float, source: str
+    files: TrafficFiles, window: Extent, origin: Float, source: str
 ) -> Generator[Progress, None, LoadedTraffic]:
     """Read floating car data with the sizes of its vehicles; not put on the road yet.
 

@@ -21,6 +21,7 @@ from ..opendrive.road_map import RoadMap
 from ..progress import Progress, in_thread
 from ..storage.files import whole_file
 from .demand import Demand, write_routes
+from .source import TrafficFiles
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
 STEP = 0.1
@@ -91,15 +92,6 @@ class Scenario:
             raise SeipError(f"a simulation must last above 0 s and at most a day, not {self.duration:g} s")
 
 
-@dataclass(frozen=True)
-class SimulationFiles:
-    """What a simulation leaves: floating car data, the route file with the vehicle types, and the network."""
-
-    floating_car_data: Path
-    routes: Path
-    network: Path
-
-
 def find_sumo() -> Sumo:
     """Find SUMO's programs: on the PATH, or in the package ``eclipse-sumo`` of this Python.
 
@@ -120,7 +112,7 @@ def find_sumo() -> Sumo:
 
 def simulate(
     map_path: Path, folder: Path, scenario: Scenario, bounds: tuple[float, float, float, float] | None = None
-) -> Generator[Progress, None, SimulationFiles]:
+) -> Generator[Progress, None, TrafficFiles]:
     """Simulate traffic on an OpenDRIVE map from 0 to the scenario's duration.
 
     Parameters
@@ -134,7 +126,7 @@ def simulate(
 
     Returns
     -------
-    SimulationFiles
+    TrafficFiles
         Byte for byte the same for the same arguments, but for the dates in SUMO's comments.
 
     Raises
@@ -143,14 +135,14 @@ def simulate(
         SUMO is missing or refuses its input, or the map has no road that leads in.
     """
     programs = find_sumo()
-    files = SimulationFiles(folder / "traffic.fcd.xml", folder / "traffic.rou.xml", folder / "traffic.net.xml")
-    yield from _network(programs, map_path, files.network, scenario.signals, bounds)
-    write_routes(files.routes, read_network(files.network), scenario.demand, scenario.seed, scenario.duration)
+    recorded, routes, network = (folder / f"traffic.{kind}.xml" for kind in ("fcd", "rou", "net"))
+    yield from _network(programs, map_path, network, scenario.signals, bounds)
+    write_routes(routes, read_network(network), scenario.demand, scenario.seed, scenario.duration)
     yield from _run(
         programs,
         programs.sumo,
         [
-            *("--net-file", files.network, "--route-files", files.routes, "--fcd-output", files.floating_car_data),
+            *("--net-file", network, "--route-files", routes, "--fcd-output", recorded),
             *("--seed", scenario.seed, "--end", scenario.duration, "--step-length", STEP, "--precision", 3),
             *("--device.fcd.period", SAMPLING, "--person-device.fcd.period", SAMPLING),
             *("--lanechange.duration", _LANE_CHANGE, "--time-to-teleport", -1),
@@ -159,7 +151,7 @@ def simulate(
         ],
         "simulating traffic",
     )
-    return files
+    return TrafficFiles(recorded, (routes,), network)
 
 
 def _network(

@@ -203,6 +203,14 @@ class Trajectories:
             return read
 
 
+@dataclass(frozen=True, eq=False)
+class LoadedTraffic:
+    """Trajectories, and what a user should know before trusting them (one sentence each)."""
+
+    trajectories: Trajectories
+    warnings: tuple[str, ...]
+
+
 def _check_users(users: tuple[RoadUser, ...]) -> None:
     """Raise `ContentError` where a road user is none."""
     for user in users:
