@@ -17,8 +17,8 @@ from headless import session, survey
 from headless.charts.traffic import save_promise_chart, save_time_map
 from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
-from seip_addon.core.placement.goal import Plan, check_goal
-from seip_addon.core.robustness.traffic_study import WHAT, InTraffic, TrafficStudy
+from seip_addon.core.placement.objective import Solution, check_objective
+from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
 from seip_addon.core.workflows.survey import Layout
 from seip_addon.core.workflows.traffic import (
     TrafficRuns,
@@ -35,7 +35,7 @@ def main(argv: list[str]) -> None:
     """Place sensors for the road in traffic and write the result to a folder."""
     options = _parser().parse_args(argv)
     goal, settings = read_goal(options), read_settings(TrafficSettings, options)
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     layout = surveyed.layout
     runs = _read_runs(options, layout)
     session.LOG.info(runs.overlap)
@@ -59,17 +59,17 @@ def _read_runs(options: argparse.Namespace, layout: Layout) -> TrafficRuns:
     return independent_runs({str(path): run for path, run in zip(paths, loaded, strict=True)}, layout.site)
 
 
-def _in_words(study: TrafficStudy, plan: Plan) -> str:
+def _in_words(study: TrafficStudy, plan: Solution) -> str:
     sensors = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    won = f"placing on traffic sees {study.won(study.layer).in_words()} more of the {WHAT[study.layer]}"
+    won = f"placing on traffic sees {study.won(study.layer).describe()} more of the {WHAT[study.layer]}"
     doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)
     return "\n".join([*sensors, *seen, won, plan.certificate, *doubt, *plan.placement.notes])
 
 
-def _share(placed: InTraffic) -> str:
+def _share(placed: JudgedInTraffic) -> str:
     return "; ".join(
-        f"{seen.held.in_words()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
+        f"{seen.held.describe()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
         for layer, seen in placed.seen.items()
     )
 

@@ -9,7 +9,7 @@ from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.goal import Goal
+from seip_addon.core.placement.objective import Objective
 from seip_addon.core.settings import Setting, settings_of
 
 Options = TypeVar("Options")
@@ -48,16 +48,16 @@ def read_settings(kind: type[Options], options: argparse.Namespace, **values: An
 def add_goal(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     """Add what a goal is made of to a command, but for a coverage to reach, and return the group."""
     goal = parser.add_argument_group("goal")
-    add_settings(goal, Goal, "count", "budget")
+    add_settings(goal, Objective, "count", "budget")
     goal.add_argument("--weighted", action="store_true", help="count targets by the weights of their regions")
-    add_settings(goal, Goal, "central_weight", "min_distance", "forbidden", "mandatory")
+    add_settings(goal, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
     return goal
 
 
-def read_goal(options: argparse.Namespace) -> Goal:
+def read_goal(options: argparse.Namespace) -> Objective:
     """Return the goal that options of `add_goal` name."""
     weight = "scene" if options.weighted and options.central_weight is None else options.central_weight
-    return read_settings(Goal, options, central_weight=weight)
+    return read_settings(Objective, options, central_weight=weight)
 
 
 def _option(name: str, about: Setting) -> str:

@@ -18,7 +18,7 @@ from headless import session, survey
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
 from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
-from seip_addon.core.placement.goal import check_goal
+from seip_addon.core.placement.objective import check_objective
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.workflows.robust import RobustnessSettings, RobustPlan, place_robustly
@@ -30,7 +30,7 @@ def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
     goal, robustness = read_goal(options), _precaution(options)
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
     plan, study = robust.plan, robust.study
@@ -52,10 +52,10 @@ def _in_words(robust: RobustPlan) -> str:
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, the nominal optimum's {nominal.planned:.2%}",
-            f"over {study.settings.unseen} unseen draws, {chosen.judged_by.outcome_in_words()}:",
-            f"mean {chosen.mean.in_words()}, the nominal optimum's {nominal.mean.in_words()}",
-            f"5 % quantile {chosen.low.in_words()}, the nominal optimum's {nominal.low.in_words()}",
-            f"which is {study.saving(chosen).in_words()} more, draw for draw",
+            f"over {study.settings.unseen} unseen draws, {chosen.judged_by.describe_outcome()}:",
+            f"mean {chosen.mean.describe()}, the nominal optimum's {nominal.mean.describe()}",
+            f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
+            f"which is {study.saving(chosen).describe()} more, draw for draw",
             plan.certificate,
             *plan.placement.notes,
         ]

@@ -21,7 +21,7 @@ from headless.lab.stability.page import load_chapter, save_chapter, save_page
 from headless.options import new_parser
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, check_goal
+from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, check_objective
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 from seip_addon.core.workflows.survey import grid_key
@@ -39,7 +39,7 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     session.check_folder(charts)
     surveyed = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
-        lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
+        lambda site, models: check_objective(site, models, Objective(count=DEFAULT_COUNT)),
     )
     runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
     stage = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())

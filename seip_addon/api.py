@@ -16,7 +16,7 @@ Examples
 >>> grid = seip.compute_visibility(layout)
 >>> grid.visible.shape
 (36, 306)
->>> plan = seip.place(layout, grid, seip.Goal(count=2))
+>>> plan = seip.place(layout, grid, seip.Objective(count=2))
 >>> plan.placement.status, round(plan.deployment.coverage, 4)
 ('optimal', 0.8922)
 >>> traffic = seip.load_traffic("scenes/junction_traffic/run-1.npz", geometry)
@@ -30,7 +30,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .core.placement.goal import Goal, Plan
+from .core.placement.objective import Objective, Solution
 from .core.progress import finish
 from .core.scans import Frame, MountedSensor, ScanSettings
 from .core.site.candidates import CandidateSettings
@@ -47,7 +47,7 @@ from .core.workflows.survey import place as _place
 
 __all__ = [
     "CandidateSettings",
-    "Goal",
+    "Objective",
     "ScanSettings",
     "SurveySettings",
     "VisibilitySettings",
@@ -100,12 +100,12 @@ def compute_visibility(layout: Layout, threads: int | None = None) -> Visibility
     return finish(_compute(layout.site, layout.models, settings.visibility, settings.engine, threads=threads))
 
 
-def place(layout: Layout, grid: VisibilityGrid, goal: Goal) -> Plan:
+def place(layout: Layout, grid: VisibilityGrid, goal: Objective) -> Solution:
     """Solve the placement problem.
 
     Returns
     -------
-    Plan
+    Solution
         Its ``placement`` holds the chosen candidates with objective, bound and gap, its ``deployment`` the sensors with
         coverage and price.
 
@@ -123,7 +123,7 @@ def load_traffic(path: str | os.PathLike[str], geometry: SceneGeometry) -> Traje
 
 
 def scan(
-    geometry: SceneGeometry, plan: Plan, traffic: Trajectories, time: float, settings: ScanSettings | None = None
+    geometry: SceneGeometry, plan: Solution, traffic: Trajectories, time: float, settings: ScanSettings | None = None
 ) -> Frame:
     """Scan traffic at a time in seconds with the sensors of a placement.
 

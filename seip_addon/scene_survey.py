@@ -16,7 +16,7 @@ import bpy
 
 from . import preferences
 from .core.errors import SeipError
-from .core.placement.goal import MOVED
+from .core.placement.objective import MOVED
 from .core.progress import Progress
 from .core.results.placement_record import Record, parsed_record
 from .core.visibility.grid import VisibilityGrid

@@ -20,7 +20,7 @@ from .background import Background
 from .core.arrays import Boolean
 from .core.errors import SeipError
 from .core.lidar import LidarModel
-from .core.placement.goal import Plan
+from .core.placement.objective import Solution
 from .core.scans import Frame, MountedSensor, Simulation
 from .core.scans.run_folder import Run
 from .core.storage.files import check_folder
@@ -89,7 +89,7 @@ class SceneSurvey:
         Of that layout.
     estimate : Estimate or None
         Of what the grid will take.
-    plan : Plan or None
+    plan : Solution or None
         Of that grid: the one that the scene's result tells of.
     record : str
         The result that the plan was taken from.
@@ -105,7 +105,7 @@ class SceneSurvey:
     warnings: tuple[str, ...] = ()
     grid: VisibilityGrid | None = None
     estimate: Estimate | None = None
-    plan: Plan | None = None
+    plan: Solution | None = None
     record: str = ""
     durations: Mapping[str, float] = field(default_factory=dict)
 

@@ -1,4 +1,4 @@
-"""Plan view of one frame with road users, detections and errors."""
+"""Solution view of one frame with road users, detections and errors."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import PercentFormatter
 
-from seip_addon.core.estimates import Estimate
+from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.pictures.palette import SOFT_INK
 from seip_addon.core.robustness.pose_study import PoseStudy
 from seip_addon.core.robustness.robust_study import Contender, RobustStudy
@@ -90,18 +90,18 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
 
 def _outcome(study: RobustStudy) -> str:
     """Name what placements are judged by, if it is one thing."""
-    return study.nominal[0].judged_by.outcome_in_words() if len(study.nominal) == 1 else "coverage"
+    return study.nominal[0].judged_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
     """Name a placement, and the nominal optimum, of which there are several then, with what it is judged by."""
     several = len(study.nominal) > 1 and contender in study.nominal
-    name = f"{contender.name}: {contender.judged_by.outcome_in_words()}" if several else contender.name
+    name = f"{contender.name}: {contender.judged_by.describe_outcome()}" if several else contender.name
     return fill(name, LEGEND)
 
 
 def _interval(  # what is drawn, where, and how
-    axes: Axes, estimate: Estimate, height: float, shown: str, marker: str, label: str | None
+    axes: Axes, estimate: IntervalEstimate, height: float, shown: str, marker: str, label: str | None
 ) -> None:
     axes.plot(interval_ends(estimate), [height, height], color=shown, linewidth=2.4)
     axes.plot(estimate.value, height, marker=marker, color=shown, linestyle="none", label=label)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from seip_addon.core.estimates import Estimate
+from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
@@ -80,7 +80,7 @@ def save_chart(path: str | os.PathLike[str], figure: Figure, title: str, panels:
     save_png(path, figure)
 
 
-def interval_ends(estimate: Estimate) -> tuple[float, float]:
+def interval_ends(estimate: IntervalEstimate) -> tuple[float, float]:
     """Return the ends of an interval; an open end is drawn at the value."""
     low, high = (end if math.isfinite(end) else estimate.value for end in (estimate.low, estimate.high))
     return low, high

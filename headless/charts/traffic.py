@@ -16,13 +16,13 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import Estimate
+from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
 from seip_addon.core.pictures.drawing import draw_sensors
 from seip_addon.core.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
 from seip_addon.core.pictures.plan_view import CRACK, draw_area
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.robustness.traffic_study import WHAT, InTraffic, TrafficStudy
+from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.target_squares import target_squares
@@ -41,7 +41,7 @@ def save_time_map(  # what is drawn, and where
     geometry: SceneGeometry,
     site: Site,
     deployment: Deployment,
-    placed: InTraffic,
+    placed: JudgedInTraffic,
     title: str,
 ) -> None:
     """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
@@ -51,7 +51,7 @@ def save_time_map(  # what is drawn, and where
     figure, panels = new_figure(SIDE * len(placed.seen) + 0.9, SIDE * shape + 0.9, len(placed.seen))
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
-        panel.set_title(f"{WHAT[layer]}: {seen.held.in_words(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
+        panel.set_title(f"{WHAT[layer]}: {seen.held.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
         panel.set(xticks=(), yticks=())
         _draw_shares(panel, site, seen.time)
         _draw_place(panel, geometry)
@@ -75,7 +75,12 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
     rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
-    _bars(shares, -1, [Estimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "promised, empty road")
+    _bars(
+        shares,
+        -1,
+        [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
+        "promised, empty road",
+    )
     _bars(shares, 0, [empty.held for empty, _ in rows], "held in traffic")
     _bars(shares, 1, [traffic.held for _, traffic in rows], "held, placed on traffic")
     shares.set_ylabel(f"share of the {WHAT[studies[0][1].layer]} seen", color=INK)
@@ -92,9 +97,9 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     save_chart(path, figure, title)
 
 
-def negative(estimate: Estimate) -> Estimate:
+def negative(estimate: IntervalEstimate) -> IntervalEstimate:
     """Return the estimate of what has the opposite sign."""
-    return Estimate(-estimate.value, -estimate.high, -estimate.low)
+    return IntervalEstimate(-estimate.value, -estimate.high, -estimate.low)
 
 
 def _draw_shares(panel: Axes, site: Site, time: Float) -> None:
@@ -112,7 +117,7 @@ def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
     draw_area(panel, closed(geometry.region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
 
 
-def _bars(axes: Axes, place: int, estimates: Sequence[Estimate], label: str) -> None:
+def _bars(axes: Axes, place: int, estimates: Sequence[IntervalEstimate], label: str) -> None:
     at = np.arange(len(estimates)) + place * THIRD
     values = np.array([estimate.value for estimate in estimates])
     axes.bar(at, values, width=0.9 * THIRD, color=(SEEN_COLOURS[1], SERIES[1], SERIES[2])[place + 1], label=label)
@@ -120,7 +125,7 @@ def _bars(axes: Axes, place: int, estimates: Sequence[Estimate], label: str) -> 
         axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
 
 
-def _dots(axes: Axes, place: float, estimates: Sequence[Estimate], colour: int, label: str) -> None:
+def _dots(axes: Axes, place: float, estimates: Sequence[IntervalEstimate], colour: int, label: str) -> None:
     at = np.arange(len(estimates)) + place * THIRD
     for x, estimate in zip(at, estimates, strict=True):
         axes.plot([x, x], interval_ends(estimate), color=SERIES[colour], linewidth=2.4)

@@ -13,7 +13,7 @@ from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement import Placement, SolverLimits, solve, solve_greedy
 from seip_addon.core.placement.clock import DEFAULT_LIMITS
 from seip_addon.core.placement.deployment import Deployment, deploy
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.site.site import Site
 
@@ -195,7 +195,7 @@ def solve_cell(
     allowed = site.candidates.sensor == cell.sensor
     if cell.height is not None:
         allowed &= site.candidates.height == cell.height
-    goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
+    goal = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
     placement = yield from solve(problem, limits)
     deployment = deploy(site, models, visible, placement.chosen)

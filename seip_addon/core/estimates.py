@@ -28,7 +28,7 @@ FEWEST_STRETCHES = 4
 
 
 @dataclass(frozen=True)
-class Estimate:
+class IntervalEstimate:
     """A figure and its interval.
 
     Parameters
@@ -41,22 +41,22 @@ class Estimate:
     low: float
     high: float
 
-    def agrees_with(self, other: Estimate) -> bool:
+    def agrees_with(self, other: IntervalEstimate) -> bool:
         """Whether the intervals of two estimates meet."""
         return self.low <= other.high and other.low <= self.high
 
-    def in_words(self, decimals: int = 2) -> str:
+    def describe(self, decimals: int = 2) -> str:
         """Return value and interval as shares in per cent."""
         return f"{self.value:.{decimals}%} [{self.low:.{decimals}%}, {self.high:.{decimals}%}]"
 
-    def in_points(self, decimals: int = 2) -> str:
+    def as_points(self, decimals: int = 2) -> str:
         """Return value and interval as differences of shares, in percentage points."""
         value, low, high = (f"{100 * part:.{decimals}f}" for part in (self.value, self.low, self.high))
         return f"{value} points [{low}, {high}]"
 
 
-def mean_of(values: Float) -> Estimate:
-    """Estimate a mean; its interval is that of the normal approximation, for some thirty draws and more.
+def mean_of(values: Float) -> IntervalEstimate:
+    """IntervalEstimate a mean; its interval is that of the normal approximation, for some thirty draws and more.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ def mean_of(values: Float) -> Estimate:
     """
     mean = math.fsum(values) / len(values)
     if len(values) < 2:
-        return Estimate(mean, -math.inf, math.inf)
+        return IntervalEstimate(mean, -math.inf, math.inf)
     reach = NORMAL * float(values.std(ddof=1)) / math.sqrt(len(values))
-    return Estimate(mean, mean - reach, mean + reach)
+    return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
-def mean_over_time(values: Float, stretch: Integer) -> Estimate:
-    """Estimate a mean of values that depend on each other when they are near in time, by means of stretches.
+def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
+    """IntervalEstimate a mean of values that depend on each other when they are near in time, by means of stretches.
 
     Stretches are taken as independent and as equally long (batch means; Law 2015,
     section 9.5.3), and Student's interval is that of their means.
@@ -87,9 +87,9 @@ def mean_over_time(values: Float, stretch: Integer) -> Estimate:
     means = np.bincount(which, values) / many
     mean, number = math.fsum(values) / len(values), len(many)
     if number < FEWEST_STRETCHES:
-        return Estimate(mean, -math.inf, math.inf)
+        return IntervalEstimate(mean, -math.inf, math.inf)
     reach = student_reach(means)
-    return Estimate(mean, mean - reach, mean + reach)
+    return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
 def student_reach(values: Float | Sequence[float]) -> float:
@@ -186,8 +186,8 @@ def _ranks(values: Float) -> Float:
     return ranks
 
 
-def quantile_of(values: Float, share: float) -> Estimate:
-    """Estimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
+def quantile_of(values: Float, share: float) -> IntervalEstimate:
+    """IntervalEstimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
 
     The number of draws below the true quantile is binomial, so that the order
     statistics between which it lies follow from n and ``share`` alone. The
@@ -204,15 +204,15 @@ def quantile_of(values: Float, share: float) -> Estimate:
     below = _binomial_distribution(number, share)
     first = int(np.searchsorted(below, TAIL, side="right"))  # P(B < first) <= TAIL
     last = int(np.searchsorted(below, 1 - TAIL))  # P(B > last) <= TAIL
-    return Estimate(
+    return IntervalEstimate(
         value=float(ordered[math.ceil(share * number) - 1]),
         low=float(ordered[first - 1]) if first > 0 else -math.inf,
         high=float(ordered[last]) if last < number else math.inf,
     )
 
 
-def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> Estimate:
-    """Estimate by how much a quantile exceeds another's, draw for draw under the same circumstances.
+def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> IntervalEstimate:
+    """IntervalEstimate by how much a quantile exceeds another's, draw for draw under the same circumstances.
 
     The interval is that of `RESAMPLES` resamples of the pairs (the percentile bootstrap, Efron 1979).
 
@@ -229,7 +229,7 @@ def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> 
     rank = math.ceil(share * number) - 1
     picked = np.random.default_rng(seed).integers(0, number, (RESAMPLES, number))
     gains = _at_rank(values[picked], rank) - _at_rank(others[picked], rank)
-    return Estimate(float(_at_rank(values, rank) - _at_rank(others, rank)), *percentiles(gains))
+    return IntervalEstimate(float(_at_rank(values, rank) - _at_rank(others, rank)), *percentiles(gains))
 
 
 def _at_rank(values: Float, rank: int) -> Float:

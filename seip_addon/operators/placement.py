@@ -12,10 +12,10 @@ import bpy
 
 from .. import scene_survey, selection
 from ..core.errors import SeipError
-from ..core.placement.goal import Goal, check_goal
+from ..core.placement.objective import Objective, check_objective
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
-from ..core.workflows.robust import RobustnessSettings, check_robust_goal, place_robustly
+from ..core.workflows.robust import RobustnessSettings, check_robust_objective, place_robustly
 from ..core.workflows.survey import Provenance, place, record_of
 from ..scene.write import write_result
 from ..session import SceneSurvey
@@ -52,15 +52,15 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
 
 def _placed(
     surveying: Generator[Progress, None, SceneSurvey],
-    goal: Goal,
+    goal: Objective,
     robustness: RobustnessSettings | None,
     *,
     pose_errors: bool = False,
 ) -> Generator[Progress, None, SceneSurvey]:
     if robustness is not None:
-        check_robust_goal(goal)
+        check_robust_objective(goal)
     known = yield from surveying
-    check_goal(known.layout.site, known.layout.models, goal)
+    check_objective(known.layout.site, known.layout.models, goal)
     known, grid = yield from scene_survey.with_visibility(known)
     began = time.perf_counter()
     if robustness is None:

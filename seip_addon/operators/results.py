@@ -15,7 +15,7 @@ from mathutils import Vector
 from .. import live_coverage, preferences, scene_status, scene_survey, selection
 from ..core.errors import SeipError
 from ..core.geometry.orientation import describe_tilt
-from ..core.placement.goal import Plan, target_weights
+from ..core.placement.objective import Solution, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.results.placement_record import Record, parsed_record, versions
@@ -141,7 +141,7 @@ def _ranked(
     return known, rank_added(visible, weight, plan.deployment.seen_by > 0, free, MOST_RANKED)
 
 
-def _plan_and_grid(known: SceneSurvey) -> tuple[Plan, VisibilityGrid]:
+def _plan_and_grid(known: SceneSurvey) -> tuple[Solution, VisibilityGrid]:
     if known.plan is None or known.grid is None:
         raise RuntimeError("the work ended without a placement")
     return known.plan, known.grid

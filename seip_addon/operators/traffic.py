@@ -12,7 +12,7 @@ import bpy
 
 from .. import live_scan, preferences, scene_status, scene_survey
 from ..core.errors import SeipError
-from ..core.placement.goal import target_weights
+from ..core.placement.objective import target_weights
 from ..core.progress import Progress, finish
 from ..core.results.placement_record import parsed_record, versions
 from ..core.robustness.traffic_instants import check_runs, spread_instants

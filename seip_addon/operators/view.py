@@ -12,7 +12,7 @@ import bpy
 
 from .. import scene_survey
 from ..core.errors import SeipError
-from ..core.placement.goal import Plan
+from ..core.placement.objective import Solution
 from ..core.progress import Progress
 from ..core.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
@@ -230,7 +230,7 @@ def _save_sheet(path: Path, held: SceneSurvey, view: Any) -> None:  # noqa: ANN4
             save_sheet(path, view, picture)
 
 
-def _plan(held: SceneSurvey) -> Plan:
+def _plan(held: SceneSurvey) -> Solution:
     if held.plan is None:
         raise RuntimeError("a placement was found without its plan")
     return held.plan

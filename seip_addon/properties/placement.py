@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import selection
-from ..core.placement.goal import DEFAULT_COUNT, Goal
+from ..core.placement.objective import DEFAULT_COUNT, Objective
 from ..core.robustness.pose_errors import STEEPEST, PoseErrors
 from ..core.robustness.risk import Risk
 from ..core.workflows.robust import RobustnessSettings
@@ -64,7 +64,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     central_weight: FloatProperty(
         name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
     )
-    min_distance: of_setting(Goal, "min_distance", "Minimum Distance")
+    min_distance: of_setting(Objective, "min_distance", "Minimum Distance")
     objective: EnumProperty(
         name="Optimise for",
         description="Whether the placement trusts the map, or is chosen for what may go wrong",
@@ -100,7 +100,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         search=selection.search_positions,
     )
 
-    def goal(self) -> Goal:
+    def goal(self) -> Objective:
         """Return what is asked, as the core takes it.
 
         Raises
@@ -108,7 +108,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         SeipError
             It contradicts itself.
         """
-        return Goal(
+        return Objective(
             count=self.count if self.limit == "COUNT" else None,
             budget=as_typed(self.budget) if self.limit == "BUDGET" else None,
             coverage=as_typed(self.coverage) / 100 if self.limit == "COVERAGE" else None,

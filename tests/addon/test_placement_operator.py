@@ -118,7 +118,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     scene = bpy.context.scene
     assert session.survey_of(scene) is None
     assert json.loads(scene.seip.result.record) == before
-    for forbidden in ("compute_visibility", "make_plan"):
+    for forbidden in ("compute_visibility", "optimise"):
         monkeypatch.setattr(f"seip_addon.core.visibility.store.{forbidden}", None, raising=False)
         monkeypatch.setattr(f"seip_addon.core.workflows.survey.{forbidden}", None, raising=False)
     assert bpy.ops.seip.rank_candidates() == {"FINISHED"}

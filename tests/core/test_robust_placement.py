@@ -19,7 +19,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_placement import solve_robust
 from seip_addon.core.robustness.robust_search import BestUnderRisk
-from seip_addon.core.robustness.views import Views
+from seip_addon.core.robustness.scenario_visibility import ScenarioVisibility
 
 RISKS = [
     Risk(),
@@ -39,7 +39,7 @@ RISKS = [
 
 
 def pack(views):
-    return Views(np.packbits(views, axis=2), views.shape[2])
+    return ScenarioVisibility(np.packbits(views, axis=2), views.shape[2])
 
 
 @st.composite

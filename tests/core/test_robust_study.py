@@ -15,13 +15,13 @@ from synthetic_junction import junction_site
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement import SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views, draws_for
 from seip_addon.core.robustness.pose_errors import PoseErrors
-from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.settings import VisibilitySettings
 
@@ -34,7 +34,7 @@ def laid_out():
     site = junction_site(positions=12, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
-    goal = placement_problem(site, grid.visible, MODELS, Goal(count=2))
+    goal = placement_problem(site, grid.visible, MODELS, Objective(count=2))
     return around, replace(goal, forbidden=site.candidates.sensor == "type2")
 
 
@@ -50,7 +50,7 @@ def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
     for contender in (nominal, *study.robust):
         chosen = contender.placement.chosen
         drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
-        views = finish(disturbed_views(around, chosen, drawn))
+        views = finish(visibility_under_errors(around, chosen, drawn))
         expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.unseen)]
         assert contender.unseen == pytest.approx(expected, abs=1e-12)
         assert not problem.forbidden[chosen].any()
@@ -104,7 +104,7 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
         for judged in (contender, study_of_losses.beside(contender)):
             chosen = judged.placement.chosen
             drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
-            views = finish(disturbed_views(around, chosen, drawn))
+            views = finish(visibility_under_errors(around, chosen, drawn))
             expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.unseen)]
             assert judged.unseen == pytest.approx(expected, abs=1e-12)
             assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
@@ -112,7 +112,7 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
 
 
 def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
-    low = study.robust[0].low.in_words()
+    low = study.robust[0].low.describe()
     assert f"5 % quantile of coverage {low} against" in robust_rows(study)[0].begins
     first, second, third, fourth = (row.begins for row in robust_rows(study_of_losses))
     assert "5 % quantile of coverage after the loss of the most important sensor" in first
@@ -136,16 +136,16 @@ def test_poses_of_one_place_err_alike(laid_out):
     around, _ = laid_out
     poses = np.arange(len(around.site.candidates))
     drawn, _ = draws_for(around, poses, PoseErrors(), 2, 0)
-    together = finish(disturbed_views(around, poses, drawn))
+    together = finish(visibility_under_errors(around, poses, drawn))
     some = np.array([3, 8])
     alone, _ = draws_for(around, some, PoseErrors(), 2, 0)
-    assert (finish(disturbed_views(around, some, alone)).packed == together.packed[:, some]).all()
+    assert (finish(visibility_under_errors(around, some, alone)).packed == together.packed[:, some]).all()
 
 
 def test_charts_are_drawn(laid_out, study, tmp_path):
     around, problem = laid_out
     deployment = deploy(around.site, MODELS, problem.visible, study.nominal[0].placement.chosen)
-    judged = finish(pose_study(around, deployment, StudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
+    judged = finish(pose_study(around, deployment, PoseStudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
     save_spread_chart(tmp_path / "spread.png", study, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study, "frontier")
     save_blame_chart(tmp_path / "blame.png", judged, "blame")

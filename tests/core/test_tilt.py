@@ -19,10 +19,10 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import angles_of, describe_tilt, orientation, orientations, turned
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal
+from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views
 from seip_addon.core.robustness.pose_errors import PoseDraws
+from seip_addon.core.robustness.visibility_under_errors import Surroundings, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.candidates import CandidateSettings, lay_candidates, tilts_of
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
@@ -254,7 +254,7 @@ def test_disturbed_views_without_a_disturbance_are_the_grid_whatever_hangs_at_on
     together = replace(together, tilt=np.array([0.0, 0.0, 0.4, 0.4]))
     site = replace(site, candidates=together)
     nothing = PoseDraws(np.zeros((1, 4, 3)), *(np.zeros((1, 4)) for _ in range(3)))
-    views = finish(disturbed_views(Surroundings(site, MODELS, SIGHT, (), ANY), np.arange(4), nothing))
+    views = finish(visibility_under_errors(Surroundings(site, MODELS, SIGHT, (), ANY), np.arange(4), nothing))
     assert (views.seen(0) == grid_of(site).visible).all()
     assert (views.seen(0)[0] != views.seen(0)[2]).any()
 
@@ -283,7 +283,7 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
 
 def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
     settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
-    judge = Judge(street(), settings, Goal(count=1))
+    judge = Judge(street(), settings, Objective(count=1))
     plan = finish(judge.plan(street_site(lay_candidates(street(), settings.candidates)), settings))
     (sensor,) = plan.deployment.sensors
     looks = VisibilityModel(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))

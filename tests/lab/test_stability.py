@@ -10,7 +10,7 @@ from headless.lab.stability import chapters as stability_chapters
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.robustness.pose_study import StudySettings
+from seip_addon.core.robustness.pose_study import PoseStudySettings
 from seip_addon.core.robustness.robust_study import RobustSettings
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
@@ -32,7 +32,7 @@ LITTLE = stability_chapters.StabilityScope(
     grids=8,
     rays=200,
     instances=2,
-    poses=StudySettings(draws=20, draws_of_kind=5),
+    poses=PoseStudySettings(draws=20, draws_of_kind=5),
     robust=RobustSettings(scenarios=3, unseen=20),
     instants=(2, 12),
 )

@@ -10,7 +10,7 @@ from headless.detection.average_precision import FEWEST_BLOCKS, RESAMPLES, Evalu
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import Estimate, percentiles, student_reach
+from seip_addon.core.estimates import IntervalEstimate, percentiles, student_reach
 
 DRAWS = 2 * RESAMPLES
 """Resamples of the blocks of traffic; what the first half of them says must be what all say."""
@@ -31,12 +31,12 @@ class ResampledPrecision:
         self.draws = resampled_average_precisions(evaluation, seed, DRAWS)
 
 
-def level(those: Sequence[ResampledPrecision], draws: int = DRAWS) -> Estimate:
+def level(those: Sequence[ResampledPrecision], draws: int = DRAWS) -> IntervalEstimate:
     """Return the mean average precision of detectors that differ in their seeds alone."""
     return _estimate([one.value for one in those], [one.draws[:draws] for one in those], those[0].blocks)
 
 
-def change(to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], draws: int = DRAWS) -> Estimate:
+def change(to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], draws: int = DRAWS) -> IntervalEstimate:
     """Return by how much the mean average precision changes from one trial to another of the same detectors.
 
     Differences are taken detector by detector and, where both had the same
@@ -59,7 +59,7 @@ def change(to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], d
     )
 
 
-def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> Estimate:
+def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> IntervalEstimate:
     """Return the mean over detectors; its 95 % interval is over other traffic and over other trainings.
 
     Over traffic it is that of the bootstrap, over trainings Student's. Of two
@@ -69,7 +69,7 @@ def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> E
     """
     value = float(np.mean(values))
     if blocks < FEWEST_BLOCKS:
-        return Estimate(value, -math.inf, math.inf)
+        return IntervalEstimate(value, -math.inf, math.inf)
     low, high = percentiles(np.mean(draws, axis=0))
     reach = student_reach(values) if len(values) > 1 else 0.0
-    return Estimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))
+    return IntervalEstimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))

@@ -13,10 +13,10 @@ from headless.charts import traffic as traffic_charts
 
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, placement_problem
-from seip_addon.core.placement.near_optimal import FlatTop, near_best
+from seip_addon.core.placement.near_optimal import NearOptimalSet, near_optimal_set
+from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, placement_problem
 from seip_addon.core.progress import Progress
-from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
 from seip_addon.core.robustness.traffic_instants import spread_instants
@@ -60,7 +60,7 @@ class StabilityScope:
     grids: int = 40
     rays: int = 20_000
     instances: int = 60
-    poses: StudySettings = field(default_factory=StudySettings)
+    poses: PoseStudySettings = field(default_factory=PoseStudySettings)
     robust: RobustSettings = field(default_factory=RobustSettings)
     instants: tuple[int, int] = (24, 120)
     detector: Mapping[str, int] = field(default_factory=dict)
@@ -109,7 +109,9 @@ class StudiedScene:
     def problem(self, sensor: str) -> PlacementProblem:
         """Return the placement of the usual number of sensors of one type."""
         layout = self.surveyed.layout
-        problem = placement_problem(layout.site, self.surveyed.grid.visible, layout.models, Goal(count=DEFAULT_COUNT))
+        problem = placement_problem(
+            layout.site, self.surveyed.grid.visible, layout.models, Objective(count=DEFAULT_COUNT)
+        )
         return replace(problem, forbidden=problem.forbidden | (layout.site.candidates.sensor != sensor))
 
 
@@ -164,11 +166,11 @@ def arithmetic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
 def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Drive the solvers to where they fail, and see how flat the top is."""
     study = yield from solver_study(stage.scope.instances)
-    tops: list[tuple[str, FlatTop]] = []
+    tops: list[tuple[str, NearOptimalSet]] = []
     for sensor in stage.surveyed.layout.models:
         problem = stage.problem(sensor)
         best = yield from solve(problem, SolverLimits(stage.surveyed.layout.settings.solver))
-        top = yield from near_best(problem, best.chosen)
+        top = yield from near_optimal_set(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
     limits_charts.save_solver_chart(stage.charts / "solvers.png", study, "Solvers at their limits")

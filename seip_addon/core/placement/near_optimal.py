@@ -24,7 +24,7 @@ MOST_BRANCHES = 300
 
 
 @dataclass(frozen=True, eq=False)
-class FlatTop:
+class NearOptimalSet:
     """The placements near the best.
 
     Parameters
@@ -69,9 +69,9 @@ class FlatTop:
         return f"{many} placements cover {near}; they use {self.positions} positions, {alike}"
 
 
-def near_best(
+def near_optimal_set(
     problem: PlacementProblem, chosen: Integer, share: float = 0.01
-) -> Generator[Progress, None, FlatTop | None]:
+) -> Generator[Progress, None, NearOptimalSet | None]:
     """List the placements that cover within a share of an optimal one.
 
     Parameters
@@ -85,7 +85,7 @@ def near_best(
 
     Returns
     -------
-    FlatTop or None
+    NearOptimalSet or None
         None where there are too many sensors or candidates to search among.
 
     Raises
@@ -106,7 +106,7 @@ def near_best(
     rows = _in_rows([np.sort(instance.original[list(found)]) for found in search.found], len(chosen))
     used = np.append(problem.positions, -1)[rows]
     in_common = np.isin(used, problem.positions[chosen]).sum(axis=1)
-    return FlatTop(
+    return NearOptimalSet(
         share=share,
         placements=rows,
         covered=np.array(list(search.found.values())) / factor,

@@ -22,7 +22,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..placement import Placement
 from ..placement.deployment import Sensor
-from ..placement.goal import Plan
+from ..placement.objective import Solution
 from ..site.site import Site
 from ..storage.files import save_json
 from .headings import degrees, tilt_degrees
@@ -80,12 +80,12 @@ def parsed_record(text: str) -> Record:
     return record
 
 
-def placement_record(site: Site, plan: Plan, run: Run) -> Record:
+def placement_record(site: Site, plan: Solution, run: Run) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
 
     Parameters
     ----------
-    plan : Plan
+    plan : Solution
         Of that site.
     run : Run
         What it was made with.

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import Float
-from ..estimates import Estimate, mean_of, quantile_gain, quantile_of
+from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
 from ..placement.clock import DEFAULT_LIMITS
 from ..progress import Progress, within
-from .disturbed_views import Surroundings, disturbed_views, draws_for
 from .pose_errors import PoseErrors
 from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
+from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
 LOW = 0.05
 """The quantile that judges."""
@@ -73,12 +73,12 @@ class Contender:
     unseen: Float
 
     @property
-    def low(self) -> Estimate:
+    def low(self) -> IntervalEstimate:
         """The 5 % quantile over unseen draws."""
         return quantile_of(self.unseen, LOW)
 
     @property
-    def mean(self) -> Estimate:
+    def mean(self) -> IntervalEstimate:
         """The mean over unseen draws."""
         return mean_of(self.unseen)
 
@@ -110,8 +110,8 @@ class RobustStudy:
         """Return what a contender gives away of the nominal optimum's planned coverage."""
         return self.beside(contender).planned - contender.planned
 
-    def saving(self, contender: Contender) -> Estimate:
-        """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
+    def saving(self, contender: Contender) -> IntervalEstimate:
+        """IntervalEstimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
         return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW)
 
     def is_converged(self, contender: Contender) -> bool:
@@ -133,7 +133,7 @@ def robust_study(
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
-    scenarios = yield from disturbed_views(around, every, drawn)
+    scenarios = yield from visibility_under_errors(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
     nominal = yield from solve(problem, settings.limits)
     foreseen = None
@@ -142,12 +142,12 @@ def robust_study(
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
     entries = [("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
-        here = Progress(number, len(risks), f"placing for {risk.in_words()}")
+        here = Progress(number, len(risks), f"placing for {risk.describe()}")
         yield here
         steps = solve_robust(problem, spread, risk, settings.limits, foreseen)
         found: Placement = yield from within(here, steps)
         placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
-        entries.append((risk.in_words(), placed, risk.alone))
+        entries.append((risk.describe(), placed, risk.alone))
     contenders = yield from _judged(around, problem, settings, entries)
     return RobustStudy(
         settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
@@ -163,7 +163,7 @@ def _judged(
     """Look from all chosen poses at once, in draws of another seed."""
     used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
     drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
-    views = yield from disturbed_views(around, used, drawn)
+    views = yield from visibility_under_errors(around, used, drawn)
     planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 from ..errors import SeipError
 from ..placement.deployment import deploy
-from ..placement.goal import Goal, Plan, placement_problem, with_count
+from ..placement.objective import Objective, Solution, placement_problem, with_count
 from ..progress import Progress
 from ..robustness.pose_errors import PoseErrors, require_draws
-from ..robustness.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
+from ..robustness.pose_study import PoseStudy, PoseStudySettings, pose_study, pose_warnings
 from ..robustness.risk import Risk
 from ..robustness.robust_study import RobustSettings, RobustStudy, robust_study
 from ..settings import setting
@@ -61,7 +61,7 @@ class RobustPlan:
 
     Parameters
     ----------
-    plan : Plan
+    plan : Solution
         Objective, bound and gap are of what the robustness asks for; its notes say so.
     study : RobustStudy
         It beside the plan that trusts the map.
@@ -69,12 +69,12 @@ class RobustPlan:
         What pose errors do to it.
     """
 
-    plan: Plan
+    plan: Solution
     study: RobustStudy
     judged: PoseStudy
 
 
-def check_robust_goal(goal: Goal) -> None:
+def check_robust_objective(goal: Objective) -> None:
     """Raise SeipError where a goal allows no robustness."""
     if goal.cheapest:
         raise SeipError(
@@ -84,7 +84,7 @@ def check_robust_goal(goal: Goal) -> None:
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, goal: Goal, robustness: RobustnessSettings
+    layout: Layout, grid: VisibilityGrid, goal: Objective, robustness: RobustnessSettings
 ) -> Generator[Progress, None, RobustPlan]:
     """Answer a goal on a survey for what may go wrong.
 
@@ -92,15 +92,15 @@ def place_robustly(
     ----------
     grid : VisibilityGrid
         Of the poses as planned.
-    goal : Goal
+    goal : Objective
         Of most coverage.
 
     Raises
     ------
     SeipError
-        As for `check_robust_goal`, `placement_problem` and `solve_robust`.
+        As for `check_robust_objective`, `placement_problem` and `solve_robust`.
     """
-    check_robust_goal(goal)
+    check_robust_objective(goal)
     site, models, around = layout.site, layout.models, surroundings(layout)
     settings = RobustSettings(
         errors=robustness.errors,
@@ -113,13 +113,13 @@ def place_robustly(
     study = yield from robust_study(around, problem, settings, [robustness.risk])
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
-    tried = StudySettings(
+    tried = PoseStudySettings(
         robustness.errors, robustness.draws, min(DRAWS_OF_KIND, robustness.draws), robustness.seed + 1
     )
     judged = yield from pose_study(around, deployment, tried)
     note = f"chosen for {chosen.name} over {robustness.scenarios} scenarios: objective, bound and gap are of that"
     notes = (note, *chosen.placement.notes, robust_sentence(study), *pose_warnings(judged))
-    plan = Plan(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
+    plan = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
     return RobustPlan(plan, study, judged)
 
 
@@ -128,6 +128,6 @@ def robust_sentence(study: RobustStudy) -> str:
     (chosen,) = study.robust
     return (
         f"against the placement for poses as planned it gives away {study.price(chosen):.2%} of planned coverage; "
-        f"{chosen.judged_by.outcome_in_words()} is at least {chosen.low.in_words()} in nineteen of twenty of "
-        f"{study.settings.unseen} unseen draws, not {study.beside(chosen).low.in_words()}"
+        f"{chosen.judged_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
+        f"{study.settings.unseen} unseen draws, not {study.beside(chosen).low.describe()}"
     )

@@ -11,12 +11,12 @@ from typing import TypeVar
 from ..arrays import Float
 from ..errors import SeipError
 from ..placement.deployment import deploy
-from ..placement.goal import Goal, Plan, placement_problem, with_count
+from ..placement.objective import Objective, Solution, placement_problem, with_count
 from ..progress import Progress
 from ..robustness.traffic_instants import check_runs, spread_instants
 from ..robustness.traffic_presence import road_user_seconds
 from ..robustness.traffic_study import WHAT, TrafficStudy, look_at_traffic, traffic_study, traffic_warnings
-from ..robustness.traffic_views import Layer
+from ..robustness.visibility_in_traffic import TrafficLayer
 from ..settings import setting
 from ..site.site import Site
 from ..traffic import Trajectories
@@ -47,7 +47,7 @@ class TrafficSettings:
         There is no instant to choose on, or none to evaluate by.
     """
 
-    layer: Layer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
+    layer: TrafficLayer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
     weights_from_traffic: bool = setting(default=False, help="weigh targets by the time that road users are there")
     instants: int = setting(24, "of traffic to choose on", minimum=1)
     judged_at: int = setting(120, "of traffic to judge by", minimum=1, metavar="INSTANTS")
@@ -80,7 +80,7 @@ class TrafficRuns:
 class TrafficPlan:
     """A plan for traffic with the study that it comes from: objective, bound and gap are of coverage in traffic."""
 
-    plan: Plan
+    plan: Solution
     study: TrafficStudy
 
 
@@ -115,7 +115,7 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
 
 
 def place_in_traffic(
-    layout: Layout, grid: VisibilityGrid, goal: Goal, runs: TrafficRuns, settings: TrafficSettings
+    layout: Layout, grid: VisibilityGrid, goal: Objective, runs: TrafficRuns, settings: TrafficSettings
 ) -> Generator[Progress, None, TrafficPlan]:
     """Answer a goal on a survey for the road in traffic, whose vehicles block the view.
 
@@ -141,4 +141,4 @@ def place_in_traffic(
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
     deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
-    return TrafficPlan(Plan(with_count(goal, layout.site), noted, None, deployment), study)
+    return TrafficPlan(Solution(with_count(goal, layout.site), noted, None, deployment), study)

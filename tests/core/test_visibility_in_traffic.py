@@ -17,9 +17,16 @@ from traffic_by_hand import make_model, make_trajectories, parked
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.disturbed_views import Surroundings
-from seip_addon.core.robustness.traffic_instants import NOBODY, STRETCH, WARM_UP, check_runs, spread_instants, standing
-from seip_addon.core.robustness.traffic_views import HEIGHT, traffic_views
+from seip_addon.core.robustness.traffic_instants import (
+    NO_TRAFFIC,
+    STRETCH,
+    WARM_UP,
+    check_runs,
+    spread_instants,
+    standing,
+)
+from seip_addon.core.robustness.visibility_in_traffic import HEIGHT, visibility_in_traffic
+from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster
@@ -75,7 +82,7 @@ crowds = st.lists(
 
 
 def views(instants, layer="road", around=AROUND):
-    seen = finish(traffic_views(around, POSES, instants, layer))
+    seen = finish(visibility_in_traffic(around, POSES, instants, layer))
     return np.array([seen.seen(instant) for instant in range(len(instants))])
 
 
@@ -133,7 +140,7 @@ def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
 
 def test_the_empty_road_is_the_visibility_grid():
     grid = finish(compute_visibility(SITE, MODELS, AROUND.sight, ANY))
-    assert (views([NOBODY])[0] == grid.visible).all()
+    assert (views([NO_TRAFFIC])[0] == grid.visible).all()
 
 
 @hypothesis_settings(max_examples=10)
@@ -144,7 +151,7 @@ def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
         triangles=np.concatenate([bodies.triangles, more.triangles]),
         hulls=np.concatenate([bodies.hulls, more.hulls]),
     )
-    nobody, some, all_of_them = views([NOBODY, bodies, both], "height")
+    nobody, some, all_of_them = views([NO_TRAFFIC, bodies, both], "height")
     assert (all_of_them <= some).all()
     assert (some <= nobody).all()
 
@@ -153,7 +160,7 @@ def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
 def test_neither_order_nor_company_of_instants_matters(layer):
     instants = [
         crowd([(12.0, 2.0, 0.0)], ["bus"]),
-        NOBODY,
+        NO_TRAFFIC,
         crowd([(2.0, 14.0, 1.5), (-20.0, 0.0, 0.2)], ["truck", "car"]),
         crowd([(0.0, 0.0, 0.8)], ["truck"]),
     ]
@@ -167,13 +174,13 @@ def test_neither_order_nor_company_of_instants_matters(layer):
 def test_a_truck_hides_the_lane_behind_it_and_shows_where_it_stands():
     pose = 0  # at (9, 9, 5)
     truck = crowd([(-4.0, 4.0, 0.0)], ["truck"])
-    nobody, before = views([NOBODY, truck], "height")[:, pose]
+    nobody, before = views([NO_TRAFFIC, truck], "height")[:, pose]
     x, y = SITE.targets.xyz[:, 0], SITE.targets.xyz[:, 1]
     behind = (np.abs(x + 9.0) <= 2.0) & (np.abs(y - 2.0) <= 2.0)
     assert (nobody & ~before)[behind].any()
     away = x > 12.0
     assert (nobody == before)[away].all()
-    road = views([NOBODY, truck])[:, pose]
+    road = views([NO_TRAFFIC, truck])[:, pose]
     under = (np.abs(x + 4.0) < 4.5) & (np.abs(y - 4.0) < 1.25 + DELTA)
     assert (road[1] & ~road[0])[under].any()
     assert not (road[1] & ~road[0])[~(np.hypot(x + 4.0, y - 4.0) < 5.0 + DELTA)].any()

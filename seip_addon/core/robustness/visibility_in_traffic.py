@@ -30,11 +30,11 @@ from ..scans.sensor import level_orientation
 from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
 from ..visibility.scanning import ScanPosition
 from ..visibility.target_index import TargetIndex
-from .disturbed_views import Surroundings
-from .traffic_instants import Standing
-from .views import Views, each_in_threads
+from .scenario_visibility import ScenarioVisibility, each_in_threads
+from .traffic_instants import TrafficObstacles
+from .visibility_under_errors import Surroundings
 
-Layer = Literal["road", "height"]
+TrafficLayer = Literal["road", "height"]
 
 HEIGHT = 1.5
 """Metres above its target at which a car has its roof, and a van or a truck its side."""
@@ -45,16 +45,16 @@ _OUTSIDE = 1e-6  # share by which a cube about a ball is larger, so that roundin
 _CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).reshape(3, 8).T
 
 
-def traffic_views(
-    around: Surroundings, poses: Integer, instants: Sequence[Standing], layer: Layer = "road"
-) -> Generator[Progress, None, Views]:
+def visibility_in_traffic(
+    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: TrafficLayer = "road"
+) -> Generator[Progress, None, ScenarioVisibility]:
     """Look from poses at instants of traffic.
 
     Parameters
     ----------
     poses : (s,) int64
         Among the site's candidates.
-    instants : sequence of Standing
+    instants : sequence of TrafficObstacles
         Who stands in the way at each of n instants.
     layer : {"road", "height"}
         What is to be seen.
@@ -66,7 +66,7 @@ def traffic_views(
 
     Returns
     -------
-    Views
+    ScenarioVisibility
         Of layer ``road``, the same as a full scan's with all triangles in one ray caster.
     """
     site, candidates = around.site, around.site.candidates
@@ -87,7 +87,7 @@ def traffic_views(
             packed[instant, number] = np.packbits(looker.seen(static.stopped_by(crowd)))
 
     yield from each_in_threads(look, range(len(poses)), caster.threads, "looking between vehicles")
-    return Views(packed, len(wanted))
+    return ScenarioVisibility(packed, len(wanted))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class _Crowd:
     hulls: Float
 
 
-def _crowd(around: Surroundings, standing: Standing, static: RayCaster) -> _Crowd:
+def _crowd(around: Surroundings, standing: TrafficObstacles, static: RayCaster) -> _Crowd:
     """Make a caster of bodies that rounds as one of the scene and the bodies together would."""
     everything = np.concatenate([static.triangles, standing.triangles])
     bodies = np.arange(len(everything)) >= len(static.triangles)
