@@ -30,7 +30,7 @@ from headless.traffic_runs import runs_beside
 import bpy
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.goal import Goal, check_goal
+from seip_addon.core.placement.objective import Objective, check_objective
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import ScanSettings, static_scene
 
@@ -103,7 +103,7 @@ def set_stage(options: argparse.Namespace) -> Stage:
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=NUMBERS[-1])))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=NUMBERS[-1])))
     paths = options.traffic or runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
     session.say(traffic.overlap())

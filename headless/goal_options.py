@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal
+from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective
 
 
 def add_goal_options(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
@@ -22,9 +22,9 @@ def add_goal_options(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup
     return goal
 
 
-def goal_of(options: argparse.Namespace, coverage: float | None = None) -> Goal:
+def goal_of(options: argparse.Namespace, coverage: float | None = None) -> Objective:
     """Return the goal that options of `add_goal_options` name, with a coverage to reach."""
-    return Goal(
+    return Objective(
         count=options.count,
         budget=options.budget,
         coverage=coverage,

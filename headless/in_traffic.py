@@ -22,12 +22,12 @@ from headless.traffic_runs import load_runs, parted, runs_beside
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal, Plan, check_goal, placement_problem, with_count
+from seip_addon.core.placement.objective import Objective, Solution, check_objective, placement_problem, with_count
 from seip_addon.core.robustness.traffic_instants import check_runs, spread_instants
 from seip_addon.core.robustness.traffic_presence import road_user_seconds
 from seip_addon.core.robustness.traffic_study import (
     WHAT,
-    InTraffic,
+    JudgedInTraffic,
     TrafficStudy,
     look_at_traffic,
     traffic_study,
@@ -47,7 +47,7 @@ def main(argv: list[str]) -> None:
     for number in (options.instants, options.judged_at):
         if number < 1:
             raise SeipError(f"ask for one instant of traffic or more, not {number}")
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     study = _studied(surveyed, goal, options)
     layout = surveyed.layout
     plan = _plan(surveyed, goal, study, options)
@@ -62,7 +62,7 @@ def main(argv: list[str]) -> None:
     session.say(f"written to {options.output}/")
 
 
-def _studied(surveyed: survey.Survey, goal: Goal, options: argparse.Namespace) -> TrafficStudy:
+def _studied(surveyed: survey.Survey, goal: Objective, options: argparse.Namespace) -> TrafficStudy:
     layout, watch = surveyed.layout, surveyed.stopwatch
     settings = layout.settings
     to_choose_on, to_judge_in = _runs(surveyed, options)
@@ -99,7 +99,7 @@ def _runs(surveyed: survey.Survey, options: argparse.Namespace) -> tuple[list[Tr
     return parted(runs)
 
 
-def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: argparse.Namespace) -> Plan:
+def _plan(surveyed: survey.Survey, goal: Objective, study: TrafficStudy, options: argparse.Namespace) -> Solution:
     """Return the placement as a plan, noted what it was chosen for."""
     layout, placement = surveyed.layout, study.traffic.placement
     note = (
@@ -108,7 +108,7 @@ def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: arg
     )
     weighed = ("targets weigh as many seconds as road users are there",) if options.weights_from_traffic else ()
     noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
-    return Plan(
+    return Solution(
         with_count(goal, layout.site),
         noted,
         None,
@@ -116,17 +116,17 @@ def _plan(surveyed: survey.Survey, goal: Goal, study: TrafficStudy, options: arg
     )
 
 
-def _in_words(study: TrafficStudy, plan: Plan) -> str:
+def _in_words(study: TrafficStudy, plan: Solution) -> str:
     sensors = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    won = f"placing on traffic sees {study.won(study.layer).in_words()} more of the {WHAT[study.layer]}"
+    won = f"placing on traffic sees {study.won(study.layer).describe()} more of the {WHAT[study.layer]}"
     doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)
     return "\n".join([*sensors, *seen, won, plan.certificate, *doubt, *plan.placement.notes])
 
 
-def _share(placed: InTraffic) -> str:
+def _share(placed: JudgedInTraffic) -> str:
     return "; ".join(
-        f"{seen.held.in_words()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
+        f"{seen.held.describe()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
         for layer, seen in placed.seen.items()
     )
 

@@ -22,7 +22,7 @@ if not __package__:  # run as a file by `blender -P`
 from headless import session, survey
 from headless.goal_options import add_goal_options, goal_of
 
-from seip_addon.core.placement.goal import Plan, check_goal
+from seip_addon.core.placement.objective import Solution, check_objective
 from seip_addon.core.workflows.convergence import coarsest_settings
 from seip_addon.core.workflows.survey import place
 
@@ -32,7 +32,7 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     goal = goal_of(options, options.coverage)
     refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal), refine)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal), refine)
     steps = place(surveyed.layout, surveyed.grid, goal, pose_errors=options.pose_errors)
     plan = surveyed.stopwatch.run("placement", steps)
     session.say(_in_words(plan))
@@ -41,7 +41,7 @@ def main(argv: list[str]) -> None:
     session.say(f"written to {options.output}/")
 
 
-def _in_words(plan: Plan) -> str:
+def _in_words(plan: Solution) -> str:
     placement, deployment = plan.placement, plan.deployment
     lines = [
         f"{survey.sensor_in_words(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"

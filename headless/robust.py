@@ -18,10 +18,11 @@ from headless import session, survey
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
 from headless.goal_options import add_goal_options, goal_of
 
-from seip_addon.core.placement.goal import check_goal
+from seip_addon.core.placement.objective import check_objective
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.workflows.robust import Precaution, RobustPlan, place_robustly
+from seip_addon.core.robustness.robust_study import RobustnessSettings
+from seip_addon.core.workflows.robust import RobustPlan, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
@@ -30,7 +31,7 @@ def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
     goal, precaution = goal_of(options), _precaution(options)
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, goal))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     steps = place_robustly(surveyed.layout, surveyed.grid, goal, precaution)
     robust = surveyed.stopwatch.run("robust placement", steps)
     plan, study = robust.plan, robust.study
@@ -52,23 +53,23 @@ def _in_words(robust: RobustPlan) -> str:
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, the nominal optimum's {nominal.planned:.2%}",
-            f"over {study.settings.unseen} unseen draws, {chosen.judged_by.outcome_in_words()}:",
-            f"mean {chosen.mean.in_words()}, the nominal optimum's {nominal.mean.in_words()}",
-            f"5 % quantile {chosen.low.in_words()}, the nominal optimum's {nominal.low.in_words()}",
-            f"which is {study.saving(chosen).in_words()} more, draw for draw",
+            f"over {study.settings.draws} unseen draws, {chosen.judged_by.describe_outcome()}:",
+            f"mean {chosen.mean.describe()}, the nominal optimum's {nominal.mean.describe()}",
+            f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
+            f"which is {study.saving(chosen).describe()} more, draw for draw",
             plan.certificate,
             *plan.placement.notes,
         ]
     )
 
 
-def _precaution(options: argparse.Namespace) -> Precaution:
+def _precaution(options: argparse.Namespace) -> RobustnessSettings:
     height = options.position_error if options.height_error is None else options.height_error
     yaw = options.tilt_error if options.yaw_error is None else options.yaw_error
     errors = PoseErrors(options.position_error, height, math.radians(yaw), math.radians(options.tilt_error))
     tail = {"expected": 1.0, "cvar": options.tail, "worst": 0.0}[options.objective]
     risk = Risk(tail, options.seen_by, options.failure)
-    return Precaution(risk, errors, options.scenarios, options.draws, options.seed)
+    return RobustnessSettings(risk, errors, options.scenarios, options.draws, options.seed)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -32,12 +32,12 @@ from headless.traffic_runs import load_runs, parted, runs_beside
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import DEFAULT_COUNT, Goal, check_goal, placement_problem
-from seip_addon.core.placement.near_optimal import FlatTop, near_best
+from seip_addon.core.placement.near_optimal import NearOptimalSet, near_optimal_set
+from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, check_objective, placement_problem
 from seip_addon.core.progress import Progress
-from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
 from seip_addon.core.robustness.traffic_instants import spread_instants
 from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study
 from seip_addon.core.storage.files import digest
@@ -75,8 +75,8 @@ class Scope:
     grids: int = 40
     rays: int = 20_000
     instances: int = 60
-    poses: StudySettings = field(default_factory=StudySettings)
-    robust: RobustSettings = field(default_factory=RobustSettings)
+    poses: PoseStudySettings = field(default_factory=PoseStudySettings)
+    robust: RobustnessSettings = field(default_factory=RobustnessSettings)
     instants: tuple[int, int] = (24, 120)
     detector: Mapping[str, int] = field(default_factory=dict)
 
@@ -121,10 +121,17 @@ class Stage:
         """What is placed, for titles."""
         return f"{DEFAULT_COUNT} × {self.sensor}"
 
+    @property
+    def limits(self) -> SolverLimits:
+        """The solver, and how long it searches."""
+        return self.surveyed.layout.settings.limits
+
     def problem(self, sensor: str) -> PlacementProblem:
         """Return the placement of the usual number of sensors of one type."""
         layout = self.surveyed.layout
-        problem = placement_problem(layout.site, self.surveyed.grid.visible, layout.models, Goal(count=DEFAULT_COUNT))
+        problem = placement_problem(
+            layout.site, self.surveyed.grid.visible, layout.models, Objective(count=DEFAULT_COUNT)
+        )
         return replace(problem, forbidden=problem.forbidden | (layout.site.candidates.sensor != sensor))
 
 
@@ -140,7 +147,7 @@ def main(argv: list[str], scope: Scope | None = None) -> None:
     session.check_folder(charts)
     surveyed = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
-        lambda site, models: check_goal(site, models, Goal(count=DEFAULT_COUNT)),
+        lambda site, models: check_objective(site, models, Objective(count=DEFAULT_COUNT)),
     )
     runs = load_runs(runs_beside(options.scene), surveyed.layout.geometry.origin)
     stage = Stage(surveyed, runs, options.scene, options.other, options.work, charts, scope or Scope())
@@ -223,11 +230,11 @@ def arithmetic(stage: Stage) -> Generator[Progress, None, Chapter]:
 def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Drive the solvers to where they fail, and see how flat the top is."""
     study = yield from solver_study(stage.scope.instances)
-    tops: list[tuple[str, FlatTop]] = []
+    tops: list[tuple[str, NearOptimalSet]] = []
     for sensor in stage.surveyed.layout.models:
         problem = stage.problem(sensor)
         best = yield from solve(problem, SolverLimits(stage.surveyed.layout.settings.solver))
-        top = yield from near_best(problem, best.chosen)
+        top = yield from near_optimal_set(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
     limits_charts.save_solver_chart(stage.charts / "solvers.png", study, "Solvers at their limits")
@@ -245,7 +252,7 @@ def solvers(stage: Stage) -> Generator[Progress, None, Chapter]:
 def poses(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Let the poses of a placement err."""
     layout, around = stage.surveyed.layout, surroundings(stage.surveyed.layout)
-    study = yield from robust_study(around, stage.problem(stage.sensor), _settings(stage))
+    study = yield from robust_study(around, stage.problem(stage.sensor), stage.scope.robust, limits=stage.limits)
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
     judged = yield from pose_study(around, deployment, stage.scope.poses)
@@ -270,7 +277,7 @@ def poses(stage: Stage) -> Generator[Progress, None, Chapter]:
 def failures(stage: Stage) -> Generator[Progress, None, Chapter]:
     """Let a sensor fail, and ask for more than one look."""
     around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
-    study = yield from robust_study(around, problem, _settings(stage), FAILURES)
+    study = yield from robust_study(around, problem, stage.scope.robust, FAILURES, stage.limits)
     robust_charts.save_spread_chart(stage.charts / "failures.png", study, f"{stage.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
     return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))
@@ -322,10 +329,6 @@ def detector(stage: Stage) -> Generator[Progress, None, Chapter]:
         limit_charts.save_foreign_chart(stage.charts / "detector_away.png", study)
         charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
-
-
-def _settings(stage: Stage) -> RobustSettings:
-    return replace(stage.scope.robust, limits=stage.surveyed.layout.settings.limits)
 
 
 def _lead(stage: Stage) -> str:

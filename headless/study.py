@@ -19,13 +19,13 @@ from headless.coverage_study.charts import save_height_chart, save_weight_chart
 from headless.coverage_study.tables import save_claims, save_study_table
 
 from seip_addon.core.pictures.plan_view import save_plan_view
-from seip_addon.core.placement.goal import Goal, check_goal
+from seip_addon.core.placement.objective import Objective, check_objective
 
 
 def main(argv: list[str]) -> None:
     """Run the study on one scene and write charts, tables and plans to a folder."""
     options = _parser().parse_args(argv)
-    surveyed = survey.survey(options, lambda site, models: check_goal(site, models, Goal(count=1)))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=1)))
     site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
     steps = coverage_study(
         site,

@@ -20,7 +20,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import tilt_in_words
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Sensor
-from seip_addon.core.placement.goal import Plan
+from seip_addon.core.placement.objective import Solution
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.site.candidates import CandidateSettings, heights_of, tilts_of
@@ -166,7 +166,7 @@ def survey(
     return Survey(layout, grid, watch)
 
 
-def save_plan(surveyed: Survey, plan: Plan, folder: Path, *, render: bool, pose_errors: bool = False) -> None:
+def save_plan(surveyed: Survey, plan: Solution, folder: Path, *, render: bool, pose_errors: bool = False) -> None:
     """Write a plan of a survey, with its record, to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
     now = Circumstances(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))

@@ -19,9 +19,10 @@ from bpy.props import (
 
 from . import pointing, scans, state
 from .core.datasets import FORMATS, SPLITS
-from .core.placement.goal import DEFAULT_COUNT, Goal
+from .core.placement.objective import DEFAULT_COUNT, Objective
 from .core.robustness.pose_errors import STEEPEST, WIDEST, PoseErrors
 from .core.robustness.risk import Risk
+from .core.robustness.robust_study import RobustnessSettings
 from .core.scans import ScanSettings
 from .core.site.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
 from .core.site.scene_geometry import DEFAULT_WEIGHT
@@ -29,7 +30,6 @@ from .core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
 from .core.traffic.source import TrafficFiles
 from .core.visibility.grid import VisibilitySettings
 from .core.workflows.recording import RecordingSettings
-from .core.workflows.robust import Precaution
 from .core.workflows.survey import SurveySettings
 from .preferences import catalogue_files
 from .scene import contract, roles
@@ -395,7 +395,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         search=pointing.search_positions,
     )
 
-    def goal(self) -> Goal:
+    def goal(self) -> Objective:
         """Return what is asked, as the core takes it.
 
         Raises
@@ -403,7 +403,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         SeipError
             It contradicts itself.
         """
-        return Goal(
+        return Objective(
             count=self.count if self.limit == "COUNT" else None,
             budget=_written(self.budget) if self.limit == "BUDGET" else None,
             coverage=_written(self.coverage) / 100 if self.limit == "COVERAGE" else None,
@@ -413,7 +413,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             mandatory=tuple(one.name for one in self.rules if one.rule == "MANDATORY"),
         )
 
-    def precaution(self) -> Precaution | None:
+    def precaution(self) -> RobustnessSettings | None:
         """Return what the placement is to stand, None where it trusts the map.
 
         Raises
@@ -425,7 +425,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             return None
         position, tilt = _written(self.position_error), _written(self.tilt_error)
         risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
-        return Precaution(risk, PoseErrors(position, position, tilt, tilt))
+        return RobustnessSettings(risk, PoseErrors(position, position, tilt, tilt))
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

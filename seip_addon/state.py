@@ -21,7 +21,7 @@ import bpy
 from . import preferences
 from .background import Background
 from .core.errors import SeipError
-from .core.placement.goal import MOVED, Plan
+from .core.placement.objective import MOVED, Solution
 from .core.progress import Progress
 from .core.results.placement_record import Record
 from .core.storage.files import check_folder
@@ -95,7 +95,7 @@ class Held:
         Of that layout.
     estimate : Estimate or None
         Of what the grid will take.
-    plan : Plan or None
+    plan : Solution or None
         Of that grid: the one that the scene's result tells of.
     record : str
         The result that the plan was taken from.
@@ -111,7 +111,7 @@ class Held:
     said: tuple[str, ...] = ()
     grid: VisibilityGrid | None = None
     estimate: Estimate | None = None
-    plan: Plan | None = None
+    plan: Solution | None = None
     record: str = ""
     durations: Mapping[str, float] = field(default_factory=dict)
 

@@ -15,7 +15,7 @@ from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.estimates import IntervalEstimate
 from seip_addon.core.robustness.pose_study import PoseStudy
 from seip_addon.core.robustness.robust_study import Contender, RobustStudy
 
@@ -90,13 +90,13 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
 
 def _outcome(study: RobustStudy) -> str:
     """Name what placements are judged by, if it is one thing."""
-    return study.nominal[0].judged_by.outcome_in_words() if len(study.nominal) == 1 else "coverage"
+    return study.nominal[0].judged_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
     """Name a placement, and the nominal optimum, of which there are several then, with what it is judged by."""
     several = len(study.nominal) > 1 and contender in study.nominal
-    name = f"{contender.name}: {contender.judged_by.outcome_in_words()}" if several else contender.name
+    name = f"{contender.name}: {contender.judged_by.describe_outcome()}" if several else contender.name
     return fill(name, LEGEND)
 
 
@@ -112,13 +112,13 @@ def _figure(title: str) -> tuple[Figure, Axes]:
 
 
 def _interval(  # what is drawn, where, and how
-    axes: Axes, estimate: Estimate, height: float, colour: str, mark: str, label: str | None
+    axes: Axes, estimate: IntervalEstimate, height: float, colour: str, mark: str, label: str | None
 ) -> None:
     axes.plot(_ends(estimate), [height, height], color=colour, linewidth=2.4)
     axes.plot(estimate.value, height, marker=mark, color=colour, linestyle="none", label=label)
 
 
-def _ends(estimate: Estimate) -> Sequence[float]:
+def _ends(estimate: IntervalEstimate) -> Sequence[float]:
     """Return the ends of an interval; where draws leave one open it ends at the value."""
     return [end if np.isfinite(end) else estimate.value for end in (estimate.low, estimate.high)]
 

@@ -22,8 +22,8 @@ from seip_addon.core.pictures.drawing import draw_sensors, save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from seip_addon.core.pictures.plan_view import CRACK, draw_area
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.robustness.estimates import Estimate
-from seip_addon.core.robustness.traffic_study import WHAT, InTraffic, TrafficStudy
+from seip_addon.core.robustness.estimates import IntervalEstimate
+from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.target_squares import target_squares
@@ -42,7 +42,7 @@ def save_time_map(  # what is drawn, and where
     geometry: SceneGeometry,
     site: Site,
     deployment: Deployment,
-    placed: InTraffic,
+    placed: JudgedInTraffic,
     title: str,
 ) -> None:
     """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
@@ -53,7 +53,7 @@ def save_time_map(  # what is drawn, and where
     panels = figure.subplots(1, len(placed.seen), squeeze=False)[0]
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
-        panel.set_title(f"{WHAT[layer]}: {seen.held.in_words(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
+        panel.set_title(f"{WHAT[layer]}: {seen.held.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
         panel.set(xticks=(), yticks=())
         _draw_shares(panel, site, seen.time)
         _draw_place(panel, geometry)
@@ -79,7 +79,12 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     figure = Figure((11.5, 4.6), dpi=160, facecolor=PAPER, layout="constrained")
     shares, changes = figure.subplots(1, 2)
     rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
-    _bars(shares, -1, [Estimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "promised, empty road")
+    _bars(
+        shares,
+        -1,
+        [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
+        "promised, empty road",
+    )
     _bars(shares, 0, [empty.held for empty, _ in rows], "held in traffic")
     _bars(shares, 1, [traffic.held for _, traffic in rows], "held, placed on traffic")
     shares.set_ylabel(f"share of the {WHAT[studies[0][1].layer]} seen", color=INK)
@@ -101,9 +106,9 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     save_png(path, figure)
 
 
-def negative(estimate: Estimate) -> Estimate:
+def negative(estimate: IntervalEstimate) -> IntervalEstimate:
     """Return the estimate of what has the opposite sign."""
-    return Estimate(-estimate.value, -estimate.high, -estimate.low)
+    return IntervalEstimate(-estimate.value, -estimate.high, -estimate.low)
 
 
 def _draw_shares(panel: Axes, site: Site, time: Float) -> None:
@@ -121,7 +126,7 @@ def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
     draw_area(panel, closed(geometry.region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
 
 
-def _bars(axes: Axes, place: int, estimates: Sequence[Estimate], label: str) -> None:
+def _bars(axes: Axes, place: int, estimates: Sequence[IntervalEstimate], label: str) -> None:
     at = np.arange(len(estimates)) + place * THIRD
     values = np.array([estimate.value for estimate in estimates])
     axes.bar(at, values, width=0.9 * THIRD, color=(SEEN_COLOURS[1], SERIES[1], SERIES[2])[place + 1], label=label)
@@ -129,13 +134,13 @@ def _bars(axes: Axes, place: int, estimates: Sequence[Estimate], label: str) -> 
         axes.plot([x, x], _ends(estimate), color=INK, linewidth=1.4)
 
 
-def _dots(axes: Axes, place: float, estimates: Sequence[Estimate], colour: int, label: str) -> None:
+def _dots(axes: Axes, place: float, estimates: Sequence[IntervalEstimate], colour: int, label: str) -> None:
     at = np.arange(len(estimates)) + place * THIRD
     for x, estimate in zip(at, estimates, strict=True):
         axes.plot([x, x], _ends(estimate), color=SERIES[colour], linewidth=2.4)
     axes.plot(at, [each.value for each in estimates], "o", color=SERIES[colour], label=label)
 
 
-def _ends(estimate: Estimate) -> list[float]:
+def _ends(estimate: IntervalEstimate) -> list[float]:
     """Return the ends of an interval; where it is open it ends at the value."""
     return [end if np.isfinite(end) else estimate.value for end in (estimate.low, estimate.high)]

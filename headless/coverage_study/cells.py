@@ -13,7 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement import Placement, SolverLimits, solve, solve_greedy
 from seip_addon.core.placement.deployment import Deployment, deploy
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.site.site import Site
 
@@ -211,7 +211,7 @@ def solve_cell(  # noqa: PLR0913 -- a problem, and the limits of its solution
     allowed = site.candidates.sensor == cell.sensor
     if cell.height is not None:
         allowed &= site.candidates.height == cell.height
-    goal = Goal(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
+    goal = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
     problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
     placement = yield from solve(problem, SolverLimits(solver, time_limit, effort))
     deployment = deploy(site, models, visible, placement.chosen)

@@ -12,10 +12,11 @@ import bpy
 
 from .. import pointing, state
 from ..core.errors import SeipError
-from ..core.placement.goal import Goal, check_goal
+from ..core.placement.objective import Objective, check_objective
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
-from ..core.workflows.robust import Precaution, check_precaution, place_robustly
+from ..core.robustness.robust_study import RobustnessSettings
+from ..core.workflows.robust import check_robust_objective, place_robustly
 from ..core.workflows.survey import Circumstances, place, record_of
 from ..scene.write import write_result
 from .results import keep_result
@@ -51,15 +52,15 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[state.Held], bpy.types.Ope
 
 def _placed(
     surveying: Generator[Progress, None, state.Held],
-    goal: Goal,
-    precaution: Precaution | None,
+    goal: Objective,
+    precaution: RobustnessSettings | None,
     *,
     pose_errors: bool = False,
 ) -> Generator[Progress, None, state.Held]:
     if precaution is not None:
-        check_precaution(goal)
+        check_robust_objective(goal)
     known = yield from surveying
-    check_goal(known.layout.site, known.layout.models, goal)
+    check_objective(known.layout.site, known.layout.models, goal)
     known, grid = yield from state.seen(known)
     began = time.perf_counter()
     if precaution is None:

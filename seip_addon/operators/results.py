@@ -15,7 +15,7 @@ from mathutils import Vector
 from .. import hand, live, pointing, preferences, state
 from ..core.errors import SeipError
 from ..core.geometry.orientation import tilt_in_words
-from ..core.placement.goal import Plan, target_weights
+from ..core.placement.objective import Solution, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.results.placement_record import Record, versions
@@ -139,7 +139,7 @@ def _ranked(
     return known, rank_added(visible, weight, plan.deployment.seen_by > 0, free, MOST_RANKED)
 
 
-def _plan_and_grid(known: state.Held) -> tuple[Plan, VisibilityGrid]:
+def _plan_and_grid(known: state.Held) -> tuple[Solution, VisibilityGrid]:
     if known.plan is None or known.grid is None:
         raise RuntimeError("the work ended without a placement")
     return known.plan, known.grid

@@ -12,7 +12,7 @@ import bpy
 
 from .. import preferences, scans, state
 from ..core.errors import SeipError
-from ..core.placement.goal import target_weights
+from ..core.placement.objective import target_weights
 from ..core.progress import Progress, finish
 from ..core.results.placement_record import versions
 from ..core.robustness.traffic_instants import check_runs, spread_instants

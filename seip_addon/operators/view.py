@@ -12,7 +12,7 @@ import bpy
 
 from .. import state
 from ..core.errors import SeipError
-from ..core.placement.goal import Plan
+from ..core.placement.objective import Solution
 from ..core.progress import Progress
 from ..core.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
@@ -229,7 +229,7 @@ def _save_sheet(path: Path, held: state.Held, view: Any) -> None:  # noqa: ANN40
             save_sheet(path, view, picture)
 
 
-def _plan(held: state.Held) -> Plan:
+def _plan(held: state.Held) -> Solution:
     if held.plan is None:
         raise RuntimeError("a placement was found without its plan")
     return held.plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import hand, state
-from ..core.placement.goal import MOVED, MOVED_SENTENCE
+from ..core.placement.objective import MOVED, MOVED_MESSAGE
 from ..core.results.placement_record import Record
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_judge_sensors, no_placement
@@ -186,7 +186,7 @@ def certificate(record: Record) -> str:
     objective = record["objective"]
     best = "cheapest" if objective["sought"] == "least price" else "best"
     if objective["status"] == MOVED:
-        return MOVED_SENTENCE
+        return MOVED_MESSAGE
     if objective["status"] == "optimal":
         return f"Proven: the {best} placement that there is among these candidates."
     gap = "an unknown share" if objective["gap"] is None else f"{objective['gap']:.2%}"

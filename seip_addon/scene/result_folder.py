@@ -13,7 +13,7 @@ from ..core.arrays import Boolean
 from ..core.errors import SeipError
 from ..core.lidar import LidarModel
 from ..core.pictures.plan_view import save_plan_view
-from ..core.placement.goal import Plan
+from ..core.placement.objective import Solution
 from ..core.progress import Progress, finish
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
@@ -68,7 +68,7 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     scene: bpy.types.Scene,
     geometry: SceneGeometry,
     site: Site,
-    plan: Plan,
+    plan: Solution,
     record: Record,
     *,
     visible: Boolean,
@@ -103,7 +103,7 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     part: Mapping[str, Path],
     geometry: SceneGeometry,
     site: Site,
-    plan: Plan,
+    plan: Solution,
     record: Record,
     visible: Boolean,
     models: Mapping[str, LidarModel],
@@ -119,7 +119,7 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     save_plan_view(part["plan.png"], geometry, site, deployment, _notes(plan, record["warnings"], models))
 
 
-def _notes(plan: Plan, warnings: Sequence[str], models: Mapping[str, LidarModel]) -> list[str]:
+def _notes(plan: Solution, warnings: Sequence[str], models: Mapping[str, LidarModel]) -> list[str]:
     """Return what the plan's reader should know: its certificate, and warnings but those of types not chosen."""
     used = {sensor.model.key for sensor in plan.deployment.sensors}
     others = set(models) - used

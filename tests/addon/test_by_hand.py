@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from seip_addon import hand, live, pointing, state
-from seip_addon.core.placement.goal import MOVED, MOVED_SENTENCE
+from seip_addon.core.placement.objective import MOVED, MOVED_MESSAGE
 from seip_addon.core.results.comparison import unpacked_counts
 from seip_addon.core.results.placement_record import comparable, load_placement_record
 from seip_addon.scene import result_folder
@@ -127,7 +127,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert comparable(load_placement_record(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
-    assert state.find(scene).plan.certificate == MOVED_SENTENCE
+    assert state.find(scene).plan.certificate == MOVED_MESSAGE
 
 
 def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):

@@ -29,7 +29,7 @@ from seip_addon.core.placement import (
     solve,
     solve_greedy,
 )
-from seip_addon.core.placement.near_optimal import near_best
+from seip_addon.core.placement.near_optimal import near_optimal_set
 from seip_addon.core.progress import finish
 
 Integer = NDArray[np.int64]
@@ -301,7 +301,7 @@ def _of_near_best(problem: PlacementProblem, subsets: Subsets) -> list[str]:
     if not (subsets.allowed & (subsets.covered > 0)).any() or len(np.unique(problem.positions)) < len(problem.visible):
         return []
     answer = finish(solve(problem))
-    near = finish(near_best(problem, answer.chosen, 0.1))
+    near = finish(near_optimal_set(problem, answer.chosen, 0.1))
     if near is None or not near.complete or answer.status != "optimal":
         return []
     best = int(subsets.covered[subsets.allowed].max())

@@ -24,7 +24,7 @@ from synthetic_junction import rectangle
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.placement.goal import Goal
+from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.grid import VisibilitySettings
@@ -52,7 +52,7 @@ def answers(judged: dict[float, float]):
 
 def picked(judged: dict[float, float], tolerance: float = 0.01) -> float:
     with answers(judged):
-        return finish(coarsest_settings(GEOMETRY, SETTINGS, Goal(count=2), tolerance)).settings.candidates.spacing
+        return finish(coarsest_settings(GEOMETRY, SETTINGS, Objective(count=2), tolerance)).settings.candidates.spacing
 
 
 @needs_any
@@ -68,9 +68,10 @@ def test_the_coarsest_is_taken_where_nothing_is_gained_and_the_finest_where_all_
     assert picked(growing) == convergence.CANDIDATE_SPACINGS[-1]
 
 
+@pytest.mark.slow
 @needs_any
 def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
-    goal, tolerance = Goal(count=2), 0.02
+    goal, tolerance = Objective(count=2), 0.02
     found = finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
     assert found.settings.spacings_because == found.sentence
     judge = Judge(GEOMETRY, SETTINGS, goal)
@@ -86,12 +87,12 @@ def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
 @pytest.mark.parametrize(
     ("goal", "tolerance", "words"),
     [
-        (Goal(count=2), 0.0, "above 0 and below 1"),
-        (Goal(coverage=0.5), 0.01, "a number of sensors or a budget"),
-        (Goal(count=2, forbidden=("sidewalk 3",)), 0.01, "'sidewalk 3' is no pole"),
+        (Objective(count=2), 0.0, "above 0 and below 1"),
+        (Objective(coverage=0.5), 0.01, "a number of sensors or a budget"),
+        (Objective(count=2, forbidden=("sidewalk 3",)), 0.01, "'sidewalk 3' is no pole"),
     ],
 )
-def test_what_a_tolerance_cannot_do(goal: Goal, tolerance: float, words: str) -> None:
+def test_what_a_tolerance_cannot_do(goal: Objective, tolerance: float, words: str) -> None:
     with pytest.raises(SeipError, match=words):
         finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
 
@@ -99,7 +100,7 @@ def test_what_a_tolerance_cannot_do(goal: Goal, tolerance: float, words: str) ->
 @needs_any
 def test_goals_that_no_spacing_can_meet_are_refused() -> None:
     with pytest.raises(SeipError, match="positions"):
-        finish(coarsest_settings(GEOMETRY, SETTINGS, Goal(count=100_000), 0.01))
+        finish(coarsest_settings(GEOMETRY, SETTINGS, Objective(count=100_000), 0.01))
 
 
 @needs_any

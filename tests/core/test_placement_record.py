@@ -9,7 +9,7 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import Placement
-from seip_addon.core.placement.goal import Goal, Plan
+from seip_addon.core.placement.objective import Objective, Solution
 from seip_addon.core.results.placement_record import (
     Run,
     comparable,
@@ -50,7 +50,7 @@ def make_record(example, run, **changes):
     values = {"objective": 512.0, "bound": 530.5, "gap": 18.5 / 512.0, **changes}
     best = solution([sensor.pose for sensor in example.deployment.sensors], **values)
     greedy = solution([1, 2, 3], objective=500.0, bound=531.0, gap=0.05)
-    return placement_record(example.site, Plan(Goal(count=3), best, greedy, example.deployment), run)
+    return placement_record(example.site, Solution(Objective(count=3), best, greedy, example.deployment), run)
 
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):

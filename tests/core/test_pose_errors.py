@@ -17,10 +17,10 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views, draws_for
 from seip_addon.core.robustness.estimates import mean_of, quantile_gain, quantile_of
 from seip_addon.core.robustness.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
-from seip_addon.core.robustness.pose_study import StudySettings, pose_study, pose_warnings
+from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
+from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import Mesh
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
@@ -130,7 +130,7 @@ def test_a_gain_is_in_its_interval_as_often_as_is_said():
         found = quantile_gain(others + 0.1 + 0.02 * rng.standard_normal(300), others, 0.05)
         hits += found.low <= 0.1 <= found.high
     assert hits / 120 > 0.88
-    assert quantile_gain(others, others, 0.05).in_words() == "0.00% [0.00%, 0.00%]"
+    assert quantile_gain(others, others, 0.05).describe() == "0.00% [0.00%, 0.00%]"
 
 
 @given(st.lists(st.floats(-5, 5), min_size=2, max_size=40))
@@ -148,7 +148,7 @@ def placed():
 
 def study_of(placed, **changed):
     site, deployment = placed
-    chosen = StudySettings(**{"draws": 40, "draws_of_kind": 10} | changed)
+    chosen = PoseStudySettings(**{"draws": 40, "draws_of_kind": 10} | changed)
     return finish(pose_study(around(site), deployment, chosen))
 
 
@@ -186,5 +186,5 @@ def test_sensor_alone_is_its_row_beside_the_planned_rows(placed):
     still = PoseDraws(*(getattr(drawn, name).copy() for name in ("shift", "yaw", "pitch", "roll")))
     for name in ("shift", "yaw", "pitch", "roll"):
         getattr(still, name)[:, 1] = 0.0
-    views = finish(disturbed_views(around(site), poses, still))
+    views = finish(visibility_under_errors(around(site), poses, still))
     assert study.alone[0].whole.tolist() == [views.seen(draw).any(axis=0).mean() for draw in range(6)]

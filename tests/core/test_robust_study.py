@@ -15,17 +15,18 @@ from synthetic_junction import junction_site
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement import SolverLimits, solve
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views, draws_for
 from seip_addon.core.robustness.pose_errors import PoseErrors
-from seip_addon.core.robustness.pose_study import StudySettings, pose_study
+from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
+from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
 MODELS = load_catalogue()
-SETTINGS = RobustSettings(scenarios=4, unseen=30, limits=SolverLimits(time_limit=20.0))
+SETTINGS = RobustnessSettings(scenarios=4, draws=30)
+LIMITS = SolverLimits(time_limit=20.0)
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +34,13 @@ def laid_out():
     site = junction_site(positions=12, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
-    goal = placement_problem(site, grid.visible, MODELS, Goal(count=2))
+    goal = placement_problem(site, grid.visible, MODELS, Objective(count=2))
     return around, replace(goal, forbidden=site.candidates.sensor == "type2")
 
 
 @pytest.fixture(scope="module")
 def study(laid_out):
-    return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)]))
+    return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)], LIMITS))
 
 
 def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
@@ -48,9 +49,9 @@ def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
     assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
     for contender in (nominal, *study.robust):
         chosen = contender.placement.chosen
-        drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
-        views = finish(disturbed_views(around, chosen, drawn))
-        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.unseen)]
+        drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
+        views = finish(visibility_under_errors(around, chosen, drawn))
+        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.draws)]
         assert contender.unseen == pytest.approx(expected, abs=1e-12)
         assert not problem.forbidden[chosen].any()
 
@@ -64,7 +65,7 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
         return replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
 
     monkeypatch.setattr("seip_addon.core.robustness.robust_study.solve_robust", poor)
-    found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)]))
+    found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)], LIMITS))
     (contender,), (nominal,) = found.robust, found.nominal
     assert contender.placement.chosen.tolist() == nominal.placement.chosen.tolist()
     assert contender.placement.objective > 0
@@ -87,7 +88,7 @@ LOSSES = [Risk(failure="worst"), Risk(tail=0.5, seen_by=2), Risk(seen_by=2), Ris
 
 @pytest.fixture(scope="module")
 def study_of_losses(laid_out):
-    return finish(robust_study(*laid_out, SETTINGS, LOSSES))
+    return finish(robust_study(*laid_out, SETTINGS, LOSSES, LIMITS))
 
 
 def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_optimum(laid_out, study_of_losses):
@@ -102,16 +103,16 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
     for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
         for judged in (contender, study_of_losses.beside(contender)):
             chosen = judged.placement.chosen
-            drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
-            views = finish(disturbed_views(around, chosen, drawn))
-            expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.unseen)]
+            drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
+            views = finish(visibility_under_errors(around, chosen, drawn))
+            expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.draws)]
             assert judged.unseen == pytest.approx(expected, abs=1e-12)
             assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
         assert (contender.unseen < contender.planned).any()
 
 
 def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
-    low = study.robust[0].low.in_words()
+    low = study.robust[0].low.describe()
     assert f"5 % quantile of coverage {low} against" in robust_rows(study)[0].begins
     first, second, third, fourth = (row.begins for row in robust_rows(study_of_losses))
     assert "5 % quantile of coverage after the loss of the most important sensor" in first
@@ -124,7 +125,7 @@ def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
 
 
 def test_without_errors_robustness_is_free(laid_out):
-    settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, unseen=2)
+    settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, draws=2)
     study = finish(robust_study(*laid_out, settings, [Risk(tail=0.5)]))
     (robust,) = study.robust
     assert robust.placement.chosen.tolist() == study.nominal[0].placement.chosen.tolist()
@@ -135,16 +136,16 @@ def test_poses_of_one_place_err_alike(laid_out):
     around, _ = laid_out
     poses = np.arange(len(around.site.candidates))
     drawn, _ = draws_for(around, poses, PoseErrors(), 2, 0)
-    together = finish(disturbed_views(around, poses, drawn))
+    together = finish(visibility_under_errors(around, poses, drawn))
     some = np.array([3, 8])
     alone, _ = draws_for(around, some, PoseErrors(), 2, 0)
-    assert (finish(disturbed_views(around, some, alone)).packed == together.packed[:, some]).all()
+    assert (finish(visibility_under_errors(around, some, alone)).packed == together.packed[:, some]).all()
 
 
 def test_charts_are_drawn(laid_out, study, tmp_path):
     around, problem = laid_out
     deployment = deploy(around.site, MODELS, problem.visible, study.nominal[0].placement.chosen)
-    judged = finish(pose_study(around, deployment, StudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
+    judged = finish(pose_study(around, deployment, PoseStudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
     save_spread_chart(tmp_path / "spread.png", study, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study, "frontier")
     save_blame_chart(tmp_path / "blame.png", judged, "blame")

@@ -11,18 +11,18 @@ import shapely
 from engines import ANY, each_engine
 from float64_rays import nearest_return
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from placement_oracle import cases
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import angles_of, orientation, orientations, tilt_in_words, turned
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal
+from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.disturbed_views import Surroundings, disturbed_views
 from seip_addon.core.robustness.pose_errors import PoseDraws
+from seip_addon.core.robustness.visibility_under_errors import Surroundings, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.candidates import CandidateSettings, lay_candidates, tilts_of
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
@@ -91,7 +91,7 @@ def tilted(site, yaw, tilt):
 
 @each_engine
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2]))
-@hypothesis_settings(max_examples=20)
+@cases(20, 4)
 def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, min_intensity):
     site, settings = patch(seed), VisibilitySettings(delta, min_intensity)
     full = finish(full_scan_visibility(site, MODELS, settings, make_ray_caster(site.triangles, engine)))
@@ -99,7 +99,7 @@ def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, min_intensity):
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-4, 4), TILT)
-@hypothesis_settings(max_examples=15)
+@cases(15, 4)
 def test_a_tilted_candidate_sees_what_an_onlooker_sees_and_what_rays_in_float64_return_from(seed, yaw, tilt):
     site = tilted(patch(seed, poses=1), yaw, tilt)
     visible, poses = grid_of(site).visible, site.candidates
@@ -247,14 +247,14 @@ def test_places_part_tilts_and_pieces_keep_each_pose_once():
     assert finish(estimate_visibility(site, MODELS, SIGHT, ANY)).places == 3
 
 
-def test_disturbed_views_without_a_disturbance_are_the_grid_whatever_hangs_at_one_place():
+def test_visibility_without_errors_is_the_grid_whatever_hangs_at_one_place():
     site = patch(5, poses=2)
     poses = site.candidates
     together = replace(poses, xyz=np.repeat(poses.xyz[:1], 4, axis=0), yaw=np.full(4, 0.3), tilt=poses.tilt)
     together = replace(together, tilt=np.array([0.0, 0.0, 0.4, 0.4]))
     site = replace(site, candidates=together)
     nothing = PoseDraws(np.zeros((1, 4, 3)), *(np.zeros((1, 4)) for _ in range(3)))
-    views = finish(disturbed_views(Surroundings(site, MODELS, SIGHT, (), ANY), np.arange(4), nothing))
+    views = finish(visibility_under_errors(Surroundings(site, MODELS, SIGHT, (), ANY), np.arange(4), nothing))
     assert (views.seen(0) == grid_of(site).visible).all()
     assert (views.seen(0)[0] != views.seen(0)[2]).any()
 
@@ -283,7 +283,7 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
 
 def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
     settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
-    judge = Judge(street(), settings, Goal(count=1))
+    judge = Judge(street(), settings, Objective(count=1))
     plan = finish(judge.plan(street_site(lay_candidates(street(), settings.candidates)), settings))
     (sensor,) = plan.deployment.sensors
     looks = Onlooker(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))

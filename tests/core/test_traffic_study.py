@@ -18,15 +18,15 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement import solve
 from seip_addon.core.placement.deployment import deploy
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.disturbed_views import Surroundings
-from seip_addon.core.robustness.estimates import Estimate, mean_of, mean_over_time
+from seip_addon.core.robustness.estimates import IntervalEstimate, mean_of, mean_over_time
 from seip_addon.core.robustness.robust_placement import at_least
-from seip_addon.core.robustness.traffic_instants import NOBODY, WARM_UP, spread_instants
+from seip_addon.core.robustness.traffic_instants import NO_TRAFFIC, WARM_UP, spread_instants
 from seip_addon.core.robustness.traffic_presence import road_user_seconds
 from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study, traffic_warnings
-from seip_addon.core.robustness.traffic_views import traffic_views
+from seip_addon.core.robustness.visibility_in_traffic import visibility_in_traffic
+from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
@@ -53,7 +53,7 @@ def laid_out():
     site = junction_site(positions=12, sensors=("hdl32e", "vlp16"), heights=(3.5,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
-    problem = placement_problem(site, grid.visible, MODELS, Goal(count=2))
+    problem = placement_problem(site, grid.visible, MODELS, Objective(count=2))
     return around, replace(problem, forbidden=site.candidates.sensor == "hdl32e")
 
 
@@ -61,7 +61,7 @@ def laid_out():
 def study(request, laid_out):
     around, problem = laid_out
     scenarios = finish(look_at_traffic(around, problem, spread_instants([queue(1), queue(2)], 6, 0), request.param))
-    return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 16, 1)))
+    return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 8, 1)))
 
 
 def test_the_empty_road_is_where_both_begin(laid_out, study):
@@ -78,11 +78,11 @@ def test_the_empty_road_is_where_both_begin(laid_out, study):
 def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study):
     around, _ = laid_out
     _, found = study
-    judged = spread_instants([queue(3)], 16, 1)
+    judged = spread_instants([queue(3)], 8, 1)
     for placed in (found.empty, found.traffic):
         for layer, seen in placed.seen.items():
-            views = finish(traffic_views(around, placed.placement.chosen, judged.standing(), layer))
-            rows = np.array([views.seen(instant).any(axis=0) for instant in range(16)])
+            views = finish(visibility_in_traffic(around, placed.placement.chosen, judged.obstacles(), layer))
+            rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
             assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
             assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
@@ -126,8 +126,8 @@ def test_it_says_what_traffic_hides(study):
     assert [row.method for row in rows[:2]] == ["view of the road", "view of the points 1.5 m above the road"]
     assert "24 road users at a time" in rows[0].regime
     road = found.empty.seen["road"]
-    assert f"of what the empty road promises vehicles hide {road.hidden.in_words()}" in rows[0].begins
-    assert f", {found.won(found.layer).in_points()} more" in rows[2].begins
+    assert f"of what the empty road promises vehicles hide {road.hidden.describe()}" in rows[0].begins
+    assert f", {found.won(found.layer).as_points()} more" in rows[2].begins
 
 
 def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_empty_road(study):
@@ -150,7 +150,7 @@ def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
         assert (seen.at == seen.empty).all()
         assert seen.rarely == 0.0
     assert traffic_warnings(found) == ()
-    assert (scenarios.views.seen(0) == finish(traffic_views(around, np.arange(24), [NOBODY])).seen(0))[
+    assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(24), [NO_TRAFFIC])).seen(0))[
         problem.allowed
     ].all()
 
@@ -162,8 +162,10 @@ def test_instants_near_in_time_count_once():
     honest, naive = mean_over_time(values, stretch), mean_of(values)
     assert honest.value == pytest.approx(naive.value)
     assert 3.0 < (honest.high - honest.low) / (naive.high - naive.low) < 6.0
-    assert mean_over_time(values[:60], stretch[:60]) == Estimate(math.fsum(values[:60]) / 60, -math.inf, math.inf)
-    assert negative(Estimate(1.0, -2.0, 3.0)) == Estimate(-1.0, -3.0, 2.0)
+    assert mean_over_time(values[:60], stretch[:60]) == IntervalEstimate(
+        math.fsum(values[:60]) / 60, -math.inf, math.inf
+    )
+    assert negative(IntervalEstimate(1.0, -2.0, 3.0)) == IntervalEstimate(-1.0, -3.0, 2.0)
 
 
 def test_the_interval_of_few_stretches_holds_as_often_as_it_says():

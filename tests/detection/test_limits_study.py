@@ -21,7 +21,7 @@ from matplotlib.image import imread
 from square_by_hand import road, sensors
 
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.estimates import IntervalEstimate
 from seip_addon.core.scans import ScanSettings
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
@@ -166,18 +166,25 @@ def test_a_course_trains_all_that_the_study_tries():
 
 def curve(*highs, halves=None):
     points = [
-        Point(DropOff(0.1 * (number + 1)), Estimate(0.8, 0.7, 0.9), Estimate(high - 0.01, high - 0.02, high), half)
-        for number, (high, half) in enumerate(zip(highs, halves or [Estimate(h, h, h) for h in highs], strict=True))
+        Point(
+            DropOff(0.1 * (number + 1)),
+            IntervalEstimate(0.8, 0.7, 0.9),
+            IntervalEstimate(high - 0.01, high - 0.02, high),
+            half,
+        )
+        for number, (high, half) in enumerate(
+            zip(highs, halves or [IntervalEstimate(h, h, h) for h in highs], strict=True)
+        )
     ]
-    return Curve("4 × type2", Estimate(0.9, 0.88, 0.92), tuple(points))
+    return Curve("4 × type2", IntervalEstimate(0.9, 0.88, 0.92), tuple(points))
 
 
 def test_it_begins_at_the_first_size_that_chance_does_not_explain():
     assert curve(0.01, 0.0, -0.001, -0.2).begins.disturbance.size == pytest.approx(0.3)
     assert curve(0.01, 0.0).begins is None
     assert curve(0.01, -0.2).steady
-    assert not curve(0.01, -0.2, halves=[Estimate(0, 0, 0), Estimate(0, -0.1, 0.1)]).steady
+    assert not curve(0.01, -0.2, halves=[IntervalEstimate(0, 0, 0), IntervalEstimate(0, -0.1, 0.1)]).steady
 
 
 def test_changes_are_told_in_points():
-    assert points_in_words(Estimate(-0.041, -0.06, 0.0004)) == "-4.1 points [-6.0, +0.0]"
+    assert points_in_words(IntervalEstimate(-0.041, -0.06, 0.0004)) == "-4.1 points [-6.0, +0.0]"

@@ -9,8 +9,8 @@ from headless import stability
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.robustness.pose_study import StudySettings
-from seip_addon.core.robustness.robust_study import RobustSettings
+from seip_addon.core.robustness.pose_study import PoseStudySettings
+from seip_addon.core.robustness.robust_study import RobustnessSettings
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
 COARSE = [
@@ -31,8 +31,8 @@ LITTLE = stability.Scope(
     grids=8,
     rays=200,
     instances=2,
-    poses=StudySettings(draws=20, draws_of_kind=5),
-    robust=RobustSettings(scenarios=3, unseen=20),
+    poses=PoseStudySettings(draws=20, draws_of_kind=5),
+    robust=RobustnessSettings(scenarios=3, draws=20),
     instants=(2, 12),
 )
 

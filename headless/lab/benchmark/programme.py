@@ -21,7 +21,7 @@ from headless.street_visibility import street_problem
 import numpy as np
 
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.scans import static_scene
 from seip_addon.core.site.candidates import CandidateSettings
@@ -111,7 +111,7 @@ def placements(
     """Compare ways to place sensors at the scene's site and in synthetic streets."""
     own = site.candidates.sensor == site.candidates.sensor[0]
     visible = finish(compute_visibility(site, models, settings)).visible
-    problem = placement_problem(site, visible, models, Goal(count=COUNT))
+    problem = placement_problem(site, visible, models, Objective(count=COUNT))
     problem = replace(
         problem,
         visible=visible[own],

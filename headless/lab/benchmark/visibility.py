@@ -15,7 +15,7 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement import Placement, SolverLimits, solve
-from seip_addon.core.placement.goal import Goal, placement_problem
+from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
@@ -187,7 +187,7 @@ def harms(
 def placed(site: Site, models: Mapping[str, LidarModel], visible: Boolean, time_limit: float) -> Placement:
     """Return the best placement of four sensors of the site's first type, the vanilla problem."""
     sensor = site.candidates.sensor
-    problem = placement_problem(site, visible, models, Goal(count=COUNT))
+    problem = placement_problem(site, visible, models, Objective(count=COUNT))
     return finish(solve(replace(problem, forbidden=sensor != sensor[0]), SolverLimits(time_limit=time_limit)))
 
 

@@ -11,7 +11,7 @@ from headless.detection.intervals import percentiles
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.robustness.estimates import Estimate, student_quantile
+from seip_addon.core.robustness.estimates import IntervalEstimate, student_quantile
 
 DRAWS = 2 * RESAMPLES
 """Resamples of the blocks of traffic; what the first half of them says must be what all say."""
@@ -32,12 +32,12 @@ class Sampled:
         self.draws = resampled_average_precisions(evaluation, seed, DRAWS)
 
 
-def level(those: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+def level(those: Sequence[Sampled], draws: int = DRAWS) -> IntervalEstimate:
     """Return the mean average precision of detectors that differ in their seeds alone."""
     return _estimate([one.value for one in those], [one.draws[:draws] for one in those], those[0].blocks)
 
 
-def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> Estimate:
+def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> IntervalEstimate:
     """Return by how much the mean average precision changes from one trial to another of the same detectors.
 
     Differences are taken detector by detector and, where both had the same
@@ -60,7 +60,7 @@ def change(to: Sequence[Sampled], of: Sequence[Sampled], draws: int = DRAWS) -> 
     )
 
 
-def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> Estimate:
+def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> IntervalEstimate:
     """Return the mean over detectors; its 95 % interval is over other traffic and over other trainings.
 
     Over traffic it is that of the bootstrap, over trainings Student's. Of two
@@ -70,8 +70,8 @@ def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> E
     """
     value = float(np.mean(values))
     if blocks < FEWEST_BLOCKS:
-        return Estimate(value, -math.inf, math.inf)
+        return IntervalEstimate(value, -math.inf, math.inf)
     low, high = percentiles(np.mean(draws, axis=0))
     count = len(values)
     reach = student_quantile(count - 1) * float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
-    return Estimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))
+    return IntervalEstimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))

@@ -10,7 +10,7 @@ from headless.lab.stability.rows import Row
 
 import numpy as np
 
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.estimates import IntervalEstimate
 
 from .disturbances import (
     Capped,
@@ -61,7 +61,7 @@ def limit_rows(study: LimitsStudy) -> tuple[Row, ...]:
     )
 
 
-def points_in_words(change: Estimate) -> str:
+def points_in_words(change: IntervalEstimate) -> str:
     """Return a change of average precision with its interval, in points: hundredths of it."""
     value, low, high = (100 * end for end in (change.value, change.low, change.high))
     return f"{value:+.1f} points [{low:+.1f}, {high:+.1f}]"
@@ -69,7 +69,7 @@ def points_in_words(change: Estimate) -> str:
 
 def _of_spreads(spreads: Sequence[Spread]) -> Row:
     each = (
-        f"{one.configuration}: {one.precision.in_words(1)}, seeds from {min(one.values):.1%} to {max(one.values):.1%}"
+        f"{one.configuration}: {one.precision.describe(1)}, seeds from {min(one.values):.1%} to {max(one.values):.1%}"
         for one in spreads
     )
     return Row(
@@ -126,7 +126,7 @@ def _of_foreign(one: Foreign) -> Row:
     return Row(
         METHOD,
         f"learnt from {one.learnt}, used on {one.tried}",
-        f"{points_in_words(one.change)} against {one.against}: {one.precision.in_words(1)}",
+        f"{points_in_words(one.change)} against {one.against}: {one.precision.describe(1)}",
         "the same frames, paired" if one.against != "at home" else "other frames: compared as a whole",
         "a detector's file says of which sensor types and sites it has learnt; used beyond, a warning names them",
     )
@@ -190,7 +190,7 @@ def _of_padding(one: Foreign) -> Row:
     return Row(
         METHOD,
         f"pillars padded with zeros, {one.tried}",
-        f"{points_in_words(one.change)}: {one.precision.in_words(1)}",
+        f"{points_in_words(one.change)}: {one.precision.describe(1)}",
         "trained as long with the same seeds, the same frames, paired",
         "pillars are not padded: no point appears that was not measured",
     )

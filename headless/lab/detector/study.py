@@ -23,7 +23,7 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 import numpy as np
 
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.estimates import IntervalEstimate
 
 from .disturbances import (
     Capped,
@@ -83,16 +83,16 @@ class Point:
 
     Parameters
     ----------
-    precision, change : Estimate
+    precision, change : IntervalEstimate
         Mean average precision over the detectors, and by how much it differs from that without the disturbance.
-    change_by_half : Estimate
+    change_by_half : IntervalEstimate
         The same from half the resamples.
     """
 
     disturbance: Disturbance
-    precision: Estimate
-    change: Estimate
-    change_by_half: Estimate
+    precision: IntervalEstimate
+    change: IntervalEstimate
+    change_by_half: IntervalEstimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Curve:
     """
 
     configuration: str
-    undisturbed: Estimate
+    undisturbed: IntervalEstimate
     points: tuple[Point, ...]
 
     @property
@@ -142,7 +142,7 @@ class Spread:
 
     configuration: str
     values: tuple[float, ...]
-    precision: Estimate
+    precision: IntervalEstimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +153,9 @@ class Foreign:
     ----------
     learnt, tried : str
         On what they have learnt, and on what they are tried.
-    precision : Estimate
+    precision : IntervalEstimate
         There.
-    change : Estimate
+    change : IntervalEstimate
         Against ``against``.
     against : str
         Whose average precision is subtracted.
@@ -163,8 +163,8 @@ class Foreign:
 
     learnt: str
     tried: str
-    precision: Estimate
-    change: Estimate
+    precision: IntervalEstimate
+    change: IntervalEstimate
     against: str
 
 

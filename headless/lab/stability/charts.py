@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
-from seip_addon.core.placement.near_optimal import FlatTop
+from seip_addon.core.placement.near_optimal import NearOptimalSet
 from seip_addon.core.placement.problem import TIE
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.visibility.rounding import NOTICEABLE, STEP
@@ -187,7 +187,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     _save(figure, path)
 
 
-def save_flat_top_chart(path: str | os.PathLike[str], tops: Sequence[tuple[str, FlatTop]], title: str) -> None:
+def save_flat_top_chart(path: str | os.PathLike[str], tops: Sequence[tuple[str, NearOptimalSet]], title: str) -> None:
     """Draw how many placements near the best share how many positions with it."""
     figure, panels = _figure(len(tops), title)
     for panel, (name, top) in zip(panels, tops, strict=True):

@@ -17,9 +17,9 @@ from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.placement.goal import Goal, Plan
+from seip_addon.core.placement.objective import Objective, Solution
 from seip_addon.core.progress import Progress, within
-from seip_addon.core.robustness.estimates import Estimate
+from seip_addon.core.robustness.estimates import IntervalEstimate
 from seip_addon.core.scans.sensor import level_orientation
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site, Targets, make_site
@@ -190,7 +190,7 @@ def criterion_study(
     draws : int
         Grids, and azimuths, that are drawn at random.
     """
-    goal, random = Goal(count=count), np.random.default_rng(seed)
+    goal, random = Objective(count=count), np.random.default_rng(seed)
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     reach = float(np.hypot(*np.ptp(site.targets.xyz[:, :2], axis=0)))
@@ -315,7 +315,7 @@ def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) 
 
 
 def _by_delta(
-    geometry: SceneGeometry, settings: SurveySettings, goal: Goal
+    geometry: SceneGeometry, settings: SurveySettings, goal: Objective
 ) -> Generator[Progress, None, list[DeltaAnswer]]:
     """Vary δ for one sensor type at one height."""
     judge = Judge(geometry, settings, goal)
@@ -349,7 +349,7 @@ def _by_grid_laid(
     judge: Judge,
     site: Site,
     settings: SurveySettings,
-    best: Plan,
+    best: Solution,
     draws: int,
     random: np.random.Generator,
 ) -> Generator[Progress, None, tuple[Draws, Draws]]:
@@ -442,7 +442,7 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
             Row(
                 method="coverage",
                 regime=draws.what,
-                begins=f"standard deviation {Estimate(draws.spread, low, high).in_points()}",
+                begins=f"standard deviation {IntervalEstimate(draws.spread, low, high).as_points()}",
                 how=f"{len(draws.coverage)} draws" + ("" if draws.settled else "; half of them say otherwise"),
                 answer="differences of coverage below twice that decide nothing",
             )

@@ -23,8 +23,8 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
         Row(
             "coverage of a placement",
             regime,
-            f"planned {study.planned.whole[0]:.2%}; 5 % quantile {study.quantile(0.05).in_words()}, "
-            f"mean {mean_of(study.together.whole).in_words()}",
+            f"planned {study.planned.whole[0]:.2%}; 5 % quantile {study.quantile(0.05).describe()}, "
+            f"mean {mean_of(study.together.whole).describe()}",
             f"{settings.draws} draws, all sensors erring; half of them "
             f"{'say the same' if study.is_converged() else 'say something else: take more'}",
             "placement over pose scenarios; `--pose-errors` says what the 5 % quantile loses",
@@ -33,7 +33,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             "a sensor's own error",
             regime,
             f"{worst} costs most{'' if certain else ', though not for certain'}: "
-            + ", ".join(f"{label} {loss.in_points()}" for label, loss in zip(study.labels, losses, strict=True)),
+            + ", ".join(f"{label} {loss.as_points()}" for label, loss in zip(study.labels, losses, strict=True)),
             "mean loss of coverage when one sensor alone errs, the same draws",
             "the warning names the sensor",
         ),
@@ -44,7 +44,7 @@ def pose_rows(study: PoseStudy) -> tuple[Row, ...]:
             Row(
                 "a kind of error",
                 regime,
-                f"{costly} costs most: " + ", ".join(f"{kind} {loss.in_points()}" for kind, loss in kinds.items()),
+                f"{costly} costs most: " + ", ".join(f"{kind} {loss.as_points()}" for kind, loss in kinds.items()),
                 f"mean loss of coverage, each kind alone, {settings.draws_of_kind} draws",
                 "set what the installer must hold to by the costly kind first",
             )
@@ -61,10 +61,10 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"placement for {contender.name}",
             regime,
             f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
-            f"{contender.judged_by.outcome_in_words()} {contender.low.in_words()} against "
-            f"{study.beside(contender).low.in_words()} of the nominal optimum: "
-            f"{study.saving(contender).in_points()} more",
-            f"{settings.unseen} draws that nothing was chosen on; half of them "
+            f"{contender.judged_by.describe_outcome()} {contender.low.describe()} against "
+            f"{study.beside(contender).low.describe()} of the nominal optimum: "
+            f"{study.saving(contender).as_points()} more",
+            f"{settings.draws} draws that nothing was chosen on; half of them "
             f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
             f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
         )
@@ -85,8 +85,8 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
             f"view of the {WHAT[layer]}",
             regime,
             f"of the targets' weight the empty road promises {seen.empty:.2%} and traffic leaves "
-            f"{seen.held.in_words()} on average over time; of what the empty road promises vehicles hide "
-            f"{seen.hidden.in_words()}, and {seen.rarely:.1%} of its targets are seen less than {MOSTLY:.0%} of the "
+            f"{seen.held.describe()} on average over time; of what the empty road promises vehicles hide "
+            f"{seen.hidden.describe()}, and {seen.rarely:.1%} of its targets are seen less than {MOSTLY:.0%} of the "
             "time",
             how,
             f"a warning where {NOTABLE:.0%} of the weight or more is lost, and a map of the share of time",
@@ -96,8 +96,8 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     gain = Row(
         f"placement for the empty road, to see the {WHAT[study.layer]}",
         regime,
-        f"placing on traffic holds {study.traffic.seen[study.layer].held.in_words()}, "
-        f"{study.won(study.layer).in_points()} more",
+        f"placing on traffic holds {study.traffic.seen[study.layer].held.describe()}, "
+        f"{study.won(study.layer).as_points()} more",
         f"chosen on {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )

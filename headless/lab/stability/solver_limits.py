@@ -14,7 +14,7 @@ from seip_addon.core.placement import Placement, PlacementProblem, SolverLimits,
 from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.placement.integer_program import is_available, reaching
-from seip_addon.core.placement.near_optimal import FlatTop
+from seip_addon.core.placement.near_optimal import NearOptimalSet
 from seip_addon.core.placement.problem import TIE
 from seip_addon.core.progress import Progress, finish
 
@@ -299,7 +299,7 @@ def _check_time(name: str, problem: PlacementProblem, limit: float) -> TimeCheck
     return TimeCheck(name, limit, found.seconds, found.gap, found.status == "optimal")
 
 
-def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, FlatTop]] = ()) -> list[Row]:
+def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] = ()) -> list[Row]:
     """Return where solvers begin to fail; ``tops`` are flat tops of real scenes, by name."""
     rows = []
     methods = dict.fromkeys((check.what, check.method) for check in study.spans)
@@ -355,7 +355,7 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, FlatTop]] = ()) ->
         Row(
             "placement",
             f"flat top, {name}",
-            top.sentence,
+            top.message,
             "all placements, by branch and bound"
             if top.complete
             else "the first branches, and exchanges of one sensor",

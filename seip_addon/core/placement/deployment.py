@@ -117,10 +117,10 @@ def deploy(
     """
     order = _by_added_coverage(visible, chosen)
     hung = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
-    return deployed(site, hung, visible[order])
+    return deployment_of(site, hung, visible[order])
 
 
-def deployed(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
+def deployment_of(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
     """Return sensors with what they see, each and together.
 
     Parameters

@@ -24,7 +24,7 @@ MOST_BRANCHES = 300
 
 
 @dataclass(frozen=True, eq=False)
-class FlatTop:
+class NearOptimalSet:
     """The placements near the best.
 
     Parameters
@@ -56,7 +56,7 @@ class FlatTop:
         return len(self.placements)
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """How many there are, and how different."""
         near = f"within {self.share:.0%} of the best"
         if self.complete and len(self) == 1:
@@ -69,9 +69,9 @@ class FlatTop:
         return f"{many} placements cover {near}; they use {self.positions} positions, {alike}"
 
 
-def near_best(
+def near_optimal_set(
     problem: PlacementProblem, chosen: Integer, share: float = 0.01
-) -> Generator[Progress, None, FlatTop | None]:
+) -> Generator[Progress, None, NearOptimalSet | None]:
     """List the placements that cover within a share of an optimal one.
 
     Parameters
@@ -85,7 +85,7 @@ def near_best(
 
     Returns
     -------
-    FlatTop or None
+    NearOptimalSet or None
         None where there are too many sensors or candidates to search among.
 
     Raises
@@ -99,14 +99,14 @@ def near_best(
     if not is_worthwhile(instance, np.arange(len(instance))):
         return None
     best = problem.covered(chosen) * factor
-    search = _NearBest(instance, (1 - share) * best)
+    search = _NearOptimal(instance, (1 - share) * best)
     finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
     if not finished:
-        search.take_exchanges(np.flatnonzero(np.isin(instance.original, chosen)))
+        search.take_swaps(np.flatnonzero(np.isin(instance.original, chosen)))
     rows = _in_rows([np.sort(instance.original[list(found)]) for found in search.found], len(chosen))
     used = np.append(problem.positions, -1)[rows]
     in_common = np.isin(used, problem.positions[chosen]).sum(axis=1)
-    return FlatTop(
+    return NearOptimalSet(
         share=share,
         placements=rows,
         covered=np.array(list(search.found.values())) / factor,
@@ -116,14 +116,14 @@ def near_best(
     )
 
 
-class _NearBest(Search):
+class _NearOptimal(Search):
     """Lists every placement that reaches the goal."""
 
     def __init__(self, instance: Instance, goal: float) -> None:
         super().__init__(instance, goal, depth_first=True)
         self.found: dict[tuple[int, ...], float] = {}
 
-    def take_exchanges(self, chosen: Integer) -> None:
+    def take_swaps(self, chosen: Integer) -> None:
         """Take a placement, and those that have another candidate in place of one of its own."""
         self.offer(chosen)
         for kept in (np.delete(chosen, number) for number in range(len(chosen))):

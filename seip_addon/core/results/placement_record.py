@@ -21,7 +21,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..placement import Placement
 from ..placement.deployment import Sensor
-from ..placement.goal import Plan
+from ..placement.objective import Solution
 from ..site.site import Site
 from ..storage.files import save_json
 from .headings import degrees, tilt_degrees
@@ -72,12 +72,12 @@ def versions(**more: str) -> dict[str, str]:
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
 
 
-def placement_record(site: Site, plan: Plan, run: Run) -> Record:
+def placement_record(site: Site, plan: Solution, run: Run) -> Record:
     """Return a placement as the value that ``placement.json`` holds.
 
     Parameters
     ----------
-    plan : Plan
+    plan : Solution
         Of that site.
     run : Run
         What it was made with.

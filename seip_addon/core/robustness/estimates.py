@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from statistics import NormalDist
 
 import numpy as np
@@ -22,7 +23,7 @@ FEWEST_STRETCHES = 4
 
 
 @dataclass(frozen=True)
-class Estimate:
+class IntervalEstimate:
     """A figure and its interval.
 
     Parameters
@@ -35,21 +36,21 @@ class Estimate:
     low: float
     high: float
 
-    def agrees_with(self, other: Estimate) -> bool:
+    def agrees_with(self, other: IntervalEstimate) -> bool:
         """Whether the intervals of two estimates meet."""
         return self.low <= other.high and other.low <= self.high
 
-    def in_words(self, decimals: int = 2) -> str:
+    def describe(self, decimals: int = 2) -> str:
         """Return value and interval as shares in per cent."""
         return f"{self.value:.{decimals}%} [{self.low:.{decimals}%}, {self.high:.{decimals}%}]"
 
-    def in_points(self, decimals: int = 2) -> str:
+    def as_points(self, decimals: int = 2) -> str:
         """Return value and interval as differences of shares, in percentage points."""
         value, low, high = (f"{100 * part:.{decimals}f}" for part in (self.value, self.low, self.high))
         return f"{value} points [{low}, {high}]"
 
 
-def mean_of(values: Float) -> Estimate:
+def mean_of(values: Float) -> IntervalEstimate:
     """Estimate a mean; its interval is that of the normal approximation, for some thirty draws and more.
 
     Parameters
@@ -59,12 +60,12 @@ def mean_of(values: Float) -> Estimate:
     """
     mean = math.fsum(values) / len(values)
     if len(values) < 2:
-        return Estimate(mean, -math.inf, math.inf)
+        return IntervalEstimate(mean, -math.inf, math.inf)
     reach = NormalDist().inv_cdf((1 + CONFIDENCE) / 2) * float(values.std(ddof=1)) / math.sqrt(len(values))
-    return Estimate(mean, mean - reach, mean + reach)
+    return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
-def mean_over_time(values: Float, stretch: Integer) -> Estimate:
+def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
     """Estimate a mean of values that depend on each other when they are near in time, by means of stretches.
 
     Stretches are taken as independent and as equally long (batch means; Law 2015,
@@ -81,11 +82,12 @@ def mean_over_time(values: Float, stretch: Integer) -> Estimate:
     means = np.bincount(which, values) / many
     mean, number = math.fsum(values) / len(values), len(many)
     if number < FEWEST_STRETCHES:
-        return Estimate(mean, -math.inf, math.inf)
+        return IntervalEstimate(mean, -math.inf, math.inf)
     reach = student_quantile(number - 1) * float(means.std(ddof=1)) / math.sqrt(number)
-    return Estimate(mean, mean - reach, mean + reach)
+    return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
+@cache
 def student_quantile(freedom: int) -> float:
     """Return the value that Student's t exceeds with a probability of 2.5 %.
 
@@ -116,7 +118,7 @@ def _student_tail(value: float, freedom: int) -> float:
     return (1 - within) / 2
 
 
-def quantile_of(values: Float, share: float) -> Estimate:
+def quantile_of(values: Float, share: float) -> IntervalEstimate:
     """Estimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
 
     The number of draws below the true quantile is binomial, so that the order
@@ -135,14 +137,14 @@ def quantile_of(values: Float, share: float) -> Estimate:
     tail = (1 - CONFIDENCE) / 2
     first = int(np.searchsorted(below, tail, side="right"))  # P(B < first) <= tail
     last = int(np.searchsorted(below, 1 - tail))  # P(B > last) <= tail
-    return Estimate(
+    return IntervalEstimate(
         value=float(ordered[math.ceil(share * number) - 1]),
         low=float(ordered[first - 1]) if first > 0 else -math.inf,
         high=float(ordered[last]) if last < number else math.inf,
     )
 
 
-def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> Estimate:
+def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> IntervalEstimate:
     """Estimate by how much a quantile exceeds another's, draw for draw under the same circumstances.
 
     The interval is that of `RESAMPLES` resamples of the pairs (the percentile bootstrap, Efron 1979).
@@ -161,7 +163,7 @@ def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> 
     picked = np.random.default_rng(seed).integers(0, number, (RESAMPLES, number))
     gains = _at_rank(values[picked], rank) - _at_rank(others[picked], rank)
     low, high = np.quantile(gains, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Estimate(float(_at_rank(values, rank) - _at_rank(others, rank)), float(low), float(high))
+    return IntervalEstimate(float(_at_rank(values, rank) - _at_rank(others, rank)), float(low), float(high))
 
 
 def _at_rank(values: Float, rank: int) -> Float:

@@ -17,10 +17,10 @@ from ..arrays import Boolean, Float
 from ..placement.deployment import Deployment
 from ..progress import Progress
 from ..site.site import Site
-from .disturbed_views import Surroundings, disturbed_views, draws_for
-from .estimates import Estimate, mean_of, quantile_of
+from .estimates import IntervalEstimate, mean_of, quantile_of
 from .pose_errors import KINDS, PoseErrors
-from .views import Views
+from .scenario_visibility import ScenarioVisibility
+from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -29,7 +29,7 @@ NOTABLE = 0.01
 
 
 @dataclass(frozen=True)
-class StudySettings:
+class PoseStudySettings:
     """How pose errors are studied.
 
     Parameters
@@ -82,7 +82,7 @@ class PoseStudy:
         Share of the drawn poses that would have been inside an object, and were turned out of it.
     """
 
-    settings: StudySettings
+    settings: PoseStudySettings
     labels: tuple[str, ...]
     planned: Coverages
     together: Coverages
@@ -90,15 +90,15 @@ class PoseStudy:
     by_kind: dict[str, Coverages]
     blocked: float
 
-    def quantile(self, share: float) -> Estimate:
+    def quantile(self, share: float) -> IntervalEstimate:
         """Estimate a quantile of the whole coverage."""
         return quantile_of(self.together.whole, share)
 
-    def loss_by_sensor(self) -> tuple[Estimate, ...]:
+    def loss_by_sensor(self) -> tuple[IntervalEstimate, ...]:
         """Estimate what is lost of the whole coverage on average when each sensor alone errs."""
         return tuple(mean_of(self.planned.whole[0] - coverages.whole) for coverages in self.alone)
 
-    def loss_by_kind(self) -> dict[str, Estimate]:
+    def loss_by_kind(self) -> dict[str, IntervalEstimate]:
         """Estimate what is lost of the whole coverage on average by each kind of error alone."""
         return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
 
@@ -122,7 +122,7 @@ class PoseStudy:
 def pose_study(
     around: Surroundings,
     deployment: Deployment,
-    settings: StudySettings,
+    settings: PoseStudySettings,
 ) -> Generator[Progress, None, PoseStudy]:
     """Find what a placement covers when its poses err.
 
@@ -134,9 +134,9 @@ def pose_study(
     site = around.site
     poses = np.array([sensor.pose for sensor in deployment.sensors if sensor.pose is not None], dtype=np.int64)
 
-    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[Views, Boolean]]:
+    def views(errors: PoseErrors, draws: int) -> Generator[Progress, None, tuple[ScenarioVisibility, Boolean]]:
         drawn, blocked = draws_for(around, poses, errors, draws, settings.seed)
-        seen = yield from disturbed_views(around, poses, drawn)
+        seen = yield from visibility_under_errors(around, poses, drawn)
         return seen, blocked
 
     as_planned, _ = yield from views(PoseErrors(0.0, 0.0, 0.0, 0.0), 1)
@@ -165,7 +165,7 @@ def _coverages(site: Site, views: Sequence[Boolean]) -> Coverages:
     return Coverages(seen.mean(axis=1), seen[:, central].mean(axis=1) if central.any() else None)
 
 
-def _one_errs(site: Site, planned: Boolean, together: Views, number: int) -> Coverages:
+def _one_errs(site: Site, planned: Boolean, together: ScenarioVisibility, number: int) -> Coverages:
     others = np.delete(planned, number, axis=0).any(axis=0)
     return _coverages(site, [np.stack([others, row]) for row in together.seen_by_pose(number)])
 
@@ -173,10 +173,10 @@ def _one_errs(site: Site, planned: Boolean, together: Views, number: int) -> Cov
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
     """Say where a placement does not hold what was planned, in sentences."""
     lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
-    return (pose_sentence(study),) if lost >= NOTABLE else ()
+    return (pose_message(study),) if lost >= NOTABLE else ()
 
 
-def pose_sentence(study: PoseStudy) -> str:
+def pose_message(study: PoseStudy) -> str:
     """Say what a placement covers in one of twenty cases, and which sensor's error costs most."""
     errors, low = study.settings.errors, study.quantile(QUANTILES[0])
     lost = max(study.planned.whole[0] - low.value, 0.0)

@@ -65,7 +65,7 @@ class Risk:
         """Fewer sensors than these have no outcome but zero."""
         return self.seen_by + (self.failure != "none")
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         """Name what is to be large."""
         of = {1.0: "expected coverage", 0.0: "coverage in the worst scenario"}.get(
             self.tail, f"mean coverage of the worst {self.tail:.0%} of the scenarios"
@@ -74,7 +74,7 @@ class Risk:
         lost = {"none": "", "worst": ", the most important sensor lost", "mean": ", any one sensor lost"}[self.failure]
         return of + twice + lost
 
-    def outcome_in_words(self) -> str:
+    def describe_outcome(self) -> str:
         """Name the outcome of one scenario."""
         by = "" if self.seen_by == 1 else f" by at least {self.seen_by} sensors"
         lost = {

@@ -49,7 +49,7 @@ from ..placement.solver import solve_within
 from ..progress import Progress, within
 from .risk import Risk
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
-from .views import Views
+from .scenario_visibility import ScenarioVisibility
 
 ROUNDS = 16
 """Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
@@ -67,7 +67,7 @@ TOO_SHORT = "the time was too short to prove this placement the best: the gap sa
 
 def solve_robust(
     problem: PlacementProblem,
-    scenarios: Views,
+    scenarios: ScenarioVisibility,
     risk: Risk,
     limits: SolverLimits = DEFAULT_LIMITS,
     foreseen: Sequence[Placement] | None = None,
@@ -78,7 +78,7 @@ def solve_robust(
     ----------
     problem : PlacementProblem
         With the visibility of the poses as planned.
-    scenarios : Views
+    scenarios : ScenarioVisibility
         Of all candidates.
     risk : Risk
         What is to be large.
@@ -99,7 +99,7 @@ def solve_robust(
     """
     most = problem.most_sensors
     if most < risk.least_sensors:
-        raise SeipError(f"{risk.in_words()} needs at least {risk.least_sensors} sensors, not {most}; allow more")
+        raise SeipError(f"{risk.describe()} needs at least {risk.least_sensors} sensors, not {most}; allow more")
     different = _without_copies(scenarios)
     plain = risk.seen_by == 1 and risk.failure == "none"
     if plain and len(different) == 1:
@@ -116,7 +116,7 @@ def solve_robust(
 
 
 def foresee(
-    problem: PlacementProblem, scenarios: Views, solver: str, clock: Clock
+    problem: PlacementProblem, scenarios: ScenarioVisibility, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
     """Solve each scenario as if it were known that it comes: no placement does better there.
 
@@ -139,7 +139,7 @@ def foresee(
 
 def _with_foresight(
     problem: PlacementProblem,
-    scenarios: Views,
+    scenarios: ScenarioVisibility,
     risk: Risk,
     placement: Placement,
     foreseen: Sequence[Placement],
@@ -183,18 +183,18 @@ def at_least(found: Placement, other: Placement, reached: float) -> Placement:
     )
 
 
-def outcomes_of(problem: PlacementProblem, scenarios: Views, risk: Risk, chosen: Integer) -> Float:
+def outcomes_of(problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, chosen: Integer) -> Float:
     """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
     return risk.outcomes(scenarios.seen_by_each(chosen), problem.weights, problem.most_sensors)
 
 
-def _without_copies(scenarios: Views) -> Views:
+def _without_copies(scenarios: ScenarioVisibility) -> ScenarioVisibility:
     """Return one scenario where all are the same, so that without errors nothing is rounded otherwise."""
     same = (scenarios.packed == scenarios.packed[:1]).all()
-    return Views(scenarios.packed[:1], scenarios.targets) if same else scenarios
+    return ScenarioVisibility(scenarios.packed[:1], scenarios.targets) if same else scenarios
 
 
-def _stacked(problem: PlacementProblem, scenarios: Views, share: Float) -> PlacementProblem:
+def _stacked(problem: PlacementProblem, scenarios: ScenarioVisibility, share: Float) -> PlacementProblem:
     """Return the problem of all scenarios' targets, those of each weighted by its share; without those of share 0."""
     used = np.flatnonzero(share)
     visible = np.concatenate([scenarios.seen(scenario) for scenario in used], axis=1)
@@ -202,7 +202,7 @@ def _stacked(problem: PlacementProblem, scenarios: Views, share: Float) -> Place
 
 
 def _searched(
-    problem: PlacementProblem, scenarios: Views, risk: Risk, solver: str, clock: Clock
+    problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, solver: str, clock: Clock
 ) -> Generator[Progress, None, Placement]:
     """Find scenarios' weights with a small bound, then the best placement by branch and bound."""
     yield Progress(0, 0, "reducing the scenarios' targets")
@@ -236,7 +236,7 @@ class FictitiousPlay:
         Of all scenarios: candidates that can matter, with their constraints.
     """
 
-    def __init__(self, problem: PlacementProblem, scenarios: Views, risk: Risk, whole: Instance) -> None:
+    def __init__(self, problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, whole: Instance) -> None:
         self._scenarios, self._risk, self._whole = scenarios, risk, whole
         self._weight = problem.weights
         self._used = problem.weights > 0

@@ -28,7 +28,7 @@ _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class TrafficObstacles:
     """What stands on the road at one instant, beside what always does; k road users of n triangles together.
 
     Parameters
@@ -43,7 +43,7 @@ class Standing:
     hulls: Float
 
 
-NOBODY = Standing(np.empty((0, 3, 3)), np.empty((0, 8, 3)))
+NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty((0, 8, 3)))
 """The empty road."""
 
 
@@ -71,10 +71,10 @@ class Instants:
         """Return n."""
         return len(self.time)
 
-    def standing(self) -> list[Standing]:
+    def obstacles(self) -> list[TrafficObstacles]:
         """Return who stands where at each instant."""
         return [
-            standing(self.runs[run], self.runs[run].at(time))
+            obstacles_of(self.runs[run], self.runs[run].at(time))
             for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True)
         ]
 
@@ -117,10 +117,10 @@ def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
             )
 
 
-def standing(trajectories: Trajectories, snapshot: Snapshot) -> Standing:
+def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
     """Return the bodies of an instant's road users where they are."""
     if len(snapshot) == 0:
-        return NOBODY
+        return NO_TRAFFIC
     attitudes = rotations(snapshot.yaw, snapshot.pitch)
     triangles, hulls = [], []
     for user, position, attitude in zip(snapshot.user.tolist(), snapshot.position, attitudes, strict=True):
@@ -128,7 +128,7 @@ def standing(trajectories: Trajectories, snapshot: Snapshot) -> Standing:
         low, high = own.min(axis=(0, 1)) - _MARGIN, own.max(axis=(0, 1)) + _MARGIN
         triangles.append(position + own @ attitude.T)
         hulls.append(position + (low + _CORNERS * (high - low)) @ attitude.T)
-    return Standing(np.concatenate(triangles), np.array(hulls))
+    return TrafficObstacles(np.concatenate(triangles), np.array(hulls))
 
 
 def _name(run: Trajectories) -> str:

@@ -16,13 +16,13 @@ from ..arrays import Boolean, Float, Integer
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
 from ..placement.clock import DEFAULT_LIMITS
 from ..progress import Progress
-from .disturbed_views import Surroundings
-from .estimates import Estimate, mean_over_time
+from .estimates import IntervalEstimate, mean_over_time
 from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
-from .traffic_instants import NOBODY, Instants, Standing
-from .traffic_views import HEIGHT, Layer, traffic_views
-from .views import Views
+from .scenario_visibility import ScenarioVisibility
+from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
+from .visibility_in_traffic import HEIGHT, Layer, visibility_in_traffic
+from .visibility_under_errors import Surroundings
 
 NOTABLE = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
@@ -38,7 +38,7 @@ WHAT: Mapping[Layer, str] = {"road": "road", "height": f"points {HEIGHT:g} m abo
 
 
 @dataclass(frozen=True, eq=False)
-class Scenarios:
+class TrafficScenarios:
     """What all candidates see at the instants that a placement is chosen on.
 
     Parameters
@@ -47,17 +47,17 @@ class Scenarios:
         What is to be seen.
     empty : (c, t) bool
         On the empty road.
-    views : Views
+    views : ScenarioVisibility
         At each instant.
     """
 
     layer: Layer
     empty: Boolean
-    views: Views
+    views: ScenarioVisibility
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class TrafficCoverage:
     """What a placement sees on the empty road and at n instants of traffic.
 
     Parameters
@@ -84,17 +84,17 @@ class Seen:
     stretch: Integer
 
     @property
-    def held(self) -> Estimate:
+    def held(self) -> IntervalEstimate:
         """The share of the targets' weight that is seen, on average over time."""
         return mean_over_time(self.at, self.stretch)
 
     @property
-    def lost(self) -> Estimate:
+    def lost(self) -> IntervalEstimate:
         """How much less that is than on the empty road: what is hidden, less what returns from vehicles show."""
         return mean_over_time(self.empty - self.at, self.stretch)
 
     @property
-    def hidden(self) -> Estimate:
+    def hidden(self) -> IntervalEstimate:
         """Of the weight that is seen on the empty road, the share that vehicles hide, on average over time."""
         return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.stretch)
 
@@ -103,26 +103,26 @@ class Seen:
         """Of the targets seen on the empty road, the share that is seen less than `MOSTLY` of the time."""
         return float((self.time[self.empty_targets] < MOSTLY).mean()) if self.empty_targets.any() else 0.0
 
-    def more_than(self, other: Seen) -> Estimate:
+    def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
         """Estimate how much more of the weight is seen than by another placement at the same instants."""
         return mean_over_time(self.at - other.at, self.stretch)
 
 
 @dataclass(frozen=True, eq=False)
-class InTraffic:
+class JudgedInTraffic:
     """A placement and what becomes of it in traffic that it was not chosen on.
 
     Parameters
     ----------
     name : str
         What it was chosen for.
-    seen : mapping of {"road", "height"} to Seen
+    seen : mapping of {"road", "height"} to TrafficCoverage
         Of the targets, and of the points `HEIGHT` metres above them.
     """
 
     name: str
     placement: Placement
-    seen: Mapping[Layer, Seen]
+    seen: Mapping[Layer, TrafficCoverage]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,19 +137,19 @@ class TrafficStudy:
         Instants of traffic that one of the two was chosen on.
     road_users : float
         On the road at an instant that is judged, on average.
-    empty : InTraffic
+    empty : JudgedInTraffic
         Chosen for the empty road.
-    traffic : InTraffic
+    traffic : JudgedInTraffic
         Chosen on traffic.
     """
 
     layer: Layer
     chosen_at: int
     road_users: float
-    empty: InTraffic
-    traffic: InTraffic
+    empty: JudgedInTraffic
+    traffic: JudgedInTraffic
 
-    def won(self, layer: Layer) -> Estimate:
+    def won(self, layer: Layer) -> IntervalEstimate:
         """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
@@ -163,18 +163,18 @@ class TrafficStudy:
 
 def look_at_traffic(
     around: Surroundings, problem: PlacementProblem, instants: Instants, layer: Layer = "road"
-) -> Generator[Progress, None, Scenarios]:
+) -> Generator[Progress, None, TrafficScenarios]:
     """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
     every = np.flatnonzero(problem.allowed)
-    views = yield from traffic_views(around, every, [NOBODY, *instants.standing()], layer)
+    views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
     spread = views.spread_to(every, len(problem.visible))
-    return Scenarios(layer, spread.seen(0), Views(spread.packed[1:], spread.targets))
+    return TrafficScenarios(layer, spread.seen(0), ScenarioVisibility(spread.packed[1:], spread.targets))
 
 
 def traffic_study(
     around: Surroundings,
     problem: PlacementProblem,
-    scenarios: Scenarios,
+    scenarios: TrafficScenarios,
     judged: Instants,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, TrafficStudy]:
@@ -195,31 +195,31 @@ def traffic_study(
     reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
-    crowds = judged.standing()
+    obstacles = judged.obstacles()
     layers: tuple[Layer, ...] = ("road", "height")
-    views: dict[Layer, Views] = {}
+    views: dict[Layer, ScenarioVisibility] = {}
     for layer in layers:
-        views[layer] = yield from traffic_views(around, used, [NOBODY, *crowds], layer)
+        views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
 
-    def judge(name: str, placement: Placement) -> InTraffic:
+    def judge(name: str, placement: Placement) -> JudgedInTraffic:
         rows = np.searchsorted(used, placement.chosen)
         seen = {layer: _seen(views[layer], rows, problem.weights, judged.stretch) for layer in layers}
-        return InTraffic(name, placement, seen)
+        return JudgedInTraffic(name, placement, seen)
 
     return TrafficStudy(
         layer=scenarios.layer,
         chosen_at=len(scenarios.views),
-        road_users=_users(crowds),
+        road_users=_users(obstacles),
         empty=judge("the empty road", empty),
         traffic=judge("traffic", placed),
     )
 
 
-def _seen(views: Views, rows: Integer, weight: Float, stretch: Integer) -> Seen:
+def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, stretch: Integer) -> TrafficCoverage:
     """Return what some poses see together; the first of the views is of the empty road."""
     seen = views.seen_by_any(rows)
     share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
-    return Seen(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
+    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
 
 
 def tried_in_traffic(
@@ -234,17 +234,17 @@ def tried_in_traffic(
     weight : (t,) float64
         Of the targets.
     """
-    crowds = instants.standing()
-    views = yield from traffic_views(around, poses, [NOBODY, *crowds], "road")
+    obstacles = instants.obstacles()
+    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")
     seen = _seen(views, np.arange(len(poses)), weight, instants.stretch)
     return (
-        f"{IN_TRAFFIC} ({_users(crowds):.0f} road users at a time) this placement sees {seen.held.in_words()} of the "
-        f"road on average over time, {seen.empty:.2%} when it is empty"
+        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.held.describe()} of "
+        f"the road on average over time, {seen.empty:.2%} when it is empty"
     )
 
 
-def _users(crowds: Sequence[Standing]) -> float:
-    return float(np.mean([len(crowd.hulls) for crowd in crowds]))
+def _users(obstacles: Sequence[TrafficObstacles]) -> float:
+    return float(np.mean([len(instant.hulls) for instant in obstacles]))
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
@@ -261,6 +261,6 @@ def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
         return losses
     doubt = (
         "in traffic that it was not chosen on this placement is not known to see more than the best one for the empty "
-        f"road: {won.in_words()} more; choose on more --instants, or keep that one"
+        f"road: {won.describe()} more; choose on more --instants, or keep that one"
     )
     return (*losses, doubt)

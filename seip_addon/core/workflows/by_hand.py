@@ -14,8 +14,8 @@ from ..geometry.orientation import angles_of, orientation
 from ..geometry.plan import surface_height
 from ..lidar import find_models, load_catalogue
 from ..placement import Placement
-from ..placement.deployment import Sensor, deployed, sensor_at
-from ..placement.goal import MOVED, Goal, Plan, target_weights
+from ..placement.deployment import Sensor, deployment_of, sensor_at
+from ..placement.objective import MOVED, Objective, Solution, target_weights
 from ..progress import Progress
 from ..results.headings import degrees, tilt_degrees
 from ..results.placement_record import Record
@@ -31,15 +31,15 @@ BY_HAND = "by hand"
 
 
 def judge(
-    layout: Layout, grid: VisibilityGrid, goal: Goal, hung: Sequence[MountedSensor], places: Mapping[str, str]
-) -> Generator[Progress, None, Plan]:
+    layout: Layout, grid: VisibilityGrid, goal: Objective, hung: Sequence[MountedSensor], places: Mapping[str, str]
+) -> Generator[Progress, None, Solution]:
     """Find what sensors see where they hang; those at candidate poses see what the grid says.
 
     Parameters
     ----------
     grid : VisibilityGrid
         Of the layout.
-    goal : Goal
+    goal : Objective
         That the placement answered which they were moved from: its weights, and whether a price was sought.
     hung : sequence of MountedSensor
         In the order of their labels.
@@ -52,7 +52,7 @@ def judge(
 
     Returns
     -------
-    Plan
+    Solution
         Without bound, gap or greedy answer.
 
     Raises
@@ -77,7 +77,7 @@ def judge(
         sensors.append(sensor)
         rows.append(eyes.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
-    deployment = deployed(site, sensors, seen)
+    deployment = deployment_of(site, sensors, seen)
     covered = float(target_weights(site, goal)[deployment.seen_by > 0].sum())
     placement = Placement(
         chosen=np.array([sensor.pose for sensor in sensors if sensor.pose is not None], dtype=np.int64),
@@ -90,10 +90,10 @@ def judge(
         covered=covered,
         price=deployment.price,
     )
-    return Plan(goal, placement, None, deployment)
+    return Solution(goal, placement, None, deployment)
 
 
-def restored_by_hand(layout: Layout, grid: VisibilityGrid, record: Record) -> Generator[Progress, None, Plan]:
+def restored_by_hand(layout: Layout, grid: VisibilityGrid, record: Record) -> Generator[Progress, None, Solution]:
     """Return the plan that the record of a `judge` tells of.
 
     Parameters

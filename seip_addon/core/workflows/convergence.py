@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import SeipError
 from ..placement.deployment import weighted_share
-from ..placement.goal import Goal, Plan, make_plan, target_weights
+from ..placement.objective import Objective, Solution, optimise, target_weights
 from ..progress import Progress, within
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
@@ -100,7 +100,7 @@ class Convergence:
 
 
 def coarsest_settings(
-    geometry: SceneGeometry, settings: SurveySettings, goal: Goal, tolerance: float
+    geometry: SceneGeometry, settings: SurveySettings, goal: Objective, tolerance: float
 ) -> Generator[Progress, None, Convergence]:
     """Find the coarsest spacings whose answer to a goal stays within a tolerance.
 
@@ -183,7 +183,7 @@ class Judge:
         δ and the sensor types that judge.
     """
 
-    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Goal) -> None:
+    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Objective) -> None:
         spacing = max(JUDGED_ON, math.sqrt(geometry.region.area / MOST_JUDGED))
         wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
         self.site = make_site(geometry, wide, spacing, settings.reach())
@@ -206,11 +206,11 @@ class Judge:
             judged=self.judge(plan),
         )
 
-    def plan(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Plan]:
+    def plan(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
         """Return the best placement on a site."""
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
         return (
-            yield from make_plan(
+            yield from optimise(
                 site,
                 grid.visible,
                 self._models,
@@ -219,7 +219,7 @@ class Judge:
             )
         )
 
-    def judge(self, plan: Plan) -> float:
+    def judge(self, plan: Solution) -> float:
         """Return the share of the fine grid's weight that a placement sees."""
         seen = np.zeros(len(self.site.targets), dtype=bool)
         for sensor in plan.deployment.sensors:

@@ -3,55 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from ..errors import SeipError
 from ..placement.deployment import deploy
-from ..placement.goal import Goal, Plan, placement_problem, with_count
+from ..placement.objective import Objective, Solution, placement_problem, with_count
 from ..progress import Progress
-from ..robustness.pose_errors import PoseErrors, require_draws
-from ..robustness.pose_study import PoseStudy, StudySettings, pose_study, pose_warnings
-from ..robustness.risk import Risk
-from ..robustness.robust_study import RobustSettings, RobustStudy, robust_study
+from ..robustness.pose_study import PoseStudy, PoseStudySettings, pose_study, pose_warnings
+from ..robustness.robust_study import RobustnessSettings, RobustStudy, robust_study
 from ..visibility.grid import VisibilityGrid
 from .survey import Layout, surroundings
 
 DRAWS_OF_KIND = 100
 """Draws with one kind of error alone, at most."""
-
-
-@dataclass(frozen=True)
-class Precaution:
-    """What a placement is to stand, and how that is tried.
-
-    Parameters
-    ----------
-    risk : Risk
-        What is to be large.
-    errors : PoseErrors
-        Of the sensors' poses.
-    scenarios : int
-        Draws to choose on.
-    draws : int
-        Unseen draws to judge by.
-    seed : int
-        Of the scenarios; the unseen draws have the next one.
-
-    Raises
-    ------
-    SeipError
-        There is nothing to choose on, or nothing to judge by.
-    """
-
-    risk: Risk
-    errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = 20
-    draws: int = 500
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        require_draws(self.scenarios)
-        require_draws(self.draws)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,21 +24,21 @@ class RobustPlan:
 
     Parameters
     ----------
-    plan : Plan
-        Objective, bound and gap are of what the precaution asks for; its notes say so.
+    plan : Solution
+        Objective, bound and gap are of what the robustness settings ask for; its notes say so.
     study : RobustStudy
         It beside the plan that trusts the map.
     judged : PoseStudy
         What pose errors do to it.
     """
 
-    plan: Plan
+    plan: Solution
     study: RobustStudy
     judged: PoseStudy
 
 
-def check_precaution(goal: Goal) -> None:
-    """Raise SeipError where a goal allows no precaution."""
+def check_robust_objective(goal: Objective) -> None:
+    """Raise SeipError where a goal allows no settings."""
     if goal.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
@@ -83,7 +47,7 @@ def check_precaution(goal: Goal) -> None:
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, goal: Goal, precaution: Precaution
+    layout: Layout, grid: VisibilityGrid, goal: Objective, settings: RobustnessSettings
 ) -> Generator[Progress, None, RobustPlan]:
     """Answer a goal on a survey for what may go wrong.
 
@@ -91,34 +55,25 @@ def place_robustly(
     ----------
     grid : VisibilityGrid
         Of the poses as planned.
-    goal : Goal
+    goal : Objective
         Of most coverage.
 
     Raises
     ------
     SeipError
-        As for `check_precaution`, `placement_problem` and `solve_robust`.
+        As for `check_robust_objective`, `placement_problem` and `solve_robust`.
     """
-    check_precaution(goal)
+    check_robust_objective(goal)
     site, models, around = layout.site, layout.models, surroundings(layout)
-    settings = RobustSettings(
-        errors=precaution.errors,
-        scenarios=precaution.scenarios,
-        unseen=precaution.draws,
-        seed=precaution.seed,
-        limits=layout.settings.limits,
-    )
     problem = placement_problem(site, grid.visible, models, goal)
-    study = yield from robust_study(around, problem, settings, [precaution.risk])
+    study = yield from robust_study(around, problem, settings, [settings.risk], layout.settings.limits)
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
-    tried = StudySettings(
-        precaution.errors, precaution.draws, min(DRAWS_OF_KIND, precaution.draws), precaution.seed + 1
-    )
+    tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
     judged = yield from pose_study(around, deployment, tried)
-    note = f"chosen for {chosen.name} over {precaution.scenarios} scenarios: objective, bound and gap are of that"
+    note = f"chosen for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
     notes = (note, *chosen.placement.notes, robust_sentence(study), *pose_warnings(judged))
-    plan = Plan(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
+    plan = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
     return RobustPlan(plan, study, judged)
 
 
@@ -127,6 +82,6 @@ def robust_sentence(study: RobustStudy) -> str:
     (chosen,) = study.robust
     return (
         f"against the placement for poses as planned it gives away {study.price(chosen):.2%} of planned coverage; "
-        f"{chosen.judged_by.outcome_in_words()} is at least {chosen.low.in_words()} in nineteen of twenty of "
-        f"{study.settings.unseen} unseen draws, not {study.beside(chosen).low.in_words()}"
+        f"{chosen.judged_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
+        f"{study.settings.draws} unseen draws, not {study.beside(chosen).low.describe()}"
     )

@@ -16,14 +16,14 @@ from ..lidar import LidarModel, find_models, load_catalogue
 from ..placement import Placement
 from ..placement.clock import SolverLimits
 from ..placement.deployment import deploy
-from ..placement.goal import Goal, Plan, make_plan, placement_problem, target_weights
 from ..placement.integer_program import check_solver
-from ..placement.near_optimal import near_best
+from ..placement.near_optimal import near_optimal_set
+from ..placement.objective import Objective, Solution, optimise, placement_problem, target_weights
 from ..progress import Progress
 from ..results.headings import tilt_degrees
 from ..results.placement_record import Record, Run, placement_record
-from ..robustness.disturbed_views import Surroundings
-from ..robustness.pose_study import StudySettings, pose_sentence, pose_study
+from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
+from ..robustness.visibility_under_errors import Surroundings
 from ..site.candidates import CandidateSettings, assumed_pole_warnings
 from ..site.far_objects import without_far_objects
 from ..site.obstruction import bareness_warnings
@@ -37,7 +37,7 @@ from ..visibility.ring_resolution import resolution_warnings
 from ..visibility.rounding import rounding_warnings
 from ..visibility.store import stored_visibility
 
-POSES_TRIED = StudySettings(draws=100, draws_of_kind=0)
+POSES_TRIED = PoseStudySettings(draws=100, draws_of_kind=0)
 """What a placement is tried with where that is asked for."""
 
 
@@ -207,16 +207,16 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
 
 
 def place(
-    layout: Layout, grid: VisibilityGrid, goal: Goal, *, pose_errors: bool = False
-) -> Generator[Progress, None, Plan]:
+    layout: Layout, grid: VisibilityGrid, goal: Objective, *, pose_errors: bool = False
+) -> Generator[Progress, None, Solution]:
     """Answer a goal on a survey, and note how far the answer can be trusted.
 
-    The notes of the placement say how many others are as good (`near_best`). With ``pose_errors`` they also say what
-    it loses where its sensors do not hang quite as planned (`pose_sentence`): rays are cast for that, and for nothing
-    else.
+    The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say
+    what it loses where its sensors do not hang quite as planned (`pose_message`): rays are cast for that, and for
+    nothing else.
     """
     site, models, settings = layout.site, layout.models, layout.settings
-    steps = make_plan(
+    steps = optimise(
         site,
         grid.visible,
         models,
@@ -226,11 +226,11 @@ def place(
     plan = yield from steps
     notes = [*plan.placement.notes]
     if plan.placement.status == "optimal" and not goal.cheapest:
-        top = yield from near_best(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
-        notes += [] if top is None else [top.sentence]
+        top = yield from near_optimal_set(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
+        notes += [] if top is None else [top.message]
     if pose_errors and plan.deployment.sensors:
         study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
-        notes.append(pose_sentence(study))
+        notes.append(pose_message(study))
     return replace(plan, placement=replace(plan.placement, notes=tuple(notes)))
 
 
@@ -262,7 +262,7 @@ class Circumstances:
 def record_of(  # what was asked for stands in the record
     layout: Layout,
     grid: VisibilityGrid,
-    plan: Plan,
+    plan: Solution,
     circumstances: Circumstances,
     *,
     render: bool,
@@ -289,14 +289,14 @@ def record_of(  # what was asked for stands in the record
     return placement_record(layout.site, plan, run)
 
 
-def recorded_goal(record: Record) -> Goal:
+def recorded_goal(record: Record) -> Objective:
     """Return the goal that a record's placement answers."""
     asked = record["settings"]["goal"]
     named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
-    return Goal(**named)
+    return Objective(**named)
 
 
-def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
+def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Solution:
     """Return the plan that a record of `record_of` tells of, without asking a solver again.
 
     Parameters
@@ -330,4 +330,4 @@ def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Plan:
         price=record["price_usd"],
         notes=tuple(record["notes"]),
     )
-    return Plan(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))
+    return Solution(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))

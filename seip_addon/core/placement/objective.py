@@ -25,11 +25,11 @@ DEFAULT_COUNT = 4
 
 MOVED = "moved by hand"
 """Status of a placement whose sensors hang where a hand has put them."""
-MOVED_SENTENCE = "Moved by hand: judged where the sensors hang; nothing is proven of it."
+MOVED_MESSAGE = "Moved by hand: judged where the sensors hang; nothing is proven of it."
 
 
 @dataclass(frozen=True)
-class Goal:
+class Objective:
     """What is asked for: the most coverage for N sensors or a budget, or a coverage for the least money.
 
     Parameters
@@ -83,12 +83,12 @@ class Goal:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Solution:
     """An answer to a goal.
 
     Parameters
     ----------
-    goal : Goal
+    goal : Objective
         With the number of sensors filled in where none was asked for.
     placement : Placement
         With its certificate.
@@ -98,7 +98,7 @@ class Plan:
         The chosen sensors and what they see.
     """
 
-    goal: Goal
+    goal: Objective
     placement: Placement
     greedy: Placement | None
     deployment: Deployment
@@ -107,14 +107,14 @@ class Plan:
     def certificate(self) -> str:
         """How good the placement provably is, as a sentence."""
         if self.placement.status == MOVED:
-            return MOVED_SENTENCE
+            return MOVED_MESSAGE
         best = "cheapest" if self.goal.cheapest else "best"
         if self.placement.status == "optimal":
             return f"Proven: the {best} placement that there is among these candidates."
         return f"Within {self.placement.gap:.2%} of the {best} placement possible among these candidates."
 
 
-def target_weights(site: Site, goal: Goal) -> NDArray[np.float64]:
+def target_weights(site: Site, goal: Objective) -> NDArray[np.float64]:
     """Weight of each target under a goal, (t,) float64."""
     if goal.central_weight is None:
         return np.ones(len(site.targets))
@@ -126,7 +126,7 @@ def target_weights(site: Site, goal: Goal) -> NDArray[np.float64]:
 
 
 def placement_problem(
-    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], goal: Goal
+    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], goal: Objective
 ) -> PlacementProblem:
     """State a goal on a site as a maximal covering location problem.
 
@@ -164,19 +164,19 @@ def placement_problem(
     )
 
 
-def check_goal(site: Site, models: Mapping[str, LidarModel], goal: Goal) -> None:
+def check_objective(site: Site, models: Mapping[str, LidarModel], goal: Objective) -> None:
     """Raise SeipError where a site can be seen not to allow a goal before any ray is cast."""
     everything = np.ones((len(site.candidates), len(site.targets)), dtype=bool)
     placement_problem(site, everything, models, goal)
 
 
-def make_plan(
+def optimise(
     site: Site,
     visible: NDArray[np.bool_],
     models: Mapping[str, LidarModel],
-    goal: Goal,
+    goal: Objective,
     limits: SolverLimits = DEFAULT_LIMITS,
-) -> Generator[Progress, None, Plan]:
+) -> Generator[Progress, None, Solution]:
     """Answer a goal on a site: the most coverage, or the least price for a coverage.
 
     Parameters
@@ -198,10 +198,10 @@ def make_plan(
     else:
         placement = yield from solve(problem, limits)
         greedy = solve_greedy(problem)
-    return Plan(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
+    return Solution(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
 
 
-def with_count(goal: Goal, site: Site) -> Goal:
+def with_count(goal: Objective, site: Site) -> Objective:
     """Fill in the number of sensors where nothing is asked for that limits it."""
     free = goal.count is None and goal.budget is None and goal.coverage is None
     return replace(goal, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else goal

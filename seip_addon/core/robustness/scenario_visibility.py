@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class Views:
+class ScenarioVisibility:
     """Which of s poses sees which of t targets in each of n circumstances.
 
     Parameters
@@ -52,11 +52,11 @@ class Views:
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)
         return np.unpackbits(joined, axis=1, count=self.targets).view(bool)
 
-    def spread_to(self, poses: Integer, number: int) -> Views:
+    def spread_to(self, poses: Integer, number: int) -> ScenarioVisibility:
         """Return views of that many poses, of which these are ``poses`` and the others see nothing."""
         packed = np.zeros((len(self), number, self.packed.shape[2]), dtype=np.uint8)
         packed[:, poses] = self.packed
-        return Views(packed, self.targets)
+        return ScenarioVisibility(packed, self.targets)
 
 
 def each_in_threads(

@@ -9,17 +9,24 @@ import numpy as np
 import pytest
 from engines import ANY, each_engine, needs_any
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from placement_oracle import cases
 from synthetic_junction import junction_site, make_candidates
 from traffic_by_hand import make_model, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.disturbed_views import Surroundings
-from seip_addon.core.robustness.traffic_instants import NOBODY, STRETCH, WARM_UP, check_runs, spread_instants, standing
-from seip_addon.core.robustness.traffic_views import HEIGHT, traffic_views
+from seip_addon.core.robustness.traffic_instants import (
+    NO_TRAFFIC,
+    STRETCH,
+    WARM_UP,
+    check_runs,
+    obstacles_of,
+    spread_instants,
+)
+from seip_addon.core.robustness.visibility_in_traffic import HEIGHT, visibility_in_traffic
+from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster
@@ -60,7 +67,7 @@ def crowd(poses, categories):
     users = [RoadUser(f"{n}", category, *SIZES[category]) for n, category in enumerate(categories)]
     ways = [[(0.0, x, y, 0.0, yaw, 0.0), (10.0, x, y, 0.0, yaw, 0.0)] for x, y, yaw in poses]
     runs = make_trajectories(*ways, users=users)
-    return standing(runs, runs.at(1.0))
+    return obstacles_of(runs, runs.at(1.0))
 
 
 crowds = st.lists(
@@ -74,7 +81,7 @@ crowds = st.lists(
 
 
 def views(instants, layer="road", around=AROUND):
-    seen = finish(traffic_views(around, POSES, instants, layer))
+    seen = finish(visibility_in_traffic(around, POSES, instants, layer))
     return np.array([seen.seen(instant) for instant in range(len(instants))])
 
 
@@ -108,21 +115,21 @@ def beams_past(bodies, pose):
 
 
 @each_engine
-@hypothesis_settings(max_examples=15)
+@cases(15, 3)
 @given(bodies=crowds)
 def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
     around = replace(AROUND, engine=engine)
     assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine)).all()
 
 
-@hypothesis_settings(max_examples=5)
+@cases(5, 2)
 @given(bodies=crowds)
 def test_only_returns_that_are_strong_enough_count(bodies):
     sight = VisibilitySettings(delta=DELTA, min_intensity=0.3)
     assert (views([bodies], around=replace(AROUND, sight=sight))[0] == by_full_scan(bodies, settings=sight)).all()
 
 
-@hypothesis_settings(max_examples=5)
+@cases(5, 2)
 @given(bodies=crowds)
 def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
     found = views([bodies], "height")[0]
@@ -132,10 +139,10 @@ def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
 
 def test_the_empty_road_is_the_visibility_grid():
     grid = finish(compute_visibility(SITE, MODELS, AROUND.sight, ANY))
-    assert (views([NOBODY])[0] == grid.visible).all()
+    assert (views([NO_TRAFFIC])[0] == grid.visible).all()
 
 
-@hypothesis_settings(max_examples=10)
+@cases(10, 3)
 @given(bodies=crowds, more=crowds)
 def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
     both = replace(
@@ -143,7 +150,7 @@ def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
         triangles=np.concatenate([bodies.triangles, more.triangles]),
         hulls=np.concatenate([bodies.hulls, more.hulls]),
     )
-    nobody, some, all_of_them = views([NOBODY, bodies, both], "height")
+    nobody, some, all_of_them = views([NO_TRAFFIC, bodies, both], "height")
     assert (all_of_them <= some).all()
     assert (some <= nobody).all()
 
@@ -152,7 +159,7 @@ def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
 def test_neither_order_nor_company_of_instants_matters(layer):
     instants = [
         crowd([(12.0, 2.0, 0.0)], ["bus"]),
-        NOBODY,
+        NO_TRAFFIC,
         crowd([(2.0, 14.0, 1.5), (-20.0, 0.0, 0.2)], ["truck", "car"]),
         crowd([(0.0, 0.0, 0.8)], ["truck"]),
     ]
@@ -166,13 +173,13 @@ def test_neither_order_nor_company_of_instants_matters(layer):
 def test_a_truck_hides_the_lane_behind_it_and_shows_where_it_stands():
     pose = 0  # at (9, 9, 5)
     truck = crowd([(-4.0, 4.0, 0.0)], ["truck"])
-    nobody, before = views([NOBODY, truck], "height")[:, pose]
+    nobody, before = views([NO_TRAFFIC, truck], "height")[:, pose]
     x, y = SITE.targets.xyz[:, 0], SITE.targets.xyz[:, 1]
     behind = (np.abs(x + 9.0) <= 2.0) & (np.abs(y - 2.0) <= 2.0)
     assert (nobody & ~before)[behind].any()
     away = x > 12.0
     assert (nobody == before)[away].all()
-    road = views([NOBODY, truck])[:, pose]
+    road = views([NO_TRAFFIC, truck])[:, pose]
     under = (np.abs(x + 4.0) < 4.5) & (np.abs(y - 4.0) < 1.25 + DELTA)
     assert (road[1] & ~road[0])[under].any()
     assert not (road[1] & ~road[0])[~(np.hypot(x + 4.0, y - 4.0) < 5.0 + DELTA)].any()
@@ -188,7 +195,7 @@ def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
         part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
         assert part.tolist() == list(range(16))
     assert len(np.unique(one.stretch)) == 2 * max(1, round((10.0 - WARM_UP) / STRETCH))
-    assert [len(crowd.hulls) for crowd in one.standing()] == [1] * 16 + [2] * 16
+    assert [len(crowd.hulls) for crowd in one.obstacles()] == [1] * 16 + [2] * 16
 
 
 def test_traffic_that_is_of_no_use_is_refused():

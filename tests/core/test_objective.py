@@ -5,7 +5,7 @@ import pytest
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement.goal import Goal, check_goal, make_plan, placement_problem, target_weights
+from seip_addon.core.placement.objective import Objective, check_objective, optimise, placement_problem, target_weights
 from seip_addon.core.progress import finish
 
 
@@ -15,7 +15,7 @@ def example():
 
 
 def problem(example, **goal):
-    return placement_problem(example.site, example.visible, example.models, Goal(**goal))
+    return placement_problem(example.site, example.visible, example.models, Objective(**goal))
 
 
 def test_without_a_goal_four_sensors_are_sought(example):
@@ -26,9 +26,9 @@ def test_without_a_goal_four_sensors_are_sought(example):
 
 def test_weights_count_in_the_weighted_problem_alone(example):
     central = example.site.targets.central
-    assert set(target_weights(example.site, Goal())) == {1.0}
-    assert set(target_weights(example.site, Goal(central_weight="scene"))[central]) == {2.0}
-    weights = target_weights(example.site, Goal(central_weight=7.5))
+    assert set(target_weights(example.site, Objective())) == {1.0}
+    assert set(target_weights(example.site, Objective(central_weight="scene"))[central]) == {2.0}
+    weights = target_weights(example.site, Objective(central_weight=7.5))
     assert set(weights[central]) == {7.5}
     assert set(weights[~central]) == {1.0}
 
@@ -41,25 +41,25 @@ def test_prices_come_from_the_catalogue(example):
 
 def test_demands_by_name_are_met(example):
     names = example.site.candidates.position_name.tolist()
-    goal = Goal(count=3, mandatory=(names[0],), forbidden=tuple(names[5:]))
-    placement = finish(make_plan(example.site, example.visible, example.models, goal)).placement
+    goal = Objective(count=3, mandatory=(names[0],), forbidden=tuple(names[5:]))
+    placement = finish(optimise(example.site, example.visible, example.models, goal)).placement
     chosen = {names[example.site.candidates.position_of[pose]] for pose in placement.chosen}
     assert names[0] in chosen
     assert chosen <= set(names[:5])
 
 
 def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
-    goal = Goal(coverage=0.6)
-    plan = finish(make_plan(example.site, example.visible, example.models, goal))
+    goal = Objective(coverage=0.6)
+    plan = finish(optimise(example.site, example.visible, example.models, goal))
     assert plan.deployment.coverage >= 0.6
     assert plan.greedy is None
-    cheaper = Goal(budget=plan.placement.price - 1)
-    other = finish(make_plan(example.site, example.visible, example.models, cheaper))
+    cheaper = Objective(budget=plan.placement.price - 1)
+    other = finish(optimise(example.site, example.visible, example.models, cheaper))
     assert other.deployment.coverage < 0.6
 
 
 def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
-    plan = finish(make_plan(example.site, example.visible, example.models, Goal()))
+    plan = finish(optimise(example.site, example.visible, example.models, Objective()))
     assert plan.goal.count == 4
     assert plan.greedy.objective <= plan.placement.objective
     assert plan.deployment.seen_by.tolist() == example.visible[plan.placement.chosen].sum(axis=0).tolist()
@@ -84,7 +84,7 @@ def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
 )
 def test_each_fault_has_its_sentence(example, goal, sentence):
     with pytest.raises(SeipError, match=sentence):
-        check_goal(example.site, example.models, Goal(**goal))
+        check_objective(example.site, example.models, Objective(**goal))
 
 
 def test_the_weighted_problem_needs_a_weighted_region(example):
@@ -92,4 +92,4 @@ def test_the_weighted_problem_needs_a_weighted_region(example):
     targets = type(site.targets)(site.targets.xyz, site.targets.weight, np.zeros(len(site.targets), bool), 1.0)
     bare = type(site)(site.name, site.origin, site.region, targets, site.candidates, site.triangles)
     with pytest.raises(SeipError, match="needs a weighted region"):
-        target_weights(bare, Goal(central_weight=2.0))
+        target_weights(bare, Objective(central_weight=2.0))

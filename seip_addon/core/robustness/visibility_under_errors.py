@@ -17,7 +17,7 @@ from ..visibility.observer import places
 from ..visibility.ray_casting import Engine, engine_name, make_ray_caster
 from ..visibility.rotated_sensors import Onlooker
 from .pose_errors import PoseDraws, PoseErrors, draw_errors, out_of_objects
-from .views import Views, each_in_threads
+from .scenario_visibility import ScenarioVisibility, each_in_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,9 @@ def draws_for(
     return out_of_objects(drawn, candidates.xyz[poses], around.objects)
 
 
-def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> Generator[Progress, None, Views]:
+def visibility_under_errors(
+    around: Surroundings, poses: Integer, draws: PoseDraws
+) -> Generator[Progress, None, ScenarioVisibility]:
     """Look from poses as draws of errors leave them; sensors of several types at one place share rays.
 
     Parameters
@@ -83,4 +85,4 @@ def disturbed_views(around: Surroundings, poses: Integer, draws: PoseDraws) -> G
 
     works = [(draw, members) for draw in range(len(draws)) for members in together]
     yield from each_in_threads(look, works, caster.threads, "looking from poses as they may be")
-    return Views(packed, len(site.targets))
+    return ScenarioVisibility(packed, len(site.targets))
