@@ -170,7 +170,7 @@ def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting,
 
 
 @given(under_risk(risks=[Risk()]))
-@cases(40)
+@cases(40, 10)
 def test_worst_is_below_tail_is_below_expectation(case):
     problem, views, _ = case
     worst, tail, mean = (finish(solve_robust(problem, pack(views), Risk(tail=share))) for share in (0.0, 0.5, 1.0))
@@ -180,7 +180,7 @@ def test_worst_is_below_tail_is_below_expectation(case):
 
 
 @given(small_problems(), st.sampled_from(RISKS[:4]))
-@cases(40)
+@cases(40, 12)
 def test_without_errors_it_is_the_nominal_answer(problem, risk):
     assume(all_placements(problem))
     nominal = finish(solve(problem))
@@ -191,7 +191,7 @@ def test_without_errors_it_is_the_nominal_answer(problem, risk):
 
 
 @given(under_risk(), st.randoms(use_true_random=False))
-@cases(60)
+@cases(60, 15)
 def test_the_order_of_candidates_does_not_matter(case, random):
     problem, views, risk = case
     order = list(range(len(problem.visible)))

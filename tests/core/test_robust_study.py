@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
 from headless.lab.stability.robustness_rows import robust_rows
@@ -25,13 +26,13 @@ from seip_addon.core.robustness.visibility_under_errors import Surroundings, dra
 from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
 MODELS = load_catalogue()
-SETTINGS = RobustnessSettings(scenarios=4, draws=30)
+SETTINGS = RobustnessSettings(scenarios=4, draws=20)
 LIMITS = SolverLimits(time_limit=20.0)
 
 
 @pytest.fixture(scope="module")
 def laid_out():
-    site = junction_site(positions=12, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
+    site = junction_site(positions=8, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
     goal = placement_problem(site, grid.visible, MODELS, Objective(count=2))
@@ -100,11 +101,16 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
         left = [(np.delete(view, gone, axis=0).sum(axis=0) >= risk.seen_by).mean() for gone in range(len(view))]
         return {"none": whole, "worst": min(left), "mean": np.mean(left)}[risk.failure]
 
+    @cache
+    def looks(*chosen):
+        poses = np.array(chosen)
+        drawn, _ = draws_for(around, poses, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
+        return finish(visibility_under_errors(around, poses, drawn))
+
     for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
         for judged in (contender, study_of_losses.beside(contender)):
             chosen = judged.placement.chosen
-            drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
-            views = finish(visibility_under_errors(around, chosen, drawn))
+            views = looks(*chosen.tolist())
             expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.draws)]
             assert judged.unseen == pytest.approx(expected, abs=1e-12)
             assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)

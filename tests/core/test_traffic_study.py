@@ -32,7 +32,7 @@ from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibili
 
 pytestmark = needs_any
 
-MODELS = load_catalogue()
+MODELS = {key: replace(model, points_per_second=model.points_per_second / 6) for key, model in load_catalogue().items()}
 BUS = RoadUser("bus", "bus", 12.0, 2.5, 3.2)
 
 
@@ -50,7 +50,7 @@ def queue(seed, *, end=60.0):
 
 @pytest.fixture(scope="module")
 def laid_out():
-    site = junction_site(positions=12, sensors=("hdl32e", "vlp16"), heights=(3.5,), spacing=4.0)
+    site = junction_site(positions=8, sensors=("hdl32e", "vlp16"), heights=(3.5,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
     problem = placement_problem(site, grid.visible, MODELS, Objective(count=2))
@@ -150,7 +150,7 @@ def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
         assert (seen.at == seen.empty).all()
         assert seen.rarely == 0.0
     assert traffic_warnings(found) == ()
-    assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(24), [NO_TRAFFIC])).seen(0))[
+    assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(16), [NO_TRAFFIC])).seen(0))[
         problem.allowed
     ].all()
 

@@ -129,7 +129,7 @@ def test_only_returns_that_are_strong_enough_count(bodies):
     assert (views([bodies], around=replace(AROUND, sight=sight))[0] == by_full_scan(bodies, settings=sight)).all()
 
 
-@cases(5, 2)
+@cases(5, 1)
 @given(bodies=crowds)
 def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
     found = views([bodies], "height")[0]
