@@ -21,7 +21,7 @@ from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
-from .visibility_in_traffic import HEIGHT, Layer, visibility_in_traffic
+from .visibility_in_traffic import HEIGHT, TrafficLayer, visibility_in_traffic
 from .visibility_under_errors import Surroundings
 
 NOTABLE = 0.01
@@ -33,7 +33,7 @@ IN_TRAFFIC = "in traffic"
 MOSTLY = 0.9
 """Share of time from which on a target counts as mostly seen."""
 
-WHAT: Mapping[Layer, str] = {"road": "road", "height": f"points {HEIGHT:g} m above the road"}
+WHAT: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {HEIGHT:g} m above the road"}
 """What is seen, in words."""
 
 
@@ -51,7 +51,7 @@ class TrafficScenarios:
         At each instant.
     """
 
-    layer: Layer
+    layer: TrafficLayer
     empty: Boolean
     views: ScenarioVisibility
 
@@ -122,7 +122,7 @@ class JudgedInTraffic:
 
     name: str
     placement: Placement
-    seen: Mapping[Layer, TrafficCoverage]
+    seen: Mapping[TrafficLayer, TrafficCoverage]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,13 +143,13 @@ class TrafficStudy:
         Chosen on traffic.
     """
 
-    layer: Layer
+    layer: TrafficLayer
     chosen_at: int
     road_users: float
     empty: JudgedInTraffic
     traffic: JudgedInTraffic
 
-    def won(self, layer: Layer) -> IntervalEstimate:
+    def won(self, layer: TrafficLayer) -> IntervalEstimate:
         """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
@@ -162,7 +162,7 @@ class TrafficStudy:
 
 
 def look_at_traffic(
-    around: Surroundings, problem: PlacementProblem, instants: Instants, layer: Layer = "road"
+    around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, TrafficScenarios]:
     """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
     every = np.flatnonzero(problem.allowed)
@@ -196,8 +196,8 @@ def traffic_study(
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
     obstacles = judged.obstacles()
-    layers: tuple[Layer, ...] = ("road", "height")
-    views: dict[Layer, ScenarioVisibility] = {}
+    layers: tuple[TrafficLayer, ...] = ("road", "height")
+    views: dict[TrafficLayer, ScenarioVisibility] = {}
     for layer in layers:
         views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
 

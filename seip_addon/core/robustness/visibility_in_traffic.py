@@ -34,7 +34,7 @@ from .scenario_visibility import ScenarioVisibility, each_in_threads
 from .traffic_instants import TrafficObstacles
 from .visibility_under_errors import Surroundings
 
-Layer = Literal["road", "height"]
+TrafficLayer = Literal["road", "height"]
 
 HEIGHT = 1.5
 """Metres above its target at which a car has its roof, and a van or a truck its side."""
@@ -46,7 +46,7 @@ _CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).resha
 
 
 def visibility_in_traffic(
-    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: Layer = "road"
+    around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, ScenarioVisibility]:
     """Look from poses at instants of traffic.
 
