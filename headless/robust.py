@@ -21,7 +21,8 @@ from headless.options import add_goal, add_settings, new_parser, read_goal, read
 from seip_addon.core.placement.objective import check_objective
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.workflows.robust import RobustnessSettings, RobustPlan, place_robustly
+from seip_addon.core.robustness.robust_study import RobustnessSettings
+from seip_addon.core.workflows.robust import RobustPlan, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
@@ -29,7 +30,7 @@ CHARTS = ("spread.png", "blame.png", "frontier.png")
 def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, robustness = read_goal(options), _precaution(options)
+    goal, robustness = read_goal(options), _robustness(options)
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
@@ -52,7 +53,7 @@ def _in_words(robust: RobustPlan) -> str:
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, the nominal optimum's {nominal.planned:.2%}",
-            f"over {study.settings.unseen} unseen draws, {chosen.judged_by.describe_outcome()}:",
+            f"over {study.settings.draws} unseen draws, {chosen.judged_by.describe_outcome()}:",
             f"mean {chosen.mean.describe()}, the nominal optimum's {nominal.mean.describe()}",
             f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
             f"which is {study.saving(chosen).describe()} more, draw for draw",
@@ -62,7 +63,7 @@ def _in_words(robust: RobustPlan) -> str:
     )
 
 
-def _precaution(options: argparse.Namespace) -> RobustnessSettings:
+def _robustness(options: argparse.Namespace) -> RobustnessSettings:
     height = options.position_error if options.height_error is None else options.height_error
     yaw = options.tilt_error if options.yaw_error is None else options.yaw_error
     errors = PoseErrors(options.position_error, height, math.radians(yaw), math.radians(options.tilt_error))

@@ -56,7 +56,7 @@ class IntervalEstimate:
 
 
 def mean_of(values: Float) -> IntervalEstimate:
-    """IntervalEstimate a mean; its interval is that of the normal approximation, for some thirty draws and more.
+    """Estimate a mean; its interval is that of the normal approximation, for some thirty draws and more.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def mean_of(values: Float) -> IntervalEstimate:
 
 
 def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
-    """IntervalEstimate a mean of values that depend on each other when they are near in time, by means of stretches.
+    """Estimate a mean of values that depend on each other when they are near in time, by means of stretches.
 
     Stretches are taken as independent and as equally long (batch means; Law 2015,
     section 9.5.3), and Student's interval is that of their means.
@@ -187,7 +187,7 @@ def _ranks(values: Float) -> Float:
 
 
 def quantile_of(values: Float, share: float) -> IntervalEstimate:
-    """IntervalEstimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
+    """Estimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
 
     The number of draws below the true quantile is binomial, so that the order
     statistics between which it lies follow from n and ``share`` alone. The
@@ -212,7 +212,7 @@ def quantile_of(values: Float, share: float) -> IntervalEstimate:
 
 
 def quantile_gain(values: Float, others: Float, share: float, seed: int = 0) -> IntervalEstimate:
-    """IntervalEstimate by how much a quantile exceeds another's, draw for draw under the same circumstances.
+    """Estimate by how much a quantile exceeds another's, draw for draw under the same circumstances.
 
     The interval is that of `RESAMPLES` resamples of the pairs (the percentile bootstrap, Efron 1979).
 

@@ -15,7 +15,8 @@ from ..core.errors import SeipError
 from ..core.placement.objective import Objective, check_objective
 from ..core.progress import Progress
 from ..core.results.placement_record import versions
-from ..core.workflows.robust import RobustnessSettings, check_robust_objective, place_robustly
+from ..core.robustness.robust_study import RobustnessSettings
+from ..core.workflows.robust import check_robust_objective, place_robustly
 from ..core.workflows.survey import Provenance, place, record_of
 from ..scene.write import write_result
 from ..session import SceneSurvey

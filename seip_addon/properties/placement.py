@@ -11,7 +11,7 @@ from .. import selection
 from ..core.placement.objective import DEFAULT_COUNT, Objective
 from ..core.robustness.pose_errors import STEEPEST, PoseErrors
 from ..core.robustness.risk import Risk
-from ..core.workflows.robust import RobustnessSettings
+from ..core.robustness.robust_study import RobustnessSettings
 from .conversion import as_typed, of_setting
 
 TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}

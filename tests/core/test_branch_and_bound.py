@@ -8,9 +8,9 @@ from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import small_problems
+from placement_oracle import cases, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import branch_and_bound
@@ -53,7 +53,7 @@ def _relax(request):
         yield
 
 
-@settings(max_examples=200, deadline=None)
+@cases(200)
 @given(small_problems(), st.floats(0.0, 1.0))
 def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     instance = reduced(problem)
@@ -77,7 +77,7 @@ def test_all_best_placements_are_listed_or_proven_absent(problem, share):
     assert few.overflowed == (len(search.found) > 1)
 
 
-@settings(max_examples=300, deadline=None)
+@cases(300)
 @given(small_problems())
 def test_the_first_in_order_is_found(problem):
     instance = reduced(problem)
@@ -106,7 +106,7 @@ def test_an_uneven_street_is_solved_as_well_as_an_even_one():
     assert instance.value(chosen) == best
 
 
-@settings(max_examples=100, deadline=None)
+@cases(100)
 @given(small_problems(), st.integers(1, 6))
 def test_the_bound_of_a_search_that_was_stopped_holds_and_the_search_can_go_on(problem, branches):
     instance = reduced(problem)

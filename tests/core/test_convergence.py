@@ -68,6 +68,7 @@ def test_the_coarsest_is_taken_where_nothing_is_gained_and_the_finest_where_all_
     assert picked(growing) == convergence.CANDIDATE_SPACINGS[-1]
 
 
+@pytest.mark.slow
 @needs_any
 def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
     goal, tolerance = Objective(count=2), 0.02

@@ -285,7 +285,7 @@ def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch
 def test_a_long_program_can_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
     before = set(threading.enumerate())
-    steps = solve(street_problem(60, 1000, blocks=2, count=8), SolverLimits(time_limit=60.0))
+    steps = solve(street_problem(40, 500, blocks=2, count=8), SolverLimits(time_limit=60.0))
     while "integer program" not in next(steps).what:
         pass
     next(steps)
@@ -428,6 +428,7 @@ def test_breaking_ties_takes_no_longer_than_the_proof(monkeypatch: pytest.Monkey
         return broken(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(solver, "canonical_optimum", noted)
+    monkeypatch.setattr(solver, "LEAST_FOR_TIES", 0.5)
     placement = finish(solver.solve_within(problem, "highs", clock))
     assert placement.status == "optimal"
     assert any("not all ties were broken" in note for note in placement.notes)

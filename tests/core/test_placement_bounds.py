@@ -7,15 +7,15 @@ from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import small_problems
+from placement_oracle import cases, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import bounds
 from seip_addon.core.placement.bounds import lagrangian_bound
 from seip_addon.core.placement.clock import Clock
-from seip_addon.core.placement.decomposition import district_bound
+from seip_addon.core.placement.decomposition import decomposition_bound
 from seip_addon.core.placement.greedy import greedy, tabu_search
 from seip_addon.core.placement.instance import make_instance
 from seip_addon.core.progress import finish
@@ -38,16 +38,16 @@ def feasible(instance):
     return [choice for choice in choices if instance.feasible(choice)]
 
 
-@settings(max_examples=150, deadline=None)
+@cases(150)
 @given(small_problems(), st.floats(0.0, 1.0))
 def test_no_placement_covers_more_than_the_districts_allow(problem, share):
     instance = reduced(problem)
     assume(instance is not None)
     best = max(map(instance.value, feasible(instance)), default=0.0)
-    assert finish(district_bound(instance, share * best, forever(), math.inf)) >= best - instance.slack
+    assert finish(decomposition_bound(instance, share * best, forever(), math.inf)) >= best - instance.slack
 
 
-@settings(max_examples=150, deadline=None)
+@cases(150)
 @given(small_problems(), st.floats(0.0, 1.0))
 def test_every_placement_that_reaches_the_goal_is_left(problem, share):
     instance = reduced(problem)
@@ -62,7 +62,7 @@ def test_every_placement_that_reaches_the_goal_is_left(problem, share):
     assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)
 
 
-@settings(max_examples=100, deadline=None)
+@cases(100)
 @given(small_problems())
 def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
     instance = reduced(problem)
@@ -79,7 +79,7 @@ def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
     chosen = greedy(instance, np.zeros(0, np.int64))
     searched = finish(tabu_search(instance, chosen, forever(), math.inf))
     _, bound = finish(lagrangian_bound(instance, instance.value(searched), forever()))
-    by_districts = finish(district_bound(instance, instance.value(searched), forever(), math.inf))
+    by_districts = finish(decomposition_bound(instance, instance.value(searched), forever(), math.inf))
     assert instance.value(chosen) < instance.value(searched) <= by_districts < bound.value
     again = finish(tabu_search(instance, chosen, forever(), math.inf))
     np.testing.assert_array_equal(searched, again)

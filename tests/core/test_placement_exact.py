@@ -7,16 +7,16 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import all_placements, covered, merit, small_problems
+from placement_oracle import all_placements, cases, covered, merit, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, cheapest_for_coverage, solve, solve_greedy, ties
 from seip_addon.core.progress import finish
 
-thorough = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
-quick = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+thorough = cases(150)
+quick = cases(40)
 
 
 @pytest.mark.parametrize("listed", [1, ties.MANY], ids=["ties by programs", "ties listed"])

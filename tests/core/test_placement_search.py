@@ -11,7 +11,7 @@ from placement_search import UNDECIDED, WEIGHTS, faults, search, sentence
 from seip_addon.core.placement import PlacementProblem, cheapest_for_coverage, solve
 from seip_addon.core.progress import finish
 
-QUICK = 60
+QUICK = 40
 MANY = 3000
 
 

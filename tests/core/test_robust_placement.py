@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import all_placements, covered, small_problems
+from placement_oracle import all_placements, cases, covered, small_problems
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
@@ -73,7 +73,7 @@ def by_hand(problem, views, risk, choice):
 
 
 @given(under_risk())
-@settings(max_examples=150, deadline=None)
+@cases(150)
 def test_no_subset_is_better(case):
     problem, views, risk = case
     answer = finish(solve_robust(problem, pack(views), risk))
@@ -170,7 +170,7 @@ def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting,
 
 
 @given(under_risk(risks=[Risk()]))
-@settings(max_examples=40, deadline=None)
+@cases(40, 10)
 def test_worst_is_below_tail_is_below_expectation(case):
     problem, views, _ = case
     worst, tail, mean = (finish(solve_robust(problem, pack(views), Risk(tail=share))) for share in (0.0, 0.5, 1.0))
@@ -180,7 +180,7 @@ def test_worst_is_below_tail_is_below_expectation(case):
 
 
 @given(small_problems(), st.sampled_from(RISKS[:4]))
-@settings(max_examples=40, deadline=None)
+@cases(40, 12)
 def test_without_errors_it_is_the_nominal_answer(problem, risk):
     assume(all_placements(problem))
     nominal = finish(solve(problem))
@@ -191,7 +191,7 @@ def test_without_errors_it_is_the_nominal_answer(problem, risk):
 
 
 @given(under_risk(), st.randoms(use_true_random=False))
-@settings(max_examples=60, deadline=None)
+@cases(60, 15)
 def test_the_order_of_candidates_does_not_matter(case, random):
     problem, views, risk = case
     order = list(range(len(problem.visible)))

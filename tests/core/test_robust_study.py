@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
 from headless.lab.stability.robustness_rows import robust_rows
@@ -20,18 +21,18 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
 from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
-from seip_addon.core.visibility.grid import compute_visibility
-from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.grid import VisibilitySettings, compute_visibility
 
 MODELS = load_catalogue()
-SETTINGS = RobustSettings(scenarios=4, unseen=30, limits=SolverLimits(time_limit=20.0))
+SETTINGS = RobustnessSettings(scenarios=4, draws=20)
+LIMITS = SolverLimits(time_limit=20.0)
 
 
 @pytest.fixture(scope="module")
 def laid_out():
-    site = junction_site(positions=12, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
+    site = junction_site(positions=8, sensors=("type1", "type2"), heights=(5.4,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
     goal = placement_problem(site, grid.visible, MODELS, Objective(count=2))
@@ -40,7 +41,7 @@ def laid_out():
 
 @pytest.fixture(scope="module")
 def study(laid_out):
-    return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)]))
+    return finish(robust_study(*laid_out, SETTINGS, [Risk(), Risk(tail=0.0)], LIMITS))
 
 
 def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
@@ -49,9 +50,9 @@ def test_all_are_judged_by_draws_that_none_was_chosen_on(laid_out, study):
     assert nominal.placement.chosen.tolist() == finish(solve(problem)).chosen.tolist()
     for contender in (nominal, *study.robust):
         chosen = contender.placement.chosen
-        drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
+        drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
         views = finish(visibility_under_errors(around, chosen, drawn))
-        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.unseen)]
+        expected = [views.seen(draw).any(axis=0).mean() for draw in range(SETTINGS.draws)]
         assert contender.unseen == pytest.approx(expected, abs=1e-12)
         assert not problem.forbidden[chosen].any()
 
@@ -65,7 +66,7 @@ def test_a_search_that_found_worse_than_the_nominal_optimum_is_not_followed(laid
         return replace(finish(solve(problem)), chosen=np.array([worst]), objective=0.0, status="feasible")
 
     monkeypatch.setattr("seip_addon.core.robustness.robust_study.solve_robust", poor)
-    found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)]))
+    found = finish(robust_study(around, problem, SETTINGS, [Risk(tail=0.0)], LIMITS))
     (contender,), (nominal,) = found.robust, found.nominal
     assert contender.placement.chosen.tolist() == nominal.placement.chosen.tolist()
     assert contender.placement.objective > 0
@@ -88,7 +89,7 @@ LOSSES = [Risk(failure="worst"), Risk(tail=0.5, seen_by=2), Risk(seen_by=2), Ris
 
 @pytest.fixture(scope="module")
 def study_of_losses(laid_out):
-    return finish(robust_study(*laid_out, SETTINGS, LOSSES))
+    return finish(robust_study(*laid_out, SETTINGS, LOSSES, LIMITS))
 
 
 def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_optimum(laid_out, study_of_losses):
@@ -100,12 +101,17 @@ def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_opti
         left = [(np.delete(view, gone, axis=0).sum(axis=0) >= risk.seen_by).mean() for gone in range(len(view))]
         return {"none": whole, "worst": min(left), "mean": np.mean(left)}[risk.failure]
 
+    @cache
+    def looks(*chosen):
+        poses = np.array(chosen)
+        drawn, _ = draws_for(around, poses, SETTINGS.errors, SETTINGS.draws, SETTINGS.seed + 1)
+        return finish(visibility_under_errors(around, poses, drawn))
+
     for contender, risk in zip(study_of_losses.robust, LOSSES, strict=True):
         for judged in (contender, study_of_losses.beside(contender)):
             chosen = judged.placement.chosen
-            drawn, _ = draws_for(around, chosen, SETTINGS.errors, SETTINGS.unseen, SETTINGS.seed + 1)
-            views = finish(visibility_under_errors(around, chosen, drawn))
-            expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.unseen)]
+            views = looks(*chosen.tolist())
+            expected = [outcome(views.seen(draw), risk) for draw in range(SETTINGS.draws)]
             assert judged.unseen == pytest.approx(expected, abs=1e-12)
             assert judged.undisturbed == pytest.approx(outcome(problem.visible[chosen], risk), abs=1e-12)
         assert (contender.unseen < contender.planned).any()
@@ -125,7 +131,7 @@ def test_it_says_what_is_compared(study, study_of_losses, tmp_path):
 
 
 def test_without_errors_robustness_is_free(laid_out):
-    settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, unseen=2)
+    settings = replace(SETTINGS, errors=PoseErrors(0.0, 0.0, 0.0, 0.0), scenarios=2, draws=2)
     study = finish(robust_study(*laid_out, settings, [Risk(tail=0.5)]))
     (robust,) = study.robust
     assert robust.placement.chosen.tolist() == study.nominal[0].placement.chosen.tolist()

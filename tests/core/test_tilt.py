@@ -11,8 +11,8 @@ import shapely
 from engines import ANY, each_engine
 from float64_rays import nearest_return
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from placement_oracle import cases
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.errors import SeipError
@@ -91,7 +91,7 @@ def tilted(site, yaw, tilt):
 
 @each_engine
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2]))
-@hypothesis_settings(max_examples=20)
+@cases(20, 4)
 def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, min_intensity):
     site, settings = patch(seed), VisibilitySettings(delta, min_intensity)
     full = finish(full_scan_visibility(site, MODELS, settings, make_ray_caster(site.triangles, engine)))
@@ -99,7 +99,7 @@ def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, min_intensity):
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-4, 4), TILT)
-@hypothesis_settings(max_examples=15)
+@cases(15, 4)
 def test_a_tilted_candidate_sees_what_an_onlooker_sees_and_what_rays_in_float64_return_from(seed, yaw, tilt):
     site = tilted(patch(seed, poses=1), yaw, tilt)
     visible, poses = grid_of(site).visible, site.candidates
@@ -247,7 +247,7 @@ def test_places_part_tilts_and_pieces_keep_each_pose_once():
     assert finish(estimate_visibility(site, MODELS, SIGHT, ANY)).places == 3
 
 
-def test_disturbed_views_without_a_disturbance_are_the_grid_whatever_hangs_at_one_place():
+def test_visibility_without_errors_is_the_grid_whatever_hangs_at_one_place():
     site = patch(5, poses=2)
     poses = site.candidates
     together = replace(poses, xyz=np.repeat(poses.xyz[:1], 4, axis=0), yaw=np.full(4, 0.3), tilt=poses.tilt)

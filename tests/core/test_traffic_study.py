@@ -33,7 +33,7 @@ from seip_addon.core.visibility.settings import VisibilitySettings
 
 pytestmark = needs_any
 
-MODELS = load_catalogue()
+MODELS = {key: replace(model, points_per_second=model.points_per_second / 6) for key, model in load_catalogue().items()}
 BUS = RoadUser("bus", "bus", 12.0, 2.5, 3.2)
 
 
@@ -51,7 +51,7 @@ def queue(seed, *, end=60.0):
 
 @pytest.fixture(scope="module")
 def laid_out():
-    site = junction_site(positions=12, sensors=("hdl32e", "vlp16"), heights=(3.5,), spacing=4.0)
+    site = junction_site(positions=8, sensors=("hdl32e", "vlp16"), heights=(3.5,), spacing=4.0)
     around = Surroundings(site, MODELS, VisibilitySettings(delta=2.0), engine=ANY)
     grid = finish(compute_visibility(site, MODELS, around.sight, ANY))
     problem = placement_problem(site, grid.visible, MODELS, Objective(count=2))
@@ -62,7 +62,7 @@ def laid_out():
 def study(request, laid_out):
     around, problem = laid_out
     scenarios = finish(look_at_traffic(around, problem, spread_instants([queue(1), queue(2)], 6, 0), request.param))
-    return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 16, 1)))
+    return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 8, 1)))
 
 
 def test_the_empty_road_is_where_both_begin(laid_out, study):
@@ -79,11 +79,11 @@ def test_the_empty_road_is_where_both_begin(laid_out, study):
 def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study):
     around, _ = laid_out
     _, found = study
-    judged = spread_instants([queue(3)], 16, 1)
+    judged = spread_instants([queue(3)], 8, 1)
     for placed in (found.empty, found.traffic):
         for layer, seen in placed.seen.items():
-            views = finish(visibility_in_traffic(around, placed.placement.chosen, judged.standing(), layer))
-            rows = np.array([views.seen(instant).any(axis=0) for instant in range(16)])
+            views = finish(visibility_in_traffic(around, placed.placement.chosen, judged.obstacles(), layer))
+            rows = np.array([views.seen(instant).any(axis=0) for instant in range(8)])
             assert seen.at == pytest.approx(rows.mean(axis=1), abs=1e-12)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
             assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
@@ -151,7 +151,7 @@ def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
         assert (seen.at == seen.empty).all()
         assert seen.rarely == 0.0
     assert traffic_warnings(found) == ()
-    assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(24), [NO_TRAFFIC])).seen(0))[
+    assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(16), [NO_TRAFFIC])).seen(0))[
         problem.allowed
     ].all()
 

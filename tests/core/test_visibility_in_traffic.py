@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from engines import ANY, each_engine, needs_any
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from placement_oracle import cases
 from synthetic_junction import junction_site, make_candidates
 from traffic_by_hand import make_model, make_trajectories, parked
 
@@ -22,8 +22,8 @@ from seip_addon.core.robustness.traffic_instants import (
     STRETCH,
     WARM_UP,
     check_runs,
+    obstacles_of,
     spread_instants,
-    standing,
 )
 from seip_addon.core.robustness.visibility_in_traffic import HEIGHT, visibility_in_traffic
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
@@ -68,7 +68,7 @@ def crowd(poses, categories):
     users = [RoadUser(f"{n}", category, *SIZES[category]) for n, category in enumerate(categories)]
     ways = [[(0.0, x, y, 0.0, yaw, 0.0), (10.0, x, y, 0.0, yaw, 0.0)] for x, y, yaw in poses]
     runs = make_trajectories(*ways, users=users)
-    return standing(runs, runs.at(1.0))
+    return obstacles_of(runs, runs.at(1.0))
 
 
 crowds = st.lists(
@@ -116,21 +116,21 @@ def beams_past(bodies, pose):
 
 
 @each_engine
-@hypothesis_settings(max_examples=15)
+@cases(15, 3)
 @given(bodies=crowds)
 def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
     around = replace(AROUND, engine=engine)
     assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine)).all()
 
 
-@hypothesis_settings(max_examples=5)
+@cases(5, 2)
 @given(bodies=crowds)
 def test_only_returns_that_are_strong_enough_count(bodies):
     sight = VisibilitySettings(delta=DELTA, min_intensity=0.3)
     assert (views([bodies], around=replace(AROUND, sight=sight))[0] == by_full_scan(bodies, settings=sight)).all()
 
 
-@hypothesis_settings(max_examples=5)
+@cases(5, 1)
 @given(bodies=crowds)
 def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
     found = views([bodies], "height")[0]
@@ -143,7 +143,7 @@ def test_the_empty_road_is_the_visibility_grid():
     assert (views([NO_TRAFFIC])[0] == grid.visible).all()
 
 
-@hypothesis_settings(max_examples=10)
+@cases(10, 3)
 @given(bodies=crowds, more=crowds)
 def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
     both = replace(
@@ -196,7 +196,7 @@ def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
         part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
         assert part.tolist() == list(range(16))
     assert len(np.unique(one.stretch)) == 2 * max(1, round((10.0 - WARM_UP) / STRETCH))
-    assert [len(crowd.hulls) for crowd in one.standing()] == [1] * 16 + [2] * 16
+    assert [len(crowd.hulls) for crowd in one.obstacles()] == [1] * 16 + [2] * 16
 
 
 def test_traffic_that_is_of_no_use_is_refused():

@@ -24,8 +24,9 @@ from headless.lab.stability.solver_limits import (
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from placement_oracle import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import SolverLimits, cheapest_for_coverage, solve, solve_greedy
@@ -44,7 +45,7 @@ def random_problem(seed: int, candidates: int = 9, targets: int = 12, count: int
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0, 6, 12, 18]))
-@settings(max_examples=40)
+@cases(40, 6)
 def test_what_is_lost_to_weights_far_apart_is_said(seed: int, decades: int) -> None:
     problem, random = random_problem(seed)
     problem = replace(problem, weights=10 ** (decades * (random.random(12) - 0.5)))
@@ -55,7 +56,7 @@ def test_what_is_lost_to_weights_far_apart_is_said(seed: int, decades: int) -> N
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([3, 6, 9]))
-@settings(max_examples=30)
+@cases(30, 6)
 def test_prices_far_apart_lose_nothing(seed: int, decades: int) -> None:
     problem, random = random_problem(seed)
     prices = 10 ** (decades * (random.random(9) - 0.5))
@@ -79,7 +80,7 @@ def test_light_targets_and_cheap_sensors_are_named() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1e-12, 1e-10]))
-@settings(max_examples=30)
+@cases(30, 6)
 def test_disturbances_below_a_tie_move_no_choice(seed: int, by: float) -> None:
     problem, random = random_problem(seed)
     disturbed = replace(problem, weights=1 + by * random.uniform(-1, 1, 12))
@@ -87,7 +88,7 @@ def test_disturbances_below_a_tie_move_no_choice(seed: int, by: float) -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1e-8, 1e-5, 1e-2]))
-@settings(max_examples=30)
+@cases(30, 6)
 def test_a_choice_changes_only_where_the_objective_says_so(seed: int, by: float) -> None:
     problem, random = random_problem(seed)
     disturbed = replace(problem, weights=1 + by * random.uniform(-1, 1, 12))
@@ -124,8 +125,8 @@ def test_a_second_is_a_second() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.05, 0.3]))
-@settings(max_examples=40)
-def test_near_best_lists_exactly_what_enumeration_finds(seed: int, share: float) -> None:
+@cases(40, 6)
+def test_near_optimal_set_lists_exactly_what_enumeration_finds(seed: int, share: float) -> None:
     problem, _ = random_problem(seed)
     best = finish(solve(problem))
     top = finish(list_near_optimal(problem, best.chosen, share))
@@ -145,19 +146,19 @@ def test_near_best_lists_exactly_what_enumeration_finds(seed: int, share: float)
     assert len(top) == len(expected)
 
 
-def test_near_best_says_when_there_are_more() -> None:
+def test_near_optimal_set_says_when_there_are_more() -> None:
     problem, _ = random_problem(5, candidates=20, targets=12, count=4)
     best = finish(solve(problem))
     with patch.object(near_optimal_set, "MOST_LISTED", 3):
         top = finish(list_near_optimal(problem, best.chosen, 0.5))
     assert not top.complete
-    assert top.sentence.startswith("more than 3 placements")
+    assert top.message.startswith("more than 3 placements")
     with pytest.raises(SeipError, match="at least 0 and below 1"):
         finish(list_near_optimal(problem, best.chosen, 1.5))
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20)
+@cases(20, 6)
 def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: int) -> None:
     problem, _ = random_problem(seed)
     best = finish(solve(problem))
@@ -167,7 +168,7 @@ def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: 
     found = {tuple(row) for row in top.placements.tolist()}
     chosen = set(best.chosen.tolist())
     assert not top.complete
-    assert top.sentence.startswith("more than")
+    assert top.message.startswith("more than")
     assert found <= every
     assert {row for row in every if len(chosen - set(row)) <= 1 and len(set(row) - {-1}) == len(chosen)} <= found
 

@@ -18,7 +18,7 @@ from seip_addon.core.placement.objective import DEFAULT_COUNT, Objective, placem
 from seip_addon.core.progress import Progress
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
-from seip_addon.core.robustness.robust_study import RobustSettings, robust_study
+from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
 from seip_addon.core.robustness.traffic_instants import spread_instants
 from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study
 from seip_addon.core.traffic import Trajectories
@@ -61,7 +61,7 @@ class StabilityScope:
     rays: int = 20_000
     instances: int = 60
     poses: PoseStudySettings = field(default_factory=PoseStudySettings)
-    robust: RobustSettings = field(default_factory=RobustSettings)
+    robust: RobustnessSettings = field(default_factory=RobustnessSettings)
     instants: tuple[int, int] = (24, 120)
     detector: Mapping[str, int] = field(default_factory=dict)
 
@@ -188,7 +188,9 @@ def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
 def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Let the poses of a placement err."""
     layout, around = stage.surveyed.layout, surroundings(stage.surveyed.layout)
-    study = yield from robust_study(around, stage.problem(stage.sensor), _settings(stage))
+    study = yield from robust_study(
+        around, stage.problem(stage.sensor), stage.scope.robust, limits=layout.settings.limits
+    )
     chosen = study.nominal[0].placement.chosen
     deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
     judged = yield from pose_study(around, deployment, stage.scope.poses)
@@ -213,7 +215,9 @@ def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
 def failures(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Let a sensor fail, and ask for more than one look."""
     around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
-    study = yield from robust_study(around, problem, _settings(stage), FAILURES)
+    study = yield from robust_study(
+        around, problem, stage.scope.robust, FAILURES, stage.surveyed.layout.settings.limits
+    )
     robust_charts.save_spread_chart(stage.charts / "failures.png", study, f"{stage.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
     return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))
@@ -265,10 +269,6 @@ def detector(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
         limit_charts.save_foreign_chart(stage.charts / "detector_away.png", study)
         charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
-
-
-def _settings(stage: StudiedScene) -> RobustSettings:
-    return replace(stage.scope.robust, limits=stage.surveyed.layout.settings.limits)
 
 
 def introduction(stage: StudiedScene) -> str:

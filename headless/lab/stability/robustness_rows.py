@@ -64,7 +64,7 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"{contender.judged_by.describe_outcome()} {contender.low.describe()} against "
             f"{study.beside(contender).low.describe()} of the nominal optimum: "
             f"{study.saving(contender).as_points()} more",
-            f"{settings.unseen} draws that nothing was chosen on; half of them "
+            f"{settings.draws} draws that nothing was chosen on; half of them "
             f"{'say the same' if study.is_converged(contender) else 'say something else: take more'}",
             f"certificate: within {contender.placement.gap:.2%} of the best objective possible",
         )

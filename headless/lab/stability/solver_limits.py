@@ -355,7 +355,7 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
         Row(
             "placement",
             f"flat top, {name}",
-            top.sentence,
+            top.message,
             "all placements, by branch and bound"
             if top.complete
             else "the first branches, and exchanges of one sensor",

@@ -300,16 +300,16 @@ class Search:
                 return
             self.offer(np.array((*node.chosen, candidate)))
 
-    def _limits(self, node: _Node, left: int) -> Instance:
-        """Return the followers of a node, without any target, and what the sensors chosen leave of the limits."""
+    def _rest(self, node: _Node, left: int, targets: Integer) -> Instance:
+        """Return the followers of a node, some targets, and what the sensors chosen leave of the limits."""
         instance, followers = self.instance, node.followers
         spent = math.fsum(instance.price[list(node.chosen)])
         return replace(
             instance,
-            visible=instance.visible[:0],
-            weight=instance.weight[:0],
+            visible=instance.visible[np.ix_(followers, targets)],
+            weight=instance.weight[targets],
             price=instance.price[followers],
-            conflict=instance.conflict[:0],
+            conflict=instance.conflict[np.ix_(followers, followers)],
             clique=instance.clique[followers],
             mandatory=np.zeros((0, len(followers)), bool),
             original=instance.original[followers],
@@ -324,15 +324,10 @@ class Search:
 
     def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
         """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
-        instance, followers = self.instance, node.followers
+        instance = self.instance
         layers = instance.layers(instance.times(node.chosen), left)
         open_targets = np.flatnonzero(layers[0] > 0)
-        rest = replace(
-            self._limits(node, left),
-            visible=instance.visible[np.ix_(followers, open_targets)],
-            weight=instance.weight[open_targets],
-            conflict=instance.conflict[np.ix_(followers, followers)],
-        )
+        rest = self._rest(node, left, open_targets)
         start = None if node.multipliers is None else node.multipliers[open_targets]
         steps = FIRST_STEPS if start is None else LATER_STEPS
         keep, bound = yield from lagrangian_bound(
@@ -343,7 +338,7 @@ class Search:
         node = replace(
             node,
             bound=min(node.bound, node.value + bound.value),
-            followers=followers[keep],
+            followers=node.followers[keep],
             gains=node.gains[keep],
             multipliers=multipliers,
         )
@@ -403,7 +398,7 @@ class Search:
         best: Float = _largest(gains_after, left).sum(axis=1, dtype=np.float64)
         if not math.isfinite(self.instance.budget):
             return 0.0, best
-        rest = self._limits(node, left + 1)
+        rest = self._rest(node, left + 1, np.zeros(0, dtype=np.int64))
         multiplier = select(rest, node.gains.astype(np.float64), node.multiplier).multiplier
         if multiplier > 0:
             net = np.maximum(gains_after - multiplier * rest.price, 0.0)

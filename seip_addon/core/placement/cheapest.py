@@ -14,7 +14,7 @@ from ..progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .clock import DEFAULT_LIMITS, Clock, SolverLimits
 from .feasibility import starting_choice
-from .greedy import greedy, greedy_with_swaps, without_idle
+from .greedy import drop_redundant, greedy, greedy_with_swaps
 from .instance import Instance, common_unit, make_instance
 from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, assess
@@ -55,7 +55,7 @@ def cheapest_for_coverage(
     whole = math.fsum(problem.weights) * factor
     goal = instance.attainable(coverage * whole)
     chosen = yield from _reaching(problem, instance, goal, whole, solver, clock)
-    chosen = without_idle(instance, chosen, goal)
+    chosen = drop_redundant(instance, chosen, goal)
     if problem.prices.any():
         cheapest, bound = yield from _cheapest(instance, chosen, goal, solver, clock)
     else:

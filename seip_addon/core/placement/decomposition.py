@@ -1,16 +1,16 @@
-r"""Upper bounds by Lagrangian decomposition into districts, for many sensors.
+r"""Upper bounds by Lagrangian decomposition into parts, for many sensors.
 
 The linear relaxation counts a target twice that two sensors see. Here the
-candidates are parted into districts, and only a target that several districts
+candidates are divided into parts, and only a target that several parts
 see is relaxed: with multipliers :math:`0 \le \lambda_j \le w_j`,
 
 .. math::
     L(\lambda) = \sum_j (w_j - \lambda_j) + \max_{\sum_d m_d \le N} \sum_d F_d(m_d),
 
-where :math:`F_d(m)` bounds what m sensors of district d cover together of the
+where :math:`F_d(m)` bounds what m sensors of part d cover together of the
 weights :math:`\lambda`: for one and two it is the best choice itself, for more
 the smaller of :math:`m/2` times the best two (coverage is submodular) and all
-that the district sees. This is Lagrangian decomposition (Guignard and Kim 1987) with
+that the part sees. This is Lagrangian decomposition (Guignard and Kim 1987) with
 overlaps kept within the parts.
 """
 
@@ -32,11 +32,11 @@ from .instance import Instance, Numbers
 ITERATIONS = 2000
 
 SENSORS = 1.8
-"""So many sensors there are for each district: of two their overlap is known."""
+"""So many sensors there are for each part: of two their overlap is known."""
 
 
 @dataclass(frozen=True, eq=False)
-class _District:
+class _Part:
     """Candidates near each other.
 
     Parameters
@@ -73,7 +73,9 @@ class _District:
         return value, [self.matrix[first], seen_by_two, np.ones(len(self.targets))]
 
 
-def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float) -> Generator[Progress, None, float]:
+def decomposition_bound(
+    instance: Instance, goal: float, clock: Clock, seconds: float
+) -> Generator[Progress, None, float]:
     """Return a weight that no placement exceeds, the budget and the mandatory groups aside.
 
     Parameters
@@ -83,27 +85,27 @@ def district_bound(instance: Instance, goal: float, clock: Clock, seconds: float
     seconds : float
         Longest time to search.
     """
-    districts = _districts(instance)
+    parts = _parts(instance)
     end = clock.elapsed + min(seconds, clock.left)
     shared = np.zeros(len(instance.weight))
-    for district in districts:
-        shared[district.targets] += 1
-    descent = SubgradientDescent(_bound(instance, districts, instance.weight / np.maximum(shared, 1)), instance.total)
+    for part in parts:
+        shared[part.targets] += 1
+    descent = SubgradientDescent(_bound(instance, parts, instance.weight / np.maximum(shared, 1)), instance.total)
     for iteration in range(ITERATIONS):
         if descent.best.value < goal - instance.margin or descent.step < SMALLEST_STEP or clock.elapsed > end:
             break
         yield Progress(iteration, ITERATIONS, "bounding by parts of the candidates")
-        clock.spend(6 * sum(district.matrix.size for district in districts))
+        clock.spend(6 * sum(part.matrix.size for part in parts))
         multipliers, seen = descent.current.multipliers, descent.current.seen
         change = descent.move(np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0)), goal)
         if change is None:
             break
-        descent.record(_bound(instance, districts, np.clip(multipliers - change, 0.0, instance.weight)))
-    precise = [replace(district, matrix=district.matrix.astype(np.float64)) for district in districts]
+        descent.record(_bound(instance, parts, np.clip(multipliers - change, 0.0, instance.weight)))
+    precise = [replace(part, matrix=part.matrix.astype(np.float64)) for part in parts]
     return _bound(instance, precise, descent.best.multipliers).value
 
 
-def _districts(instance: Instance) -> list[_District]:
+def _parts(instance: Instance) -> list[_Part]:
     """Part the candidates around the first of a greedy choice, each clique where it overlaps most."""
     number = max(1, round(instance.count / SENSORS))
     free = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
@@ -112,17 +114,17 @@ def _districts(instance: Instance) -> list[_District]:
     shared = np.zeros((int(instance.clique.max()) + 1, len(centres)))
     np.add.at(shared, instance.clique, overlap)
     nearest = shared.argmax(axis=1)[instance.clique]
-    return [_district(instance, np.flatnonzero(nearest == index)) for index in np.unique(nearest)]
+    return [_part(instance, np.flatnonzero(nearest == index)) for index in np.unique(nearest)]
 
 
-def _district(instance: Instance, members: Integer) -> _District:
+def _part(instance: Instance, members: Integer) -> _Part:
     targets = np.flatnonzero(instance.visible[members].any(axis=0))
     excluded = instance.conflict[np.ix_(members, members)] | np.eye(len(members), dtype=bool)
-    return _District(targets, instance.matrix[np.ix_(members, targets)], excluded)
+    return _Part(targets, instance.matrix[np.ix_(members, targets)], excluded)
 
 
 @dataclass(frozen=True, eq=False)
-class _DistrictBound:
+class _PartsBound:
     """L at some multipliers, and how often each target counts in it."""
 
     value: float
@@ -130,18 +132,18 @@ class _DistrictBound:
     seen: Float
 
 
-def _bound(instance: Instance, districts: list[_District], multipliers: Float) -> _DistrictBound:
-    found = [district.values(multipliers, instance.count) for district in districts]
+def _bound(instance: Instance, parts: list[_Part], multipliers: Float) -> _PartsBound:
+    found = [part.values(multipliers, instance.count) for part in parts]
     value, numbers = _share_out(np.array([values for values, _ in found]))
     seen = np.zeros(len(multipliers))
-    for district, (values, counted), number in zip(districts, found, numbers, strict=True):
+    for part, (values, counted), number in zip(parts, found, numbers, strict=True):
         if number == 1:
-            seen[district.targets] += counted[0]
+            seen[part.targets] += counted[0]
         elif number > 1 and values[number] == values[2] * number / 2:
-            seen[district.targets] += counted[1] * number / 2
+            seen[part.targets] += counted[1] * number / 2
         elif number > 1:
-            seen[district.targets] += counted[2]
-    return _DistrictBound(math.fsum(instance.weight - multipliers) + value, multipliers, seen)
+            seen[part.targets] += counted[2]
+    return _PartsBound(math.fsum(instance.weight - multipliers) + value, multipliers, seen)
 
 
 def _share_out(values: Float) -> tuple[float, list[int]]:

@@ -150,7 +150,7 @@ def tabu_search(
     return best
 
 
-def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
+def drop_redundant(instance: Instance, chosen: Integer, goal: float) -> Integer:
     """Take away sensors, the dearest first, that neither the coverage to reach nor a mandatory group needs."""
     for candidate in chosen[np.argsort(-instance.price[chosen], kind="stable")]:
         rest = chosen[chosen != candidate]
@@ -159,7 +159,7 @@ def without_idle(instance: Instance, chosen: Integer, goal: float) -> Integer:
     return chosen
 
 
-def without_weakest(instance: Instance, chosen: Integer) -> Integer:
+def drop_weakest(instance: Instance, chosen: Integer) -> Integer:
     """Take away the sensor that is missed least."""
     return max((chosen[chosen != candidate] for candidate in chosen), key=instance.value)
 

@@ -56,7 +56,7 @@ class NearOptimalSet:
         return len(self.placements)
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """How many there are, and how different."""
         near = f"within {self.share:.0%} of the best"
         if self.complete and len(self) == 1:
@@ -99,10 +99,10 @@ def near_optimal_set(
     if not is_worthwhile(instance, np.arange(len(instance))):
         return None
     best = problem.covered(chosen) * factor
-    search = _NearBest(instance, (1 - share) * best)
+    search = _NearOptimal(instance, (1 - share) * best)
     finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
     if not finished:
-        search.take_exchanges(np.flatnonzero(np.isin(instance.original, chosen)))
+        search.take_swaps(np.flatnonzero(np.isin(instance.original, chosen)))
     rows = _in_rows([np.sort(instance.original[list(found)]) for found in search.found], len(chosen))
     used = np.append(problem.positions, -1)[rows]
     in_common = np.isin(used, problem.positions[chosen]).sum(axis=1)
@@ -116,14 +116,14 @@ def near_optimal_set(
     )
 
 
-class _NearBest(Search):
+class _NearOptimal(Search):
     """Lists every placement that reaches the goal."""
 
     def __init__(self, instance: Instance, goal: float) -> None:
         super().__init__(instance, goal, depth_first=True)
         self.found: dict[tuple[int, ...], float] = {}
 
-    def take_exchanges(self, chosen: Integer) -> None:
+    def take_swaps(self, chosen: Integer) -> None:
         """Take a placement, and those that have another candidate in place of one of its own."""
         self.offer(chosen)
         for kept in (np.delete(chosen, number) for number in range(len(chosen))):

@@ -13,9 +13,9 @@ from ..progress import Progress, finish
 from .bounds import Bound, can_reach, lagrangian_bound
 from .branch_and_bound import BestPlacements, is_worthwhile
 from .clock import DEFAULT_LIMITS, Clock, SolverLimits
-from .decomposition import district_bound
+from .decomposition import decomposition_bound
 from .feasibility import starting_choice
-from .greedy import greedy_bound, greedy_steps, greedy_with_swaps, orders, swap_search, tabu_search, without_idle
+from .greedy import drop_redundant, greedy_bound, greedy_steps, greedy_with_swaps, orders, swap_search, tabu_search
 from .instance import Instance, common_unit, make_instance
 from .integer_program import CoverProgram, check_solver
 from .problem import TIE, Placement, PlacementProblem, assess
@@ -25,10 +25,10 @@ BRANCHING = 0.15
 """Share of what is left of the limits for a first branch and bound, which goes on after the other methods."""
 
 SEARCHING, PROBING, BOUNDING = 0.1, 0.05, 0.4
-"""Shares for a tabu search of swaps, for a first bound by districts, and for a full one where the first gains."""
+"""Shares for a tabu search of swaps, for a first bound by decomposition, and for a full one where the first gains."""
 
 GAIN = 0.05
-"""Share of the gap that the first bound by districts must close for the full one to be worth its time."""
+"""Share of the gap that the first bound by decomposition must close for the full one to be worth its time."""
 
 SOLVING = 0.5
 """Share for the integer program, beside branch and bound."""
@@ -80,7 +80,7 @@ def solve(problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS) -> G
     swaps gives an incumbent, a Lagrangian relaxation a bound; candidates
     that the bound rules out are dropped. Among the rest branch and bound
     decides; where it does not soon, a tabu search improves the incumbent,
-    districts and an integer program the bound where they can, and branch and
+    decomposition and an integer program the bound where they can, and branch and
     bound goes on with the time that is left, its bound falling all the while.
 
     Raises
@@ -99,7 +99,7 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
     start = yield from starting_choice(problem, instance, solver)
     first = yield from greedy_with_swaps(instance, start)
     proof = yield from prove(instance, first, solver, clock)
-    chosen = without_idle(instance, proof.chosen, instance.value(proof.chosen))
+    chosen = drop_redundant(instance, proof.chosen, instance.value(proof.chosen))
     notes = [*scale_notes(problem)]
     if proof.optimal:
         part = clock.counted_part(max(clock.work, LEAST_FOR_TIES))
@@ -196,7 +196,7 @@ def _prove_among(
         for beginning in (chosen, relaxed):
             searched = yield from tabu_search(instance, beginning, clock, SEARCHING * clock.left)
             chosen = max(chosen, searched, key=instance.value)
-        least = min(least, (yield from _by_districts(instance, least, chosen, clock)))
+        least = min(least, (yield from _decomposition_bound(instance, least, chosen, clock)))
     keep = can_reach(instance, bound, _better(instance, chosen))
     if least < _better(instance, chosen) - instance.margin or len(keep) == 0:
         return Proof(chosen, instance.value(chosen), optimal=True)
@@ -241,13 +241,15 @@ def _finished(instance: Instance, search: BestPlacements, among: Integer, chosen
     return Proof(chosen, instance.value(chosen), optimal=True, ties=ties)
 
 
-def _by_districts(instance: Instance, least: float, chosen: Integer, clock: Clock) -> Generator[Progress, None, float]:
-    """Bound by districts: shortly first, and with more time where that closes part of the gap."""
+def _decomposition_bound(
+    instance: Instance, least: float, chosen: Integer, clock: Clock
+) -> Generator[Progress, None, float]:
+    """Bound by parts of the candidates: shortly first, and with more time where that closes part of the gap."""
     better = _better(instance, chosen)
-    first = yield from district_bound(instance, better, clock, PROBING * clock.left)
+    first = yield from decomposition_bound(instance, better, clock, PROBING * clock.left)
     if first < better or least - first < GAIN * (least - better):
         return first
-    return (yield from district_bound(instance, better, clock, BOUNDING * clock.left))
+    return (yield from decomposition_bound(instance, better, clock, BOUNDING * clock.left))
 
 
 def _better(instance: Instance, chosen: Integer) -> float:

@@ -19,7 +19,7 @@ from ..progress import Progress
 from .bounds import lagrangian_bound
 from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
 from .clock import Clock
-from .greedy import swap_search, without_idle, without_weakest
+from .greedy import drop_redundant, drop_weakest, swap_search
 from .instance import Instance
 from .integer_program import reaching
 
@@ -82,9 +82,9 @@ def fewest(
     """Return a placement of fewest sensors that reaches the goal, and whether that is proven."""
     while len(chosen) > 1:
         fewer = replace(instance, count=len(chosen) - 1)
-        improved = yield from swap_search(fewer, without_weakest(instance, chosen))
+        improved = yield from swap_search(fewer, drop_weakest(instance, chosen))
         if fewer.feasible(improved) and fewer.value(improved) >= goal - instance.slack:
-            chosen = without_idle(fewer, improved, goal)
+            chosen = drop_redundant(fewer, improved, goal)
             continue
         keep, bound = yield from lagrangian_bound(fewer, goal, clock)
         if bound.value < goal - instance.slack or len(keep) == 0:
@@ -94,14 +94,14 @@ def fewest(
             search = BestPlacements(fewer.part(keep), goal, 1, goal)
             finished = yield from search.run(clock, clock.left / 2)
             if search.found:
-                chosen = without_idle(fewer, keep[search.found[0]], goal)
+                chosen = drop_redundant(fewer, keep[search.found[0]], goal)
                 continue
             if finished:
                 break
         outcome = yield from reaching(fewer.part(keep), goal).maximise_coverage(solver, clock)
         if outcome.chosen is None:
             return chosen, outcome.finished
-        chosen = without_idle(fewer, keep[outcome.chosen], goal)
+        chosen = drop_redundant(fewer, keep[outcome.chosen], goal)
     return chosen, True
 
 

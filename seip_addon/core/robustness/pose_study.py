@@ -91,15 +91,15 @@ class PoseStudy:
     blocked: float
 
     def quantile(self, share: float) -> IntervalEstimate:
-        """IntervalEstimate a quantile of the whole coverage."""
+        """Estimate a quantile of the whole coverage."""
         return quantile_of(self.together.whole, share)
 
     def loss_by_sensor(self) -> tuple[IntervalEstimate, ...]:
-        """IntervalEstimate what is lost of the whole coverage on average when each sensor alone errs."""
+        """Estimate what is lost of the whole coverage on average when each sensor alone errs."""
         return tuple(mean_of(self.planned.whole[0] - coverages.whole) for coverages in self.alone)
 
     def loss_by_kind(self) -> dict[str, IntervalEstimate]:
-        """IntervalEstimate what is lost of the whole coverage on average by each kind of error alone."""
+        """Estimate what is lost of the whole coverage on average by each kind of error alone."""
         return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
 
     def worst_sensor(self) -> tuple[str, bool]:

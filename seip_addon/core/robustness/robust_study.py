@@ -12,7 +12,8 @@ from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
 from ..placement.clock import DEFAULT_LIMITS
 from ..progress import Progress, within
-from .pose_errors import PoseErrors
+from ..settings import setting
+from .pose_errors import PoseErrors, require_draws
 from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
@@ -25,26 +26,37 @@ RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 
 
 @dataclass(frozen=True)
-class RobustSettings:
-    """How placements under pose errors are chosen and judged.
+class RobustnessSettings:
+    """What a placement is to stand, and how that is tried.
 
     Parameters
     ----------
+    risk : Risk
+        What is to be large.
+    errors : PoseErrors
+        Of the sensors' poses.
     scenarios : int
         Draws to choose on.
-    unseen : int
-        Draws to judge by.
+    draws : int
+        Unseen draws to judge by.
     seed : int
         Of the scenarios; the unseen draws have the next one.
-    limits : SolverLimits
-        For each placement.
+
+    Raises
+    ------
+    SeipError
+        There is nothing to choose on, or nothing to judge by.
     """
 
+    risk: Risk = field(default_factory=Risk)
     errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = 20
-    unseen: int = 500
-    seed: int = 0
-    limits: SolverLimits = DEFAULT_LIMITS
+    scenarios: int = setting(20, "draws to choose on", minimum=1)
+    draws: int = setting(500, "unseen draws to judge by", minimum=1)
+    seed: int = setting(0, "of the scenarios; unseen draws have the next")
+
+    def __post_init__(self) -> None:
+        require_draws(self.scenarios)
+        require_draws(self.draws)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +109,7 @@ class RobustStudy:
         Weight of all targets, the unit of placements' objectives.
     """
 
-    settings: RobustSettings
+    settings: RobustnessSettings
     nominal: tuple[Contender, ...]
     robust: tuple[Contender, ...]
     total: float
@@ -111,7 +123,7 @@ class RobustStudy:
         return self.beside(contender).planned - contender.planned
 
     def saving(self, contender: Contender) -> IntervalEstimate:
-        """IntervalEstimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
+        """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
         return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW)
 
     def is_converged(self, contender: Contender) -> bool:
@@ -122,7 +134,11 @@ class RobustStudy:
 
 
 def robust_study(
-    around: Surroundings, problem: PlacementProblem, settings: RobustSettings, risks: Sequence[Risk] = RISKS
+    around: Surroundings,
+    problem: PlacementProblem,
+    settings: RobustnessSettings,
+    risks: Sequence[Risk] = RISKS,
+    limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, RobustStudy]:
     """Place for the poses as planned and for each risk, and judge all by unseen draws.
 
@@ -130,21 +146,25 @@ def robust_study(
     ----------
     problem : PlacementProblem
         Of all candidates of the site.
+    risks : sequence of Risk
+        What is to be large, for each placement that is compared.
+    limits : SolverLimits
+        For each placement.
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)
     scenarios = yield from visibility_under_errors(around, every, drawn)
     spread = scenarios.spread_to(every, len(problem.visible))
-    nominal = yield from solve(problem, settings.limits)
+    nominal = yield from solve(problem, limits)
     foreseen = None
     if any(risk.seen_by == 1 for risk in risks):
-        foreseen = yield from foresee(problem, spread, settings.limits.solver, settings.limits.clock())
+        foreseen = yield from foresee(problem, spread, limits.solver, limits.clock())
     ways = dict.fromkeys(risk.alone for risk in risks)  # in the order of the risks, each once
     entries = [("the poses as planned", nominal, way) for way in ways]
     for number, risk in enumerate(risks):
         here = Progress(number, len(risks), f"placing for {risk.describe()}")
         yield here
-        steps = solve_robust(problem, spread, risk, settings.limits, foreseen)
+        steps = solve_robust(problem, spread, risk, limits, foreseen)
         found: Placement = yield from within(here, steps)
         placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
         entries.append((risk.describe(), placed, risk.alone))
@@ -157,12 +177,12 @@ def robust_study(
 def _judged(
     around: Surroundings,
     problem: PlacementProblem,
-    settings: RobustSettings,
+    settings: RobustnessSettings,
     entries: Sequence[tuple[str, Placement, Risk]],
 ) -> Generator[Progress, None, list[Contender]]:
     """Look from all chosen poses at once, in draws of another seed."""
     used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
-    drawn, _ = draws_for(around, used, settings.errors, settings.unseen, settings.seed + 1)
+    drawn, _ = draws_for(around, used, settings.errors, settings.draws, settings.seed + 1)
     views = yield from visibility_under_errors(around, used, drawn)
     planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())

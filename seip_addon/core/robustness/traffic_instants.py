@@ -71,10 +71,10 @@ class Instants:
         """Return n."""
         return len(self.time)
 
-    def standing(self) -> list[TrafficObstacles]:
+    def obstacles(self) -> list[TrafficObstacles]:
         """Return who stands where at each instant."""
         return [
-            standing(self.runs[run], self.runs[run].at(time))
+            obstacles_of(self.runs[run], self.runs[run].at(time))
             for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True)
         ]
 
@@ -117,7 +117,7 @@ def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
             )
 
 
-def standing(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
+def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
     """Return the bodies of an instant's road users where they are."""
     if len(snapshot) == 0:
         return NO_TRAFFIC

@@ -104,7 +104,7 @@ class TrafficCoverage:
         return float((self.time[self.empty_targets] < MOSTLY).mean()) if self.empty_targets.any() else 0.0
 
     def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
-        """IntervalEstimate how much more of the weight is seen than by another placement at the same instants."""
+        """Estimate how much more of the weight is seen than by another placement at the same instants."""
         return mean_over_time(self.at - other.at, self.stretch)
 
 
@@ -116,7 +116,7 @@ class JudgedInTraffic:
     ----------
     name : str
         What it was chosen for.
-    seen : mapping of {"road", "height"} to Seen
+    seen : mapping of {"road", "height"} to TrafficCoverage
         Of the targets, and of the points `HEIGHT` metres above them.
     """
 
@@ -150,7 +150,7 @@ class TrafficStudy:
     traffic: JudgedInTraffic
 
     def won(self, layer: TrafficLayer) -> IntervalEstimate:
-        """IntervalEstimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
+        """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
     def is_converged(self) -> bool:
@@ -166,7 +166,7 @@ def look_at_traffic(
 ) -> Generator[Progress, None, TrafficScenarios]:
     """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
     every = np.flatnonzero(problem.allowed)
-    views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.standing()], layer)
+    views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
     spread = views.spread_to(every, len(problem.visible))
     return TrafficScenarios(layer, spread.seen(0), ScenarioVisibility(spread.packed[1:], spread.targets))
 
@@ -195,11 +195,11 @@ def traffic_study(
     reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
-    crowds = judged.standing()
+    obstacles = judged.obstacles()
     layers: tuple[TrafficLayer, ...] = ("road", "height")
     views: dict[TrafficLayer, ScenarioVisibility] = {}
     for layer in layers:
-        views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *crowds], layer)
+        views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
 
     def judge(name: str, placement: Placement) -> JudgedInTraffic:
         rows = np.searchsorted(used, placement.chosen)
@@ -209,7 +209,7 @@ def traffic_study(
     return TrafficStudy(
         layer=scenarios.layer,
         chosen_at=len(scenarios.views),
-        road_users=_users(crowds),
+        road_users=_users(obstacles),
         empty=judge("the empty road", empty),
         traffic=judge("traffic", placed),
     )
@@ -234,17 +234,17 @@ def tried_in_traffic(
     weight : (t,) float64
         Of the targets.
     """
-    crowds = instants.standing()
-    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *crowds], "road")
+    obstacles = instants.obstacles()
+    views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")
     seen = _seen(views, np.arange(len(poses)), weight, instants.stretch)
     return (
-        f"{IN_TRAFFIC} ({_users(crowds):.0f} road users at a time) this placement sees {seen.held.describe()} of the "
-        f"road on average over time, {seen.empty:.2%} when it is empty"
+        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.held.describe()} of "
+        f"the road on average over time, {seen.empty:.2%} when it is empty"
     )
 
 
-def _users(crowds: Sequence[TrafficObstacles]) -> float:
-    return float(np.mean([len(crowd.hulls) for crowd in crowds]))
+def _users(obstacles: Sequence[TrafficObstacles]) -> float:
+    return float(np.mean([len(instant.hulls) for instant in obstacles]))
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ def visibility_in_traffic(
     site, candidates = around.site, around.site.candidates
     engine = engine_name(around.engine)
     caster = make_ray_caster(site.triangles, engine)
-    crowds = [_crowd(around, one, caster) for one in instants]
+    vehicles = [_vehicle_caster(around, one, caster) for one in instants]
     wanted = site.targets.xyz + np.array([0.0, 0.0, HEIGHT if layer == "height" else 0.0])
     index = TargetIndex(wanted, around.sight.delta)
     packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
@@ -82,31 +82,33 @@ def visibility_in_traffic(
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
         place = ScanPosition(caster, xyz, float(yaw), [model], around.sight)
         static = _StaticScan(place, wanted)
-        looker: _Looker = _Above(static, wanted) if layer == "height" else _Road(static, index, len(wanted))
-        for instant, crowd in enumerate(crowds):
-            packed[instant, number] = np.packbits(looker.seen(static.stopped_by(crowd)))
+        visibility: _LayerVisibility = (
+            _HeightVisibility(static, wanted) if layer == "height" else _RoadVisibility(static, index, len(wanted))
+        )
+        for instant, present in enumerate(vehicles):
+            packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(present)))
 
     yield from each_in_threads(look, range(len(poses)), caster.threads, "looking between vehicles")
     return ScenarioVisibility(packed, len(wanted))
 
 
 @dataclass(frozen=True, eq=False)
-class _Crowd:
+class _VehicleCaster:
     """The road users of an instant, ready to be cast against."""
 
     caster: RayCaster
     hulls: Float
 
 
-def _crowd(around: Surroundings, standing: TrafficObstacles, static: RayCaster) -> _Crowd:
+def _vehicle_caster(around: Surroundings, present: TrafficObstacles, static: RayCaster) -> _VehicleCaster:
     """Make a caster of bodies that rounds as one of the scene and the bodies together would."""
-    everything = np.concatenate([static.triangles, standing.triangles])
+    everything = np.concatenate([static.triangles, present.triangles])
     bodies = np.arange(len(everything)) >= len(static.triangles)
-    return _Crowd(make_ray_caster(everything, engine_name(around.engine), bodies), standing.hulls)
+    return _VehicleCaster(make_ray_caster(everything, engine_name(around.engine), bodies), present.hulls)
 
 
 @dataclass(frozen=True, eq=False)
-class _Stopped:
+class _BlockedRays:
     """Rays that end on a road user, ascending; k of them.
 
     Parameters
@@ -176,18 +178,18 @@ class _StaticScan:
         ray = np.flatnonzero(self.counts)
         return ray, self._ends(ray, self.distance[ray])
 
-    def stopped_by(self, crowd: _Crowd) -> _Stopped:
+    def blocked_by(self, present: _VehicleCaster) -> _BlockedRays:
         """Cast at road users with the rays that pass their boxes, and keep what they stop before its end."""
         towards = np.zeros(self.rays, dtype=bool)
-        towards[self.through(crowd.hulls)[1]] = True
+        towards[self.through(present.hulls)[1]] = True
         ray = np.flatnonzero(towards & self._matters)
         directions = self.directions(ray)
-        distance, triangle = crowd.caster.cast(self.place.origin, directions, self.model.max_range)
+        distance, triangle = present.caster.cast(self.place.origin, directions, self.model.max_range)
         sooner = distance < self.distance[ray]
         ray, distance = ray[sooner], distance[sooner]
-        bodies = replace(self.place, caster=crowd.caster)
+        bodies = replace(self.place, caster=present.caster)
         returning = bodies.counting(self.model, directions[sooner], distance, triangle[sooner])
-        return _Stopped(ray, distance, self._ends(ray[returning], distance[returning]))
+        return _BlockedRays(ray, distance, self._ends(ray[returning], distance[returning]))
 
     def _ends(self, ray: Integer, distance: Float) -> Float:
         ends: Float = self.place.origin + distance[:, None] * self.directions(ray)
@@ -198,12 +200,12 @@ class _StaticScan:
         return np.array_split(ray, max(1, -(-len(ray) // _RAYS_AT_ONCE)))
 
 
-class _Looker(Protocol):
-    def seen(self, stopped: _Stopped) -> Boolean:
+class _LayerVisibility(Protocol):
+    def seen(self, stopped: _BlockedRays) -> Boolean:
         """Return what is seen while road users stop some rays, (t,) bool."""
 
 
-class _Road:
+class _RoadVisibility:
     """Returns near targets; each is counted, so that those of stopped rays can be taken off."""
 
     def __init__(self, static: _StaticScan, index: TargetIndex, targets: int) -> None:
@@ -218,7 +220,7 @@ class _Road:
         self._first = np.concatenate([[0], np.cumsum(many)])
         self._times = np.bincount(self._target, minlength=targets)
 
-    def seen(self, stopped: _Stopped) -> Boolean:
+    def seen(self, stopped: _BlockedRays) -> Boolean:
         begin = self._first[stopped.ray]
         count = self._first[stopped.ray + 1] - begin
         lost = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
@@ -227,7 +229,7 @@ class _Road:
         return seen
 
 
-class _Above:
+class _HeightVisibility:
     """Beams past points; for each point one that passes it on the empty road is known."""
 
     def __init__(self, static: _StaticScan, points: Float) -> None:
@@ -238,7 +240,7 @@ class _Above:
         for point, ray in self._passing(np.flatnonzero(~self._seen)):
             self._seen[point], self._witness[point] = True, ray
 
-    def seen(self, stopped: _Stopped) -> Boolean:
+    def seen(self, stopped: _BlockedRays) -> Boolean:
         usual = self._end[stopped.ray]
         self._end[stopped.ray] = stopped.distance
         seen = self._seen.copy()

@@ -3,56 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from ..errors import SeipError
 from ..placement.deployment import deploy
 from ..placement.objective import Objective, Solution, placement_problem, with_count
 from ..progress import Progress
-from ..robustness.pose_errors import PoseErrors, require_draws
 from ..robustness.pose_study import PoseStudy, PoseStudySettings, pose_study, pose_warnings
-from ..robustness.risk import Risk
-from ..robustness.robust_study import RobustSettings, RobustStudy, robust_study
-from ..settings import setting
+from ..robustness.robust_study import RobustnessSettings, RobustStudy, robust_study
 from ..visibility.grid import VisibilityGrid
 from .survey import Layout, surroundings
 
 DRAWS_OF_KIND = 100
 """Draws with one kind of error alone, at most."""
-
-
-@dataclass(frozen=True)
-class RobustnessSettings:
-    """What a placement is to stand, and how that is tried.
-
-    Parameters
-    ----------
-    risk : Risk
-        What is to be large.
-    errors : PoseErrors
-        Of the sensors' poses.
-    scenarios : int
-        Draws to choose on.
-    draws : int
-        Unseen draws to judge by.
-    seed : int
-        Of the scenarios; the unseen draws have the next one.
-
-    Raises
-    ------
-    SeipError
-        There is nothing to choose on, or nothing to judge by.
-    """
-
-    risk: Risk
-    errors: PoseErrors = field(default_factory=PoseErrors)
-    scenarios: int = setting(20, "draws to choose on", minimum=1)
-    draws: int = setting(500, "unseen draws to judge by", minimum=1)
-    seed: int = setting(0, "of the scenarios; unseen draws have the next")
-
-    def __post_init__(self) -> None:
-        require_draws(self.scenarios)
-        require_draws(self.draws)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +25,7 @@ class RobustPlan:
     Parameters
     ----------
     plan : Solution
-        Objective, bound and gap are of what the robustness asks for; its notes say so.
+        Objective, bound and gap are of what the robustness settings ask for; its notes say so.
     study : RobustStudy
         It beside the plan that trusts the map.
     judged : PoseStudy
@@ -75,7 +38,7 @@ class RobustPlan:
 
 
 def check_robust_objective(goal: Objective) -> None:
-    """Raise SeipError where a goal allows no robustness."""
+    """Raise SeipError where a goal allows no settings."""
     if goal.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
@@ -84,7 +47,7 @@ def check_robust_objective(goal: Objective) -> None:
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, robustness: RobustnessSettings
+    layout: Layout, grid: VisibilityGrid, goal: Objective, settings: RobustnessSettings
 ) -> Generator[Progress, None, RobustPlan]:
     """Answer a goal on a survey for what may go wrong.
 
@@ -102,22 +65,13 @@ def place_robustly(
     """
     check_robust_objective(goal)
     site, models, around = layout.site, layout.models, surroundings(layout)
-    settings = RobustSettings(
-        errors=robustness.errors,
-        scenarios=robustness.scenarios,
-        unseen=robustness.draws,
-        seed=robustness.seed,
-        limits=layout.settings.limits,
-    )
     problem = placement_problem(site, grid.visible, models, goal)
-    study = yield from robust_study(around, problem, settings, [robustness.risk])
+    study = yield from robust_study(around, problem, settings, [settings.risk], layout.settings.limits)
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
-    tried = PoseStudySettings(
-        robustness.errors, robustness.draws, min(DRAWS_OF_KIND, robustness.draws), robustness.seed + 1
-    )
+    tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
     judged = yield from pose_study(around, deployment, tried)
-    note = f"chosen for {chosen.name} over {robustness.scenarios} scenarios: objective, bound and gap are of that"
+    note = f"chosen for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
     notes = (note, *chosen.placement.notes, robust_sentence(study), *pose_warnings(judged))
     plan = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
     return RobustPlan(plan, study, judged)
@@ -129,5 +83,5 @@ def robust_sentence(study: RobustStudy) -> str:
     return (
         f"against the placement for poses as planned it gives away {study.price(chosen):.2%} of planned coverage; "
         f"{chosen.judged_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
-        f"{study.settings.unseen} unseen draws, not {study.beside(chosen).low.describe()}"
+        f"{study.settings.draws} unseen draws, not {study.beside(chosen).low.describe()}"
     )

@@ -217,9 +217,8 @@ def place(
 ) -> Generator[Progress, None, Solution]:
     """Answer a goal on a survey, and note how far the answer can be trusted.
 
-    The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say what
-    it loses where its sensors do not hang quite as planned (`pose_message`): rays are cast for that, and for nothing
-    else.
+    The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say
+    what it loses where its sensors do not hang quite as planned (`pose_message`): rays are cast for that alone.
     """
     site, models, settings = layout.site, layout.models, layout.settings
     steps = optimise(
@@ -233,7 +232,7 @@ def place(
     notes = [*plan.placement.notes]
     if plan.placement.status == "optimal" and not goal.cheapest:
         top = yield from near_optimal_set(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
-        notes += [] if top is None else [top.sentence]
+        notes += [] if top is None else [top.message]
     if pose_errors and plan.deployment.sensors:
         study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
         notes.append(pose_message(study))
