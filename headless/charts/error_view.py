@@ -1,4 +1,4 @@
-"""Solution view of one frame with road users, detections and errors."""
+"""Plan view of one frame with road users, detections and errors."""
 
 from __future__ import annotations
 
