@@ -103,7 +103,7 @@ class PrecisionRecall:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """How the detections of all frames were judged.
+    """Detections of all frames matched to the ground truth by one rule.
 
     Parameters
     ----------

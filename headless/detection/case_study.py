@@ -343,7 +343,7 @@ def evaluate_all(
 def suitability_by_configuration(
     simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
 ) -> dict[str, tuple[str, ...]]:
-    """Return what speaks against trusting the detectors with each configuration, by its name, in sentences."""
+    """Return the warnings about using the detectors with each sensor configuration, by its name."""
     found: dict[str, dict[str, None]] = {}
     frames = {one.name: simulator.frame(one, traffic.test[0], 0) for model in models for one in model.configurations}
     for model, detector in zip(models, detectors, strict=True):

@@ -33,7 +33,7 @@ FEW, SOME, MANY = NUMBERS
 
 @dataclass(frozen=True)
 class SeedResult:
-    """One training, judged with one placement.
+    """Figures of one training with one sensor configuration.
 
     Parameters
     ----------

@@ -30,8 +30,8 @@ from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
 VEHICLES = ("car", "van", "truck", "bus")
 """Categories whose average precision the study compares."""
 
-NO_TRAFFIC = -1
-"""Whom a detection found that found none, and by which a road user was found that none found."""
+NOBODY = -1
+"""Index that stands for no match, of a detection and of a road user."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Rule:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Who found whom in one frame; g road users, k detections.
+    """Detections matched to the ground truth of one frame; g road users, k detections.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Match:
 
 
 def match(frame: FrameResult, rule: Rule) -> Match:
-    """Return who found whom."""
+    """Match the detections of a frame to its ground-truth boxes."""
     truth, detected = frame.truth, frame.detected
     counted = must_be_found(frame, rule)
     overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)

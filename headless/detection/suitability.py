@@ -21,7 +21,7 @@ kept fewer points than they were learnt with: `disturbances.Capped`.
 def suitability_warnings(
     detector: Detector, sensors: Sequence[str], site: str, points: NDArray[np.float32]
 ) -> tuple[str, ...]:
-    """Return what speaks against using a detector, in sentences.
+    """Return warnings about using a detector beyond the types, the site and the densities that it was trained on.
 
     Parameters
     ----------

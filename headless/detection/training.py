@@ -183,7 +183,7 @@ class _Run:
 
     def validate(self) -> None:
         """Take the average precision on the frames set aside, which are always the same."""
-        results = [judged(self.detector, sample) for sample in spread(self.aside, VALIDATION_FRAMES)]
+        results = [result_of_sample(self.detector, sample) for sample in spread(self.aside, VALIDATION_FRAMES)]
         rule = Rule(fewest_points=self.settings.least_points)
         self.curve.validation[self.step] = evaluate(results, rule).average_precision
         if self.curve.best == self.step:
@@ -321,7 +321,7 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
     return TrainingSample(points, boxes[seen], sample.category[seen], sample.returns[seen])
 
 
-def judged(detector: Detector, sample: TrainingSample) -> FrameResult:
+def result_of_sample(detector: Detector, sample: TrainingSample) -> FrameResult:
     """Return what a detector finds in a sample, all of which counts, beside what is there."""
     found = detect(detector, sample.points[:, :3], sample.points[:, 3])
     names = np.array([members[0] for members in GROUPS.values()], dtype=np.str_)

@@ -10,7 +10,7 @@ from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import fill_pillars, grid_over
 from headless.detection.settings import CLASSES, NetworkSettings, TrainingSettings
-from headless.detection.training import judged, train, vary
+from headless.detection.training import result_of_sample, train, vary
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_a_frame_can_be_learnt_by_heart(head, steps):
     network = replace(SMALL, head=head, width=24)
     settings = replace(BRIEF, steps=steps, batch=4, window=25.6, learning_rate=1e-2, validate_every=100)
     result = trained([same], [again], settings, network)
-    found = judged(result.detector, sample_of(frame, GRID, network.most_points))
+    found = result_of_sample(result.detector, sample_of(frame, GRID, network.most_points))
     assert evaluate([found], Rule(iou=0.7)).average_precision == pytest.approx(1.0)
     assert result.curve.loss[-1] < 0.3 * result.curve.loss[0]
 

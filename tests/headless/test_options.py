@@ -1,0 +1,69 @@
+"""Options that are made from settings, and settings that are read from options."""
+
+import argparse
+import math
+
+from headless.options import add_goal, add_settings, read_goal, read_settings
+from headless.survey import add_options
+
+import pytest
+
+from seip_addon.core.placement.goal import Goal
+from seip_addon.core.robustness.risk import Risk
+from seip_addon.core.scans import ScanSettings
+from seip_addon.core.settings import settings_of
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.core.workflows.traffic import TrafficSettings
+
+ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Goal, Risk, ScanSettings, TrafficSettings)
+
+
+def surveyed(*typed):
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    return parser.parse_args(["-o", "out", *typed])
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_options_left_alone_give_the_defaults(kind):
+    parser = argparse.ArgumentParser()
+    add_settings(parser, kind, *settings_of(kind))
+    assert read_settings(kind, parser.parse_args([])) == kind()
+
+
+@pytest.mark.parametrize(
+    ("typed", "kind", "changed"),
+    [
+        (["--sensor", "type1", "vlp16"], CandidateSettings, {"sensors": ("type1", "vlp16")}),
+        (["--heights", "4:5:0.5", "8"], CandidateSettings, {"heights": (4.0, 4.5, 5.0, 8.0)}),
+        (["--tilts", "0", "90:1"], CandidateSettings, None),
+        (["--tilts", "0", "45"], CandidateSettings, {"tilts": (0.0, math.pi / 4)}),
+        (["--setback", "0.7", "--assumed-poles"], CandidateSettings, {"setback": 0.7, "assumed_poles": True}),
+        (["--setback", "near"], CandidateSettings, None),
+        (["--delta", "0.5"], VisibilitySettings, {"delta": 0.5}),
+        (["--grid", "2", "--engine", "bvh"], SurveySettings, {"grid_spacing": 2.0, "engine": "bvh"}),
+        (["--engine", "eyes"], SurveySettings, None),
+    ],
+)
+def test_what_is_typed_reaches_its_setting_or_is_refused(typed, kind, changed):
+    if changed is None:
+        with pytest.raises(SystemExit):
+            surveyed(*typed)
+    else:
+        assert read_settings(kind, surveyed(*typed)) == kind(**changed)
+
+
+def test_weights_are_the_scene_s_or_one_for_all():
+    parser = argparse.ArgumentParser()
+    add_goal(parser)
+    wanted = {
+        (): None,
+        ("--weighted",): "scene",
+        ("--central-weight", "3"): 3.0,
+        ("--weighted", "--forbid", "x"): "scene",
+    }
+    for typed, weight in wanted.items():
+        assert read_goal(parser.parse_args(typed)).central_weight == weight
+    assert read_goal(parser.parse_args(["--require", "a", "b"])) == Goal(mandatory=("a", "b"))
