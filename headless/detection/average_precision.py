@@ -219,7 +219,7 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
 def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> CountedTruth:
     truths = [frame.truth for frame in frames]
     score = [
-        np.append(frame.detected.score, MISSED)[found.found_by]  # NO_TRAFFIC is the last
+        np.append(frame.detected.score, MISSED)[found.found_by]  # NOBODY is the last
         for frame, found in zip(frames, matches, strict=True)
     ]
     everyone = CountedTruth(

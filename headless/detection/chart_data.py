@@ -19,7 +19,7 @@ from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin
 from .claims import SeedResult
 from .frame_results import FrameResult
-from .matching import NO_TRAFFIC, Rule, match
+from .matching import NOBODY, Rule, match
 
 IN_PLAN = [0, 1, 3, 4, 6]
 
@@ -93,7 +93,7 @@ def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
         sensors=sensors[:, :2],
         truth=frame.truth.boxes[:, IN_PLAN],
         wanted=found.counted,
-        missed=found.counted & (found.found_by == NO_TRAFFIC),
+        missed=found.counted & (found.found_by == NOBODY),
         detected=shown.detected.boxes[:, IN_PLAN],
         false=found.judged & ~found.hit,
     )

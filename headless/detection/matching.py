@@ -65,9 +65,9 @@ class Match:
     counted : (g,) bool
         Whether the road user is one that had to be found.
     found_by : (g,) int64
-        The detection that found it, `NO_TRAFFIC` where none did.
+        The detection that found it, `NOBODY` where none did.
     found : (k,) int64
-        The road user that each detection found, `NO_TRAFFIC` where it found none that counts.
+        The road user that each detection found, `NOBODY` where it found none that counts.
     judged : (k,) bool
         Whether it is a hit or false; the rest neither helps nor harms.
     """
@@ -80,7 +80,7 @@ class Match:
     @property
     def hit(self) -> Boolean:
         """Whether each detection found a road user that counts, (k,) bool."""
-        hit: Boolean = self.found != NO_TRAFFIC
+        hit: Boolean = self.found != NOBODY
         return hit
 
     def of_found(self, of_truth: NDArray[Any], own: NDArray[Any]) -> NDArray[Any]:
@@ -96,16 +96,16 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     counted = must_be_found(frame, rule)
     overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
     best = overlap.max(axis=1, initial=0.0)
-    found_by, found = np.full(len(truth), NO_TRAFFIC), np.full(len(detected), NO_TRAFFIC)
+    found_by, found = np.full(len(truth), NOBODY), np.full(len(detected), NOBODY)
     for row in np.lexsort((-best, -detected.score)):
         if best[row] <= rule.iou:
             continue
-        free = np.where(counted & (found_by == NO_TRAFFIC), overlap[row], 0.0)
+        free = np.where(counted & (found_by == NOBODY), overlap[row], 0.0)
         if free.max() > rule.iou:
             found[row] = free.argmax()
             found_by[found[row]] = row
     excused = (overlap[:, ~counted] > rule.iou).any(axis=1) | ~detected.inside
-    return Match(counted, found_by, found, (found != NO_TRAFFIC) | (of_its_kind(frame, rule) & ~excused))
+    return Match(counted, found_by, found, (found != NOBODY) | (of_its_kind(frame, rule) & ~excused))
 
 
 def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:

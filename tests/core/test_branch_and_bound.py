@@ -98,7 +98,7 @@ def test_a_search_stops_at_its_limit():
 
 
 def test_an_uneven_street_is_solved_as_well_as_an_even_one():
-    problem = street_problem(25, 300, seed=5, count=3)
+    problem = street_problem(16, 300, seed=5, count=3)
     weights = np.random.default_rng(1).uniform(0.5, 2.0, 300)
     instance = make_instance(replace(problem, weights=weights))[0]
     best = max(instance.value(choice) for choice in feasible(instance))

@@ -416,6 +416,7 @@ def test_an_effort_is_positive(effort: float) -> None:
         finish(solve(row_problem(halves), SolverLimits(effort=effort)))
 
 
+@pytest.mark.slow
 def test_breaking_ties_takes_no_longer_than_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
     # all is seen by many choices: the proof is quick, the ties are many
     visible = np.random.default_rng(1).random((300, 200)) < 0.5

@@ -8,16 +8,16 @@ from headless.survey import add_options
 
 import pytest
 
-from seip_addon.core.placement.goal import Goal
+from seip_addon.core.placement.objective import Objective
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.settings import settings_of
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.visibility.grid import VisibilitySettings
+from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.core.workflows.traffic import TrafficSettings
 
-ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Goal, Risk, ScanSettings, TrafficSettings)
+ALL = (CandidateSettings, VisibilitySettings, SurveySettings, Objective, Risk, ScanSettings, TrafficSettings)
 
 
 def surveyed(*typed):
@@ -66,4 +66,4 @@ def test_weights_are_the_scene_s_or_one_for_all():
     }
     for typed, weight in wanted.items():
         assert read_goal(parser.parse_args(typed)).central_weight == weight
-    assert read_goal(parser.parse_args(["--require", "a", "b"])) == Goal(mandatory=("a", "b"))
+    assert read_goal(parser.parse_args(["--require", "a", "b"])) == Objective(mandatory=("a", "b"))

@@ -29,9 +29,8 @@ from hypothesis import strategies as st
 from placement_oracle import cases
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import SolverLimits, cheapest_for_coverage, solve, solve_greedy
-from seip_addon.core.placement import near_optimal as near_optimal_set
-from seip_addon.core.placement.near_optimal import near_optimal_set as list_near_optimal
+from seip_addon.core.placement import SolverLimits, cheapest_for_coverage, near_optimal, solve, solve_greedy
+from seip_addon.core.placement.near_optimal import near_optimal_set
 from seip_addon.core.placement.problem import TIE
 from seip_addon.core.placement.solver import scale_notes
 from seip_addon.core.progress import finish
@@ -129,7 +128,7 @@ def test_a_second_is_a_second() -> None:
 def test_near_optimal_set_lists_exactly_what_enumeration_finds(seed: int, share: float) -> None:
     problem, _ = random_problem(seed)
     best = finish(solve(problem))
-    top = finish(list_near_optimal(problem, best.chosen, share))
+    top = finish(near_optimal_set(problem, best.chosen, share))
     useful = np.flatnonzero(problem.visible.any(axis=1))
     goal = (1 - share) * best.covered - 1e-9
     expected = {
@@ -149,12 +148,16 @@ def test_near_optimal_set_lists_exactly_what_enumeration_finds(seed: int, share:
 def test_near_optimal_set_says_when_there_are_more() -> None:
     problem, _ = random_problem(5, candidates=20, targets=12, count=4)
     best = finish(solve(problem))
-    with patch.object(near_optimal_set, "MOST_LISTED", 3):
-        top = finish(list_near_optimal(problem, best.chosen, 0.5))
+    with patch.object(near_optimal, "MOST_LISTED", 3):
+        top = finish(near_optimal_set(problem, best.chosen, 0.5))
     assert not top.complete
     assert top.message.startswith("more than 3 placements")
     with pytest.raises(SeipError, match="at least 0 and below 1"):
-        finish(list_near_optimal(problem, best.chosen, 1.5))
+        finish(near_optimal_set(problem, best.chosen, 1.5))
+
+
+def without_padding(placements: np.ndarray) -> set[tuple[int, ...]]:
+    return {tuple(candidate for candidate in row if candidate >= 0) for row in placements.tolist()}
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -162,15 +165,15 @@ def test_near_optimal_set_says_when_there_are_more() -> None:
 def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: int) -> None:
     problem, _ = random_problem(seed)
     best = finish(solve(problem))
-    every = {tuple(row) for row in finish(list_near_optimal(problem, best.chosen, 0.3)).placements.tolist()}
-    with patch.object(near_optimal_set, "MOST_BRANCHES", 0):
-        top = finish(list_near_optimal(problem, best.chosen, 0.3))
-    found = {tuple(row) for row in top.placements.tolist()}
+    every = without_padding(finish(near_optimal_set(problem, best.chosen, 0.3)).placements)
+    with patch.object(near_optimal, "MOST_BRANCHES", 0):
+        top = finish(near_optimal_set(problem, best.chosen, 0.3))
+    found = without_padding(top.placements)
     chosen = set(best.chosen.tolist())
     assert not top.complete
     assert top.message.startswith("more than")
     assert found <= every
-    assert {row for row in every if len(chosen - set(row)) <= 1 and len(set(row) - {-1}) == len(chosen)} <= found
+    assert {row for row in every if len(chosen - set(row)) <= 1 and len(row) == len(chosen)} <= found
 
 
 def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
@@ -182,7 +185,7 @@ def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     assert "68.4%" in rows[1].begins
     assert "gap 5.0%" in rows[2].begins
     problem, _ = random_problem(1)
-    top = finish(list_near_optimal(problem, finish(solve(problem)).chosen, 0.1))
+    top = finish(near_optimal_set(problem, finish(solve(problem)).chosen, 0.1))
     charts.save_solver_chart(tmp_path / "solvers.png", study, "solvers")
     charts.save_flat_top_chart(tmp_path / "flat.png", [("small", top)], "flat")
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in tmp_path.iterdir())
