@@ -38,7 +38,7 @@ test: environment
 	$(PY) -m pytest $(SPREAD) -m "not slow"
 
 test-slow: environment
-	$(PY) -m pytest $(SPREAD) -m slow
+	$(PY) -m pytest $(SPREAD) -m "slow or hypothesis"
 
 lint: environment
 	$(PY) -m ruff check

@@ -6,11 +6,16 @@ import sys
 import pytest
 from hypothesis import settings
 
-# Shared machines stall at random: speed is the benchmarks' business. The same examples every time.
-settings.register_profile("seip", deadline=None, derandomize=True)
-settings.load_profile("seip")
+# Shared machines stall at random: speed is the benchmarks' business. The same random cases every time: a dozen of each
+# property in quick runs, hypothesis's hundred where `make test-slow` runs them all.
+settings.register_profile("quick", max_examples=12, deadline=None, derandomize=True)
+settings.register_profile("thorough", deadline=None, derandomize=True)
 
 STATUS = pytest.StashKey[int]()
+
+
+def pytest_configure(config):
+    settings.load_profile("quick" if "not slow" in config.getoption("markexpr") else "thorough")
 
 
 def pytest_sessionfinish(session, exitstatus):

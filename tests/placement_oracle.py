@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from itertools import combinations
 
 import numpy as np
@@ -18,7 +17,7 @@ WEIGHTS = [[1.0], [1.0, 2.0], [0.0, 0.5, 3.0], [1e-3, 1.0, 7.0], [2.0**21 - 1, 2
 
 def cases(many: int, few: int = 25) -> settings:
     """Return settings for so many random cases where slow tests run as well, and for ``few`` in quick runs."""
-    number = min(many, few) if os.environ.get("SEIP_FEW_CASES") == "1" else many
+    number = min(many, few) if settings.get_current_profile_name() == "quick" else many
     return settings(max_examples=number, deadline=None, suppress_health_check=list(HealthCheck))
 
 

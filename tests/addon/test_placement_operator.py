@@ -247,6 +247,7 @@ def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
         bpy.ops.seip.export_result()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["EXPECTED", "CVAR", "WORST"])
 def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, objective):
     goal = junction.seip.goal

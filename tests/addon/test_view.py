@@ -104,6 +104,7 @@ def test_draw_handlers_are_always_removed(placed, ending):
         seip_addon.register()
 
 
+@pytest.mark.slow
 def test_a_picture_has_the_rendered_view_and_the_plan(placed, tmp_path, monkeypatch):
     for name, value in (("WIDTH", 320), ("HEIGHT", 180), ("SAMPLES", 1)):
         monkeypatch.setattr(render, name, value)

@@ -72,6 +72,7 @@ def test_one_thread_finds_the_same():
     assert (grids[0].packed == grids[1].packed).all()
 
 
+@pytest.mark.slow
 def test_an_estimate_is_within_a_factor_of_two():
     settings = VisibilitySettings()
     for _ in range(3):  # other work on the machine may come between
