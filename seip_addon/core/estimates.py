@@ -47,6 +47,8 @@ class IntervalEstimate:
 
     def describe(self, decimals: int = 2) -> str:
         """Return value and interval as shares in per cent."""
+        if not math.isfinite(self.high - self.low):
+            return f"{self.value:.{decimals}%} [too few data for an interval]"
         return f"{self.value:.{decimals}%} [{self.low:.{decimals}%}, {self.high:.{decimals}%}]"
 
     def as_points(self, decimals: int = 2) -> str:

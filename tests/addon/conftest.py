@@ -18,3 +18,18 @@ def add_on(tmp_path, monkeypatch):
     seip_addon.unregister()
     assert set(dir(bpy.types)) == before
     assert not hasattr(bpy.types.Scene, "seip")
+
+
+@pytest.fixture
+def junction(add_on, small_scene):
+    """The small junction, open, with settings under which several sensors of one type are worth placing."""
+    bpy.ops.wm.open_mainfile(filepath=str(small_scene))
+    scene = bpy.context.scene
+    scene.seip.survey.heights = "8"
+    scene.seip.survey.grid = 4.0
+    scene.seip.survey.spacing = 12.0
+    scene.seip.goal.count = 2
+    bpy.ops.seip.list_sensor_types()
+    for one in scene.seip.survey.types:
+        one.use = one.name == "type1"
+    return scene

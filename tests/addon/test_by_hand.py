@@ -20,16 +20,11 @@ from seip_addon.session import session
 from tests.json_schema import violations
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENE = ROOT / "scenes" / "junction.blend"
 
 
 @pytest.fixture
-def placed(add_on, tmp_path):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    scene = bpy.context.scene
-    scene.seip.survey.heights = "8"
-    scene.seip.survey.grid = 4.0
-    scene.seip.survey.spacing = 12.0
+def placed(junction, tmp_path):
+    scene = junction
     scene.seip.goal.count = 3
     scene.seip.result.folder = str(tmp_path / "out")
     bpy.ops.seip.solve_placement()

@@ -4,7 +4,6 @@ import csv
 import json
 import math
 from collections.abc import Generator
-from pathlib import Path
 from types import SimpleNamespace
 
 from headless import place, robust
@@ -21,34 +20,19 @@ from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.scene.write import MARK
 from seip_addon.session import session
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--no-render"]
-
-
-def ask(scene: bpy.types.Scene) -> bpy.types.Scene:
-    scene.seip.survey.heights = "8"
-    scene.seip.survey.grid = 4.0
-    scene.seip.survey.spacing = 12.0
-    scene.seip.goal.count = 2
-    return scene
-
-
-@pytest.fixture
-def junction(add_on):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    return ask(bpy.context.scene)
+OPTIONS = ["--heights", "8", "--grid", "4", "--spacing", "12", "--count", "2", "--sensor", "type1", "--no-render"]
 
 
 def labels(scene: bpy.types.Scene) -> list[str]:
     return sorted(selection.sensor_empties(scene))
 
 
-def test_panel_and_batch_write_the_same_placement(junction, tmp_path):
+def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scene):
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     junction.seip.result.folder = str(tmp_path / "panel")
     assert bpy.ops.seip.export_result() == {"FINISHED"}
     key = session.survey_of(junction).grid.key
-    place.main([str(SCENE), *OPTIONS, "-o", str(tmp_path / "batch")])
+    place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path / "batch")])
     panel, batch = (load_placement_record(tmp_path / name / "placement.json") for name in ("panel", "batch"))
     assert comparable(panel) == comparable(batch)
     assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
@@ -56,12 +40,12 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path):
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
 
 
-def test_pose_errors_are_tried_where_that_is_asked_for(junction, tmp_path):
+def test_pose_errors_are_tried_where_that_is_asked_for(junction, tmp_path, small_scene):
     junction.seip.goal.pose_errors = True
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     panel = json.loads(junction.seip.result.record)
     assert any("in one of twenty cases" in note for note in panel["notes"])
-    place.main([str(SCENE), *OPTIONS, "--pose-errors", "-o", str(tmp_path)])
+    place.main([str(small_scene), *OPTIONS, "--pose-errors", "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
 
 
@@ -249,7 +233,7 @@ def test_a_folder_that_cannot_be_written_has_its_sentence(junction, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", ["EXPECTED", "CVAR", "WORST"])
-def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, objective):
+def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, objective, small_scene):
     goal = junction.seip.goal
     goal.objective, goal.position_error, goal.tilt_error, goal.failure = objective, 0.5, math.radians(3), "mean"
     types = junction.seip.survey
@@ -261,7 +245,7 @@ def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, o
     panel = json.loads(junction.seip.result.record)
     options = ["--heights", "8", "--grid", "8", "--spacing", "25", "--count", "2", "--no-render", "--sensor", "type1"]
     wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failure", "mean", "--objective", objective.lower()]
-    robust.main([str(SCENE), *options, *wrong, "-o", str(tmp_path)])
+    robust.main([str(small_scene), *options, *wrong, "-o", str(tmp_path)])
     batch = load_placement_record(tmp_path / "placement.json")
     for one in (panel, batch):
         one["settings"].pop("render")

@@ -1,7 +1,5 @@
 """Looking at a placement: ranking, comparison, and sensors that a hand moves."""
 
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
@@ -12,17 +10,10 @@ from seip_addon.core.results.comparison import unpacked_counts
 from seip_addon.core.results.placement_record import parsed_record
 from seip_addon.session import scene_of, session
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-
 
 @pytest.fixture
-def placed(add_on):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    scene = bpy.context.scene
-    scene.seip.survey.heights = "8"
-    scene.seip.survey.grid = 4.0
-    scene.seip.survey.spacing = 12.0
-    scene.seip.goal.count = 2
+def placed(junction):
+    scene = junction
     bpy.ops.seip.solve_placement()
     return scene
 
@@ -151,7 +142,7 @@ def test_following_leaves_nothing_behind(placed):
 
 def test_following_stops_where_the_scene_has_changed(placed):
     bpy.ops.seip.follow_sensors()
-    bpy.data.objects["Building 1"].location.x += 1.0
+    bpy.data.objects["building 1"].location.x += 1.0
     bpy.context.view_layer.update()
     live_coverage.update()
     assert "the scene has changed" in session.following.problem

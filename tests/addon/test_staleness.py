@@ -9,18 +9,11 @@ from seip_addon import scene_status, selection
 from seip_addon.sensor_edits import sensor_edits
 from seip_addon.session import SceneSurvey, session
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-
 
 @pytest.fixture
-def known(add_on):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    scene = bpy.context.scene
-    scene.seip.survey.heights = "8"
-    scene.seip.survey.grid = 4.0
-    scene.seip.survey.spacing = 12.0
+def known(junction):
     bpy.ops.seip.compute_visibility()
-    return session.survey_of(scene)
+    return session.survey_of(junction)
 
 
 def read_again(known: SceneSurvey) -> bool:
@@ -29,7 +22,7 @@ def read_again(known: SceneSurvey) -> bool:
 
 
 def building() -> bpy.types.Object:
-    return bpy.data.objects["Building 1"]
+    return bpy.data.objects["building 1"]
 
 
 def move() -> None:
@@ -90,7 +83,7 @@ def select() -> None:
 
 
 def look_elsewhere() -> None:
-    bpy.context.scene.camera.location.z += 5.0
+    bpy.context.scene.cursor.location.z += 5.0
 
 
 def place_sensors() -> None:
@@ -178,6 +171,7 @@ def test_a_check_holds_until_scene_or_settings_change(known, tmp_path):
 
 def test_what_a_hand_did_to_the_sensors_is_said(known):
     scene = bpy.context.scene
+    scene.seip.goal.count = 4
     bpy.ops.seip.solve_placement()
     bpy.data.collections["SEIP Sensors"].hide_viewport = True
     assert not sensor_edits(scene)

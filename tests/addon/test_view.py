@@ -1,7 +1,5 @@
 """What the viewport shows: colours of the coverage, sight lines, and layers that are always removed."""
 
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
@@ -13,19 +11,6 @@ from seip_addon.session import session
 from seip_addon.viewport import layers
 from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT
-
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-
-
-@pytest.fixture
-def junction(add_on):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    scene = bpy.context.scene
-    scene.seip.survey.heights = "8"
-    scene.seip.survey.grid = 4.0
-    scene.seip.survey.spacing = 12.0
-    scene.seip.goal.count = 2
-    return scene
 
 
 @pytest.fixture

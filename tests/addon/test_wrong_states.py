@@ -2,7 +2,6 @@
 
 import builtins
 import json
-from pathlib import Path
 
 import bpy
 import pytest
@@ -16,27 +15,16 @@ from seip_addon.scene import contract
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import RunningWork, session
 
-SCENE = Path(__file__).resolve().parents[2] / "scenes" / "junction.blend"
-
 
 @pytest.fixture
-def scene(add_on):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
-    survey = bpy.context.scene.seip.survey
-    survey.heights, survey.grid, survey.spacing = "8", 4.0, 12.0
-    return bpy.context.scene
-
-
-@pytest.fixture
-def placed(scene):
-    scene.seip.goal.count = 2
+def placed(junction):
     bpy.ops.seip.solve_placement()
-    return scene
+    return junction
 
 
 @pytest.fixture
-def linked(add_on):
-    with bpy.data.libraries.load(str(SCENE), link=True) as (theirs, ours):
+def linked(add_on, small_scene):
+    with bpy.data.libraries.load(str(small_scene), link=True) as (theirs, ours):
         ours.scenes = theirs.scenes
     own = bpy.context.scene
     bpy.context.window.scene = next(scene for scene in bpy.data.scenes if scene.library is not None)
@@ -50,13 +38,13 @@ def test_a_linked_scene_is_not_written_into(linked, button):
         getattr(bpy.ops.seip, button)()
 
 
-def test_an_object_in_edit_mode_counts_as_it_is_shown_there(scene):
+def test_an_object_in_edit_mode_counts_as_it_is_shown_there(junction):
     bpy.ops.seip.compute_visibility()
-    key = session.survey_of(scene).grid.key
-    bpy.context.view_layer.objects.active = bpy.data.objects["Building 1"]
+    key = session.survey_of(junction).grid.key
+    bpy.context.view_layer.objects.active = bpy.data.objects["building 1"]
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.seip.compute_visibility()
-    assert session.survey_of(scene).grid.key == key
+    assert session.survey_of(junction).grid.key == key
 
 
 def test_a_record_of_a_newer_version_is_not_shown(placed):
@@ -79,7 +67,7 @@ def test_an_export_needs_a_folder(placed):
         bpy.ops.seip.export_result()
 
 
-def test_a_cache_that_cannot_be_written_is_named_before_anything_is_cast(scene, tmp_path, monkeypatch):
+def test_a_cache_that_cannot_be_written_is_named_before_anything_is_cast(junction, tmp_path, monkeypatch):
     file = tmp_path / "file"
     file.touch()
     monkeypatch.setattr(preferences, "cache_folder", lambda: file)
@@ -154,11 +142,11 @@ def test_an_undo_is_followed(placed):
     live_coverage.stop()
 
 
-def test_work_asks_blender_for_nothing_once_it_is_under_way(scene, monkeypatch):
+def test_work_asks_blender_for_nothing_once_it_is_under_way(junction, monkeypatch):
     def asked():
         pytest.fail("the preferences were asked from the work")
 
-    seeing = scene_survey.with_visibility(finish(scene_survey.survey(scene)))
+    seeing = scene_survey.with_visibility(finish(scene_survey.survey(junction)))
     for name in ("cache_folder", "cores", "own"):
         monkeypatch.setattr(preferences, name, asked)
     _, grid = finish(seeing)
