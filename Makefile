@@ -53,7 +53,7 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/test_shipped_maps.py tests/core/test_traffic_simulation.py tests/headless/test_traffic.py
+	$(PY) -m pytest tests/core/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py
 
 # Runs of one scene differ by their seed alone; dense ones have twice the vehicles.
 traffic: sumo

@@ -20,10 +20,10 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import session, survey
+from headless.convergence import coarsest_settings
 from headless.options import add_goal, add_settings, new_parser, read_goal
 
 from seip_addon.core.placement.objective import Objective, Solution, check_objective
-from seip_addon.core.workflows.convergence import coarsest_settings
 from seip_addon.core.workflows.survey import place
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from headless import session
+from headless.convergence import Convergence
 from headless.options import add_settings, read_settings
 
 import bpy
@@ -30,7 +31,6 @@ from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.needed_triangles import triangles_sentence
 from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.workflows.convergence import Convergence
 from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder

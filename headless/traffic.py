@@ -25,6 +25,8 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import session
 from headless.options import new_parser
+from headless.sumo.demand import Demand
+from headless.sumo.simulation import Scenario, SignalPlan, simulate
 
 import bpy
 import numpy as np
@@ -33,7 +35,6 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
-from seip_addon.core.traffic.demand import Demand
 from seip_addon.core.traffic.floating_car_data import Extent, listed
 from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
@@ -46,7 +47,6 @@ from seip_addon.core.traffic.source import (
     read_sumo,
     road_bounds,
 )
-from seip_addon.core.traffic.sumo import Scenario, SignalPlan, simulate
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate

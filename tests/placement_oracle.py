@@ -6,19 +6,12 @@ import math
 from itertools import combinations
 
 import numpy as np
-from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from seip_addon.core.placement import PlacementProblem
 
 WEIGHTS = [[1.0], [1.0, 2.0], [0.0, 0.5, 3.0], [1e-3, 1.0, 7.0], [2.0**21 - 1, 2.0**21 + 1]]
 """Weights to draw from. The last ones have sums that single precision holds, while sums of their sums are rounded."""
-
-
-def cases(many: int, few: int = 25) -> settings:
-    """Return settings for so many random cases where slow tests run as well, and for ``few`` in quick runs."""
-    number = min(many, few) if settings.get_current_profile_name() == "quick" else many
-    return settings(max_examples=number, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @st.composite

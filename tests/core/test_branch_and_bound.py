@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import cases, small_problems
+from placement_oracle import small_problems
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import branch_and_bound

@@ -1,6 +1,7 @@
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.pictures.callouts import place_callouts
 
@@ -13,7 +14,7 @@ def overlap(low_a, high_a, low_b, high_b):
     return bool(np.all((low_a < high_b) & (low_b < high_a)))
 
 
-@settings(max_examples=60)
+@cases(60)
 @given(st.integers(0, 10_000), st.integers(1, 12))
 def test_with_room_no_label_hides_an_anchor_or_another_label_or_leaves_the_picture(seed, count):
     random = np.random.default_rng(seed)

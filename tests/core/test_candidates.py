@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.candidates import CandidateSettings, lay_candidates
@@ -66,7 +67,7 @@ def test_a_narrow_strip_is_filled_evenly():
     assert gaps.max() <= 4.0 + 0.5 + 1e-9
 
 
-@settings(max_examples=25)
+@cases(25)
 @given(spacing=st.floats(1.0, 6.0), angle=st.floats(0, 3), width=st.floats(2.0, 30.0))
 def test_spread_is_even_and_leaves_no_room(spacing, angle, width):
     area = shapely.affinity.rotate(shapely.box(0, 0, 30, width), angle, use_radians=True)

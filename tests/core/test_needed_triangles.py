@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from engines import each_engine
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.visibility.needed_triangles import needed_triangles, triangles_sentence
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 
 @each_engine
-@settings(max_examples=40)
+@cases(40)
 @given(st.integers(0, 2**32 - 1))
 def test_no_line_of_sight_changes(engine: Engine, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
+from random_cases import cases
 from scipy.integrate import quad, solve_ivp
 from scipy.special import fresnel
 
@@ -44,7 +45,7 @@ def test_a_clothoid_from_a_straight_is_a_fresnel_integral():
 
 
 @given(curvatures, curvatures, lengths)
-@settings(max_examples=25)
+@cases(25)
 def test_a_clothoid_is_the_integral_of_its_heading(first, last, length):
     rate = (last - first) / length
 
@@ -73,7 +74,7 @@ cubics = st.tuples(st.floats(-2, 2), st.floats(-0.5, 0.5), st.floats(-2e-2, 2e-2
 
 
 @given(cubics, st.floats(1.0, 100.0), st.floats(0.0, 1.0))
-@settings(max_examples=25)
+@cases(25)
 def test_poly3_is_walked_by_its_arc(coefficients, length, share):
     expected = by_stepping([0, 1, 0, 0], coefficients, 1.0, share * length)
     np.testing.assert_allclose(at(poly3(coefficients, length), share * length), expected, atol=1e-8)
@@ -85,7 +86,7 @@ def test_poly3_is_walked_by_its_arc(coefficients, length, share):
     st.floats(0.0, 1.0),
     st.floats(0.9, 1.1),
 )
-@settings(max_examples=25)
+@cases(25)
 def test_a_normalised_parametric_cubic_is_walked_by_its_arc(u, v, share, misstated):
     du, dv = Polynomial(u).deriv(), Polynomial(v).deriv()
     arc = quad(lambda p: math.hypot(du(p), dv(p)), 0, 1, epsabs=1e-12, limit=200)[0]

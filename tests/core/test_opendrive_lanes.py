@@ -9,6 +9,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import junction_area
@@ -47,7 +48,7 @@ def test_lanes_are_ordered_from_left_to_right_and_share_their_edges(folder):
 
 
 @given(st.floats(-0.05, 0.05), st.floats(1.0, 60.0), st.floats(0.5, 8.0))
-@settings(max_examples=30)
+@cases(30)
 def test_a_lane_on_an_arc_has_the_area_of_its_ring(folder, curvature, length, width):
     (surface,) = surfaces(
         folder, road(geometry(f'<arc curvature="{curvature!r}"/>', length), section(lane(-1, width))), tolerance=1e-4
@@ -99,7 +100,7 @@ def test_chords_stay_within_the_tolerance(folder, shape, width, elevation, toler
 
 @pytest.mark.slow
 @bends
-@settings(max_examples=300)
+@cases(300)
 def test_chords_of_many_bends_stay_within_the_tolerance(folder, shape, width, elevation, tolerance):
     chords_stay_within_the_tolerance(folder, shape, width, elevation, tolerance)
 
@@ -112,7 +113,7 @@ def distance_to_line(line, point):
 
 
 @given(st.floats(-math.pi, math.pi), st.sampled_from([0.0, 5.4e6]))
-@settings(max_examples=20)
+@cases(20)
 def test_moving_and_turning_the_map_moves_and_turns_its_lanes(folder, turn, far):
     shape = '<spiral curvStart="0.0" curvEnd="0.03"/>'
     (here,) = surfaces(folder, road(geometry(shape, 60.0)))

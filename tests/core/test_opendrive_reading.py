@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from opendrive_text import document, geometry, lane, map_lanes, read_text, road, section
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import (
@@ -239,7 +240,7 @@ def is_read_or_refused_in_words(folder, span, value):
 
 
 @given(st.sampled_from(VALUES), st.sampled_from(WRONG))
-@settings(max_examples=30)
+@cases(30)
 def test_a_value_gone_wrong_is_read_or_refused_in_words(tmp_path_factory, span, value):
     is_read_or_refused_in_words(tmp_path_factory.getbasetemp(), span, value)
 

@@ -177,6 +177,7 @@ def test_merging_targets_keeps_weight_and_does_not_depend_on_order() -> None:
     np.testing.assert_array_equal(sums, same)
 
 
+@pytest.mark.slow
 def test_of_many_pairs_that_see_all_the_one_that_sees_most_twice() -> None:
     problem = street_problem(60, 1000, blocks=2, count=6)
     visible = problem.visible.copy()
@@ -399,6 +400,7 @@ def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_more_effort_proves_no_less() -> None:
     little, more = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (0.1, 1.0))
     assert little.objective <= more.objective <= more.bound < little.bound

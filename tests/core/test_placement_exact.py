@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import all_placements, cases, covered, merit, small_problems
+from placement_oracle import all_placements, covered, merit, small_problems
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, cheapest_for_coverage, solve, solve_greedy, ties

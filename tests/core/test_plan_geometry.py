@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.geometry.plan import closed, outline, plane_height, signed_area, surface_height, without
 
@@ -20,7 +21,7 @@ def test_areas_are_signed_by_the_turn(some):
 
 
 @given(triangles)
-@settings(max_examples=40)
+@cases(40)
 def test_an_outline_covers_what_its_triangles_cover(some):
     lying = some[np.abs(signed_area(some)) > 0]
     union = shapely.union_all(shapely.polygons(lying[:, :, :2]))
@@ -40,7 +41,7 @@ def test_gaps_up_to_twice_the_width_are_closed():
 
 
 @given(triangles, st.floats(-50, 50), st.floats(-50, 50))
-@settings(max_examples=40)
+@cases(40)
 def test_the_surface_is_the_highest_plane_over_a_point(some, x, y):
     place = np.array([[x, y]])
     lying = some[np.abs(signed_area(some)) > 0]

@@ -68,6 +68,7 @@ def test_labels_of_sensors_do_not_touch_each_other(example):
     assert not any(a.overlaps(b) for i, a in enumerate(labels) for b in labels[:i])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 1, 16, 45])
 def test_any_number_of_sensors_can_be_drawn(example, tmp_path, count):
     deployment = deploy(example.site, example.models, example.visible, np.arange(0, 2 * count, 2))

@@ -124,6 +124,7 @@ def test_few_draws_leave_an_end_open():
     assert math.isfinite(quantile_of(np.arange(500.0), 0.05).low)
 
 
+@pytest.mark.slow
 def test_a_gain_is_in_its_interval_as_often_as_is_said():
     rng, hits = np.random.default_rng(0), 0
     for _ in range(120):
@@ -178,6 +179,7 @@ def test_a_study_says_who_is_to_blame(placed):
     assert study.is_converged()
 
 
+@pytest.mark.slow
 def test_sensor_alone_is_its_row_beside_the_planned_rows(placed):
     site, deployment = placed
     study = study_of(placed, draws=6)

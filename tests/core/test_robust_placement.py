@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from placement_oracle import all_placements, cases, covered, small_problems
+from placement_oracle import all_placements, covered, small_problems
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
@@ -169,6 +170,7 @@ def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting,
     assert last.bound == pytest.approx(best)
 
 
+@pytest.mark.slow
 @given(under_risk(risks=[Risk()]))
 @cases(40, 10)
 def test_worst_is_below_tail_is_below_expectation(case):

@@ -148,6 +148,7 @@ def test_poses_of_one_place_err_alike(laid_out):
     assert (finish(visibility_under_errors(around, some, alone)).packed == together.packed[:, some]).all()
 
 
+@pytest.mark.slow
 def test_charts_are_drawn(laid_out, study, tmp_path):
     around, problem = laid_out
     deployment = deploy(around.site, MODELS, problem.visible, study.nominal[0].placement.chosen)

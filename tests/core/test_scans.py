@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from engines import ANY, each_engine, needs_any
 from float64_rays import first_hits
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 from small_junction import box_triangles
 from traffic_by_hand import box_body, ground, make_model, make_sensor, make_static, make_trajectories, parked
 
@@ -143,7 +144,7 @@ def places(draw):
 
 
 @each_engine
-@settings(max_examples=25)
+@cases(25)
 @given(place=places())
 def test_merged_returns_are_those_of_a_full_scan(engine, place) -> None:
     static, sensors, cars = place
@@ -176,7 +177,7 @@ def test_an_edge_is_found_where_it_is() -> None:
     )
 
 
-@settings(max_examples=30)
+@cases(30)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_windows_hold_every_ray_through_a_hull(seed) -> None:
     random = np.random.default_rng(seed)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from headless.sumo.simulation import find_sumo
+
 import numpy as np
 import pytest
 import shapely
@@ -25,7 +27,6 @@ from seip_addon.core.opendrive import (
     placed_signals,
     read_map,
 )
-from seip_addon.core.traffic.sumo import find_sumo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

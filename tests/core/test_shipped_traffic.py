@@ -58,6 +58,7 @@ def test_a_run_lies_on_its_road(run, geometries):
     assert trajectories.position[:, 2].max() <= heights.max() + 1e-3
 
 
+@pytest.mark.slow
 def test_nobody_stands_in_another(run):
     assert not len(finish(find_overlaps(Trajectories.load(run))))
 

@@ -174,6 +174,7 @@ def test_errors_come_first_and_each_once():
     assert checked(*SOUND.surfaces, problems=(warning, error, warning)).problems == (error, warning)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(*[st.floats(-1e5, 1e5)] * 9), max_size=6), st.sampled_from(["region", "roads", "occluders"]))
 def test_no_triangles_break_it(corners, role):
     odd = Surface(role, "odd", np.array(corners, dtype=float).reshape(-1, 3, 3))

@@ -2,8 +2,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.streetscape import street_furniture as furniture
 
@@ -21,7 +22,7 @@ def volume(solid):
 
 
 @given(SIZES, SIZES, SIZES, st.booleans())
-@settings(max_examples=25)
+@cases(25)
 def test_a_block_is_closed_and_faces_outwards(length, width, height, clockwise):
     base = np.array([[0, 0, 2], [length, 0, 2], [length, width, 2], [0, width, 2]])
     block = furniture.block(base[::-1] if clockwise else base, np.full(4, height), side="wall")
@@ -34,7 +35,7 @@ def test_a_fence_has_the_volume_of_its_panels():
 
 
 @given(st.floats(3, 20), st.floats(1, 12), st.integers(0, 5))
-@settings(max_examples=25)
+@cases(25)
 def test_a_tree_is_as_high_and_wide_as_asked_for(height, crown, variant):
     tree = furniture.tree(height, crown, variant)
     assert tree.vertices[:, 2].max() == pytest.approx(height)

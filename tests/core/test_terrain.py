@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.geometry.plan import plane_height
 from seip_addon.core.streetscape.terrain import Terrain, cut, triangulate
@@ -46,7 +47,7 @@ def test_triangles_fill_an_area_once_and_face_up():
 
 
 @given(st.floats(0.7, 20), st.floats(-50, 50), st.floats(-50, 50))
-@settings(max_examples=25)
+@cases(25)
 def test_draping_keeps_the_area_wherever_the_grid_falls(spacing, x, y):
     area = shapely.affinity.translate(L_SHAPE, x, y)
     ground = SQUARE * [100, 100, 1] - [200, 200, 0]
@@ -72,7 +73,7 @@ def test_a_draped_area_has_no_cracks():
 
 
 @given(st.floats(-1, 5), st.floats(0.1, 3))
-@settings(max_examples=25)
+@cases(25)
 def test_cutting_leaves_the_rest_on_its_plane(x, size):
     hole = shapely.box(x, 1, x + size, 1 + size)
     rest = cut(SQUARE, hole)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from headless.convergence import Judge
 from headless.lab.stability.criterion import in_view
 
 import numpy as np
@@ -12,7 +13,7 @@ from engines import ANY, each_engine
 from float64_rays import nearest_return
 from hypothesis import given
 from hypothesis import strategies as st
-from placement_oracle import cases
+from random_cases import cases
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.errors import SeipError
@@ -43,7 +44,6 @@ from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import resolution_warnings, unresolved_from
 from seip_addon.core.visibility.sight_lines import pose_at
 from seip_addon.core.visibility.visibility_model import VisibilityModel
-from seip_addon.core.workflows.convergence import Judge
 from seip_addon.core.workflows.survey import SurveySettings
 
 MODELS = {key: replace(model, points_per_second=model.points_per_second / 8) for key, model in load_catalogue().items()}

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
@@ -78,7 +79,7 @@ def test_height_and_pitch_are_those_of_the_road(yaw, slope):
 
 
 @given(st.floats(-70.0, 70.0), st.floats(-3.5, 3.5), st.floats(-np.pi, np.pi))
-@settings(max_examples=25)
+@cases(25)
 def test_any_vehicle_on_an_inclined_road_lies_in_its_plane(x, y, yaw):
     fit = fit_to_road(moving([x, x], y, yaw=yaw), scene()).trajectories
     assert fit.position[0, 2] == pytest.approx(GRADE * x, abs=1e-3)
@@ -229,7 +230,7 @@ def test_who_is_in_the_most_ways_goes_first():
 
 
 @given(st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=20), st.floats(0.0, 1.0))
-@settings(max_examples=25)
+@cases(25)
 def test_between_two_samples_motion_is_straight(x, share):
     line = moving(x, 0.0, z=0.0)
     end = line.span[1]

@@ -207,6 +207,7 @@ def test_traffic_elsewhere_gives_no_weights():
         finish(road_user_seconds(site.targets, [parked((500.0, 0.0, 0.0, 0.0, 0.0))]))
 
 
+@pytest.mark.slow
 def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     around, problem = laid_out
     _, found = study

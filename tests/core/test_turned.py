@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from engines import ANY, each_engine
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from random_cases import cases
 from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import beam_directions, load_catalogue
@@ -63,7 +63,7 @@ def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
     place=st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(2, 9)),
     delta=st.sampled_from([0.3, 1.0, 2.5]),
 )
-@hypothesis_settings(max_examples=25)
+@cases(25)
 def test_wherever_it_hangs(angles, place, delta):
     caster = make_ray_caster(SITE.triangles, ANY)
     xyz, orientation = np.array(place), turned(*angles)

@@ -11,9 +11,9 @@ import pytest
 from engines import ANY, each_engine, needs_any, needs_bvh, needs_embree
 from float64_rays import nearest_return
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from random_cases import cases
 from shapely import box
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
@@ -248,7 +248,7 @@ def moved(site: Site, shift: Float, turn: float) -> Site:
 
 
 @each_engine
-@hypothesis_settings(max_examples=30)
+@cases(30)
 @given(seed=st.integers(0, 2**32 - 1), turn=st.floats(-7, 7))
 def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: float) -> None:
     settings = VisibilitySettings(0.6)
@@ -262,7 +262,7 @@ def test_moving_everything_changes_nothing(engine: Engine, seed: int, turn: floa
 
 @each_engine
 @given(seed=st.integers(0, 2**32 - 1))
-@hypothesis_settings(max_examples=30)
+@cases(30)
 def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
     settings = VisibilitySettings(0.6)
     site = decided_site(seed, settings.delta)

@@ -10,7 +10,7 @@ import pytest
 from engines import ANY, each_engine, needs_any
 from hypothesis import given
 from hypothesis import strategies as st
-from placement_oracle import cases
+from random_cases import cases
 from synthetic_junction import junction_site, make_candidates
 from traffic_by_hand import make_model, make_trajectories, parked
 

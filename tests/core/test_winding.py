@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from random_cases import cases
 
 from seip_addon.core.geometry.winding_number import Blocks, enclosed, winding_number
 from seip_addon.core.site.obstruction import inside_any, post_blocked
@@ -91,7 +92,7 @@ def test_triangles_in_one_place_do_no_harm():
 
 
 @given(seed=st.integers(0, 2**32 - 1), clearance=st.sampled_from([0.0, 0.3, 2.0]))
-@settings(max_examples=30)
+@cases(30)
 def test_a_post_is_blocked_by_what_comes_too_near_in_plan_at_its_height(seed, clearance):
     random = np.random.default_rng(seed)
     triangles = np.concatenate([solids(random, 6, 1), leaves(random, 40)])

@@ -111,6 +111,7 @@ def test_a_cluster_writes_the_same_bytes_though_a_worker_dies(cluster, tmp_path:
     assert not (tmp_path / "hurt.pieces").exists()
 
 
+@pytest.mark.slow
 @needs_embree
 def test_the_number_of_threads_changes_nothing() -> None:
     grids = [finish(compute_visibility(SITE, MODELS, SETTINGS, "embree", threads=threads)) for threads in (1, 2)]

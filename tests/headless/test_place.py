@@ -83,6 +83,7 @@ def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path, run):
     record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
     settings = record["settings"]

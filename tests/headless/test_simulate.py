@@ -101,6 +101,7 @@ def test_a_run_has_frames_a_manifest_a_picture_and_a_dataset(run):
         assert (np.abs(on_truck - frame.labels.centre[1]) < frame.labels.size[1] / 2 + 0.3).all()
 
 
+@pytest.mark.slow
 def test_the_same_run_in_another_process_is_the_same_bytes(folder, run):
     command = [
         sys.executable,
@@ -134,6 +135,7 @@ def test_options_reach_the_frames(folder):
     assert len(road) > 1000
 
 
+@pytest.mark.slow
 def test_traffic_that_is_animated_in_the_scene_is_simulated(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
     animate(bpy.context.scene, make_traffic().moved_to(ORIGIN))

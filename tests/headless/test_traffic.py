@@ -6,13 +6,14 @@ import sys
 from pathlib import Path
 
 from headless import traffic
+from headless.sumo import simulation as sumo
 
 import numpy as np
 import pytest
 from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.traffic import Trajectories, sumo
+from seip_addon.core.traffic import Trajectories
 
 ROOT = Path(__file__).resolve().parents[2]
 JUNCTION = ROOT / "scenes" / "junction.blend"

@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from placement_oracle import cases
+from random_cases import cases
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import SolverLimits, cheapest_for_coverage, near_optimal, solve, solve_greedy

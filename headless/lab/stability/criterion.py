@@ -10,6 +10,16 @@ import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
+from headless.convergence import (
+    CANDIDATE_SPACINGS,
+    GRID_SPACINGS,
+    JUDGED_ON,
+    Answer,
+    Convergence,
+    Judge,
+    coarsest_settings,
+)
+
 import numpy as np
 import shapely
 
@@ -27,15 +37,6 @@ from seip_addon.core.visibility.ray_casting import RayCaster, make_ray_caster
 from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.visibility_model import visibility_model
-from seip_addon.core.workflows.convergence import (
-    CANDIDATE_SPACINGS,
-    GRID_SPACINGS,
-    JUDGED_ON,
-    Answer,
-    Convergence,
-    Judge,
-    coarsest_settings,
-)
 from seip_addon.core.workflows.survey import SurveySettings
 
 from .rows import Row

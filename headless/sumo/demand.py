@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import SeipError
-from ..storage.files import whole_file
+from seip_addon.core.errors import SeipError
+from seip_addon.core.storage.files import whole_file
+
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 
 _LONGEST_ROUTE = 40  # edges; in a network without ends a vehicle leaves after so many

@@ -15,15 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import SeipError
-from ..placement.deployment import weighted_share
-from ..placement.objective import Objective, Solution, optimise, target_weights
-from ..progress import Progress, within
-from ..site.scene_geometry import SceneGeometry
-from ..site.site import Site, make_site
-from ..visibility.grid import compute_visibility
-from ..visibility.visibility_model import VisibilityModel, visibility_model
-from .survey import SurveySettings
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.deployment import weighted_share
+from seip_addon.core.placement.objective import Objective, Solution, optimise, target_weights
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.site.site import Site, make_site
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.visibility_model import VisibilityModel, visibility_model
+from seip_addon.core.workflows.survey import SurveySettings
 
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 """Metres between targets, from coarse to fine: each halves the square that a target stands for."""

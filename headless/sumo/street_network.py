@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Float
-from ..progress import finish
-from .sumo_files import Attributes, read_tags
+from seip_addon.core.arrays import Float
+from seip_addon.core.progress import finish
+from seip_addon.core.traffic.sumo_files import Attributes, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"
 """What a lane is for."""

@@ -5,16 +5,18 @@ from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from headless.sumo import simulation as sumo
+from headless.sumo.demand import MIX, MODELS, Demand, write_routes
+from headless.sumo.street_network import DRIVING, PARKING, WALKING, read_network
+
 import numpy as np
 import pytest
 from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic import CATEGORIES, sumo
-from seip_addon.core.traffic.demand import MIX, MODELS, Demand, write_routes
+from seip_addon.core.traffic import CATEGORIES
 from seip_addon.core.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
-from seip_addon.core.traffic.street_network import DRIVING, PARKING, WALKING, read_network
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 
 ROOT = Path(__file__).resolve().parents[2]

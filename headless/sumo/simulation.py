@@ -14,14 +14,15 @@ from threading import Event
 import numpy as np
 import shapely
 
-from ..arrays import Float
-from ..errors import SeipError
-from ..opendrive import read_map
-from ..opendrive.road_map import RoadMap
-from ..progress import Progress, in_thread
-from ..storage.files import whole_file
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
+from seip_addon.core.opendrive.road_map import RoadMap
+from seip_addon.core.progress import Progress, in_thread
+from seip_addon.core.storage.files import whole_file
+from seip_addon.core.traffic.source import TrafficFiles
+
 from .demand import Demand, write_routes
-from .source import TrafficFiles
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
 STEP = 0.1

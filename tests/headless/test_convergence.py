@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
+from headless import convergence
+from headless.convergence import Answer, Judge, coarsest_settings
 from headless.lab.stability import charts
 from headless.lab.stability.criterion import (
     Draws,
@@ -30,8 +32,6 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.workflows import convergence
-from seip_addon.core.workflows.convergence import Answer, Judge, coarsest_settings
 from seip_addon.core.workflows.survey import SurveySettings
 
 GEOMETRY = make_geometry(24.0)
@@ -141,6 +141,7 @@ def test_spreads_hold_the_true_one() -> None:
     assert held >= 180
 
 
+@pytest.mark.slow
 @needs_any
 def test_the_study_finds_the_border_of_the_rings(tmp_path: Path) -> None:
     settings = SurveySettings(
