@@ -53,7 +53,7 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py
+	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py
 
 # Runs of one scene differ by their seed alone; dense ones have twice the vehicles.
 traffic: sumo
@@ -73,7 +73,7 @@ detection: environment
 
 test-detection: detection
 	@$(PYTHON) -m headless.set_up "$(VENV)" second-opinion
-	$(PY) -m pytest tests/detection tests/core/test_source_digest.py
+	$(PY) -m pytest tests/detection tests/core/storage/test_source_digest.py
 
 study: detection
 	$(PY) -m headless.study scenes/junction.blend -o out/study

@@ -2,7 +2,7 @@
 
 As a script it tries as many problems as are asked for, and says what it found::
 
-    python -m tests.core.placement_search --problems 100000 [--first-seed 0] [--minutes 60]
+    python -m tests.placement_search --problems 100000 [--first-seed 0] [--minutes 60]
 """
 
 from __future__ import annotations

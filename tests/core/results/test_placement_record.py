@@ -21,7 +21,7 @@ from seip_addon.core.results.placement_record import (
 from tests.json_schema import violations
 from tests.small_junction import Example, make_example
 
-SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads((Path(__file__).parents[3] / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
 
 
 def solution(chosen, **values) -> Placement:

@@ -10,7 +10,7 @@ import pytest
 
 from seip_addon.core.storage.source_digest import CORE, _sources
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 ENTRIES = ["seip_addon.core.visibility.grid", "seip_addon.core.scans.run_folder"]
 DIGEST = """
 import sys

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import shapely
 from opendrive_text import document, geometry, lane, read_text, road, section
+from plain_street import PLAIN, street
 from street_map import street_map
-from test_candidates import PLAIN, street
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish

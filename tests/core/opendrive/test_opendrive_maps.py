@@ -19,7 +19,7 @@ from seip_addon.core.opendrive import (
     read_map,
 )
 
-FOLDER = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[3] / "shared" / "opendrive")
+FOLDER = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 NAMES = ["Town01", "Town05", "crest-curve", "parking_demo", "stationary_objects"]
 
 

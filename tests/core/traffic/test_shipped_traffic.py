@@ -14,7 +14,7 @@ from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.scene.blend_file import open_blend
 from seip_addon.scene.read import read_scene
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes"
+SCENES = Path(__file__).resolve().parents[3] / "scenes"
 RUNS = sorted(SCENES.glob("*_traffic*/run-*.npz"))
 MOST_TURN = 0.5  # radians within 0.2 s; vehicles turn less
 

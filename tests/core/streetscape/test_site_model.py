@@ -15,7 +15,7 @@ from seip_addon.core.streetscape.description import Area, Building, Poles, SiteD
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
 
-MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[3] / "shared" / "opendrive")
+MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 HERE = SiteDescription(near=(0.0, 0.0), radius=30.0)
 SIGNAL = (
     '<signal id="1" s="{s}" t="{t}" zOffset="0" orientation="{to}" dynamic="{dynamic}" type="1000001" hOffset="0"/>'

@@ -18,7 +18,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import array_file
 from seip_addon.core.traffic import RoadUser, Trajectories
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = ROOT / "scenes" / "junction_traffic" / "run-1.npz"
 USERS = (RoadUser("a", "car", 4.5, 1.8, 1.5), RoadUser("b", "bus", 12.0, 2.5, 3.4))
 

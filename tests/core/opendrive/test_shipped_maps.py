@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[3] / "scenes"
 KERB = 0.12
 
 

@@ -12,7 +12,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.run_overlap import overlap_of, require_independent, vehicle_positions
 
-SHIPPED = Path(__file__).parents[2] / "scenes"
+SHIPPED = Path(__file__).parents[3] / "scenes"
 RUN = Trajectories.load(SHIPPED / "junction_traffic" / "run-1.npz")
 
 

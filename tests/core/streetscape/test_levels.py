@@ -14,7 +14,7 @@ from seip_addon.core.streetscape.description import SiteDescription, read_site_d
 from seip_addon.core.streetscape.model import site_model
 from seip_addon.core.streetscape.parts import Role
 
-MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[3] / "shared" / "opendrive")
+MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 DECK = 6.0
 LANES = section(lane(1), lane(-1))
 

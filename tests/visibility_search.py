@@ -2,7 +2,7 @@
 
 As a script it tries as many scenes as are asked for, and says what it found::
 
-    python -m tests.core.visibility_search --scenes 20000 [--first-seed 0] [--minutes 60]
+    python -m tests.visibility_search --scenes 20000 [--first-seed 0] [--minutes 60]
 """
 
 from __future__ import annotations

@@ -226,11 +226,11 @@ def test_measured_returns_follow_the_seed_and_leave_misses() -> None:
 
 
 def test_the_documented_example_is_a_catalogue(tmp_path: Path) -> None:
-    text = (Path(__file__).resolve().parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    text = (Path(__file__).resolve().parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
     assert load_catalogue([tmp_path / "mine.toml"])["corner32"].price == 9_000
 
 
 def test_the_documentation_names_every_sensor() -> None:
-    text = (Path(__file__).resolve().parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    text = (Path(__file__).resolve().parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
     assert all(f"| `{key}` |" in text for key in load_catalogue())

@@ -16,7 +16,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.description import SiteDescription, describe_place, read_site_description
 from seip_addon.core.streetscape.model import site_model
 
-MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[3] / "shared" / "opendrive")
+MAPS = Path(os.environ.get("SEIP_MAPS") or Path(__file__).resolve().parents[4] / "shared" / "opendrive")
 LANES = section(lane(1), lane(-1))
 JUNCTIONS = '<junction id="7" name="first"/><junction id="8" name="second"/>'
 
