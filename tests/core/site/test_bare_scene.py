@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_street import PLAIN, block, street
 from street_map import street_map
-from test_candidates import PLAIN, block, street
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
