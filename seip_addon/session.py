@@ -30,8 +30,8 @@ from .core.visibility.estimate import Estimate
 from .core.visibility.grid import VisibilityGrid
 from .core.visibility.visibility_model import VisibilityModel
 from .core.workflows.survey import Layout, SurveySettings
+from .overlay import Overlay
 from .scene.changes import Watch
-from .viewport.overlay import Overlay
 
 
 @dataclass(frozen=True)

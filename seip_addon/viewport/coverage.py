@@ -5,9 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..core.pictures.palette import rgb
+from ..overlay import Block, Entry, Overlay
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
-from .legend import Block, Entry
-from .overlay import Overlay
 
 NAME = "coverage"
 SHOWN_BY = {"MATERIAL", "VERTEX"}

@@ -10,9 +10,9 @@ from typing import Any
 
 import bpy
 
+from ..overlay import Block, Overlay
 from ..session import session
-from .legend import Block, draw_legend
-from .overlay import Overlay
+from .legend import draw_legend
 
 _handles: list[Any] = []
 

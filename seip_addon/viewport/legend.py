@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import bpy
 
-Colour = tuple[float, float, float, float]
+from ..overlay import Block, Colour, Entry
 
 TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0
 """Pixels at the interface's usual scale."""
@@ -16,22 +15,6 @@ PAPER: Colour = (0.06, 0.08, 0.10, 0.82)
 INK: Colour = (0.95, 0.96, 0.97, 1.0)
 EDGE: Colour = (0.55, 0.58, 0.62, 1.0)
 FONT = 0
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A line of a legend: words beside a swatch of one colour, or of several that run into one another."""
-
-    words: str
-    colours: tuple[Colour, ...]
-
-
-@dataclass(frozen=True)
-class Block:
-    """A part of a legend."""
-
-    title: str
-    entries: tuple[Entry, ...]
 
 
 def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.types.Area, scale: float) -> None:

@@ -10,8 +10,7 @@ import numpy as np
 from ..core.pictures.cloud_colours import STANDING, By, cloud_colours, sensor_colour, strength_ramp
 from ..core.pictures.palette import STRONGEST, rgb
 from ..core.scans import Frame, MountedSensor
-from .legend import Block, Colour, Entry
-from .overlay import Layer, Overlay
+from ..overlay import Block, Colour, Entry, Layer, Overlay
 
 NAME = "point cloud"
 RAMP_STEPS = 8

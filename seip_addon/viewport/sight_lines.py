@@ -7,9 +7,8 @@ import numpy as np
 
 from ..core.pictures.palette import INK, rgb
 from ..core.visibility.sight_lines import SightLines
+from ..overlay import Block, Colour, Entry, Layer, Overlay
 from ..scene.write import LIFT
-from .legend import Block, Colour, Entry
-from .overlay import Layer, Overlay
 
 NAME = "sight lines"
 LINE_COLOUR: Colour = (1.0, 0.85, 0.25, 0.30)

@@ -10,12 +10,28 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .legend import Block, Colour
+Colour = tuple[float, float, float, float]
 
 Kind = Literal["POINTS", "LINES", "TRIS"]
 
 POINT_SIZE = 2.0
 """Pixels, at the interface's usual scale."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of a legend: words beside a swatch of one colour, or of several that run into one another."""
+
+    words: str
+    colours: tuple[Colour, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a legend."""
+
+    title: str
+    entries: tuple[Entry, ...]
 
 
 @dataclass
