@@ -86,7 +86,7 @@ stability: detection
 	$(PY) -m headless.stability scenes/junction.blend --other scenes/corridor.blend -o docs
 
 benchmark: environment
-	$(PY) -m pip install --quiet --group benchmark
+	$(PY) -m pip install -qq --group benchmark
 	$(PY) -m headless.benchmark scenes/junction.blend -o docs
 
 extension: environment

@@ -126,7 +126,7 @@ def check_wheels(wheels: list[Path]) -> None:
 
 def download(folder: Path, requirements: list[str], python: str, tags: list[str]) -> bool:
     """Return whether pip had a wheel of each requirement for this Python and these tags."""
-    pip = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:"]
+    pip = [sys.executable, "-m", "pip", "download", "-qq", "--no-deps", "--only-binary=:all:"]
     command = [*pip, f"--dest={folder}", f"--python-version={python}", *tags, *requirements]
     looking_for_pure = "--abi=none" in tags
     outcome = subprocess.run(  # noqa: S603  # pip, with our own pins

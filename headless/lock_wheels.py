@@ -57,7 +57,7 @@ def wheels(wanted: list[str], python: str, platforms: list[str], *, pure: bool =
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         command = [
-            *(sys.executable, "-m", "pip", "install", "--dry-run", "--quiet", "--ignore-installed", "--no-deps"),
+            *(sys.executable, "-m", "pip", "install", "--dry-run", "-qq", "--ignore-installed", "--no-deps"),
             *("--only-binary", ":all:", "--target", folder, "--python-version", python, "--report", str(report)),
             *(f"--platform={platform}" for platform in platforms),
             *(["--abi=none"] if pure else []),

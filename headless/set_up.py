@@ -133,7 +133,7 @@ def install(environment: Path) -> None:
 
 def install_group(environment: Path, group: str) -> None:
     """Install the packages of a group, those of the lock first."""
-    pip = [str(environment / "bin" / "python"), "-m", "pip", "install", "--quiet", "--only-binary", ":all:"]
+    pip = [str(environment / "bin" / "python"), "-m", "pip", "install", "-qq", "--only-binary", ":all:"]
     pip += ["--no-deps"] if group in ALONE else []
     pins = requirements(group)
     free = [pin for pin in pins if pin.split("==")[0] in UNLOCKED]
