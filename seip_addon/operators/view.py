@@ -14,6 +14,7 @@ from .. import scene_survey
 from ..core.errors import SeipError
 from ..core.placement.objective import Solution
 from ..core.progress import Progress
+from ..core.results.placement_record import relevant_warnings
 from ..core.visibility.sight_lines import pose_at, sight_lines
 from ..scene import contract
 from ..scene.blend_file import save_blend
@@ -224,7 +225,8 @@ def _save_sheet(path: Path, held: SceneSurvey, view: Any) -> None:  # noqa: ANN4
     layout, plan = held.layout, _plan(held)
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
-        notes = [plan.certificate, *layout.warnings]
+        chosen = [sensor.model.key for sensor in plan.deployment.sensors]
+        notes = [plan.certificate, *relevant_warnings(layout.warnings, layout.models, chosen)]
         save_plan_view(drawn, layout.geometry, layout.site, plan.deployment, notes)
         with Image.open(drawn) as picture:
             save_sheet(path, view, picture)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from .. import scene_status
-from ..core.placement.objective import MOVED, MOVED_MESSAGE
-from ..core.results.placement_record import Record, parsed_record
+from ..core.placement.objective import certificate
+from ..core.results.placement_record import Record, parsed_record, relevant_warnings
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_judge_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
@@ -137,10 +137,10 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row.label(text=value)
     if column.active:
         proven = record["objective"]["status"] == "optimal"
-        draw_sentence(box, certificate(record), icon="CHECKMARK" if proven else "INFO")
+        draw_sentence(box, _certificate(record["objective"]), icon="CHECKMARK" if proven else "INFO")
     notes = box.column()
     notes.active = column.active
-    for note in (*record["notes"], *warnings_of_chosen(record)):
+    for note in (*record["notes"], *_warnings(record)):
         draw_sentence(notes, note, icon="INFO")
 
 
@@ -161,22 +161,13 @@ def figures(record: Record) -> list[tuple[str, str]]:
     return lines
 
 
-def warnings_of_chosen(record: Record) -> list[str]:
-    """Return the warnings but those of sensor types that are not among the chosen."""
-    others = {*record["settings"]["candidates"]["sensors"]} - {sensor["sensor"] for sensor in record["sensors"]}
-    return [warning for warning in record["warnings"] if warning.partition(":")[0] not in others]
+def _certificate(objective: Record) -> str:
+    return certificate(objective["status"], objective["gap"], cheapest=objective["sought"] == "least price")
 
 
-def certificate(record: Record) -> str:
-    """Say how good the placement provably is."""
-    objective = record["objective"]
-    best = "cheapest" if objective["sought"] == "least price" else "best"
-    if objective["status"] == MOVED:
-        return MOVED_MESSAGE
-    if objective["status"] == "optimal":
-        return f"Proven: the {best} placement that there is among these candidates."
-    gap = "an unknown share" if objective["gap"] is None else f"{objective['gap']:.2%}"
-    return f"Within {gap} of the {best} placement possible among these candidates."
+def _warnings(record: Record) -> list[str]:
+    chosen = [sensor["sensor"] for sensor in record["sensors"]]
+    return relevant_warnings(record["warnings"], record["settings"]["candidates"]["sensors"], chosen)
 
 
 CLASSES = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from ..core.placement.objective import Solution
 from ..core.progress import Progress, finish
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
-from ..core.results.placement_record import Record, save_placement_record
+from ..core.results.placement_record import Record, relevant_warnings, save_placement_record
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from .blend_file import save_blend
@@ -116,11 +116,5 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     yield Progress(1, 3, "writing tables")
     save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
     yield Progress(2, 3, "drawing the plan")
-    save_plan_view(part["plan.png"], geometry, site, deployment, _notes(plan, record["warnings"], models))
-
-
-def _notes(plan: Solution, warnings: Sequence[str], models: Mapping[str, LidarModel]) -> list[str]:
-    """Return what the plan's reader should know: its certificate, and warnings but those of types not chosen."""
-    used = {sensor.model.key for sensor in plan.deployment.sensors}
-    others = set(models) - used
-    return [plan.certificate, *(warning for warning in warnings if warning.partition(":")[0] not in others)]
+    warnings = relevant_warnings(record["warnings"], models, (sensor.model.key for sensor in deployment.sensors))
+    save_plan_view(part["plan.png"], geometry, site, deployment, [plan.certificate, *warnings])

@@ -113,12 +113,28 @@ class Solution:
     @property
     def certificate(self) -> str:
         """How good the placement provably is, as a sentence."""
-        if self.placement.status == MOVED:
-            return MOVED_MESSAGE
-        best = "cheapest" if self.goal.cheapest else "best"
-        if self.placement.status == "optimal":
-            return f"Proven: the {best} placement that there is among these candidates."
-        return f"Within {self.placement.gap:.2%} of the {best} placement possible among these candidates."
+        return certificate(self.placement.status, self.placement.gap, cheapest=self.goal.cheapest)
+
+
+def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
+    """Return how good a placement provably is, as a sentence.
+
+    Parameters
+    ----------
+    status : str
+        Of the placement.
+    gap : float or None
+        Between bound and objective, as a share of the objective; None or infinite where nothing bounds it.
+    cheapest : bool
+        Whether the least price was sought.
+    """
+    if status == MOVED:
+        return MOVED_MESSAGE
+    best = "cheapest" if cheapest else "best"
+    if status == "optimal":
+        return f"Proven: the {best} placement that there is among these candidates."
+    share = "an unknown share" if gap is None or not math.isfinite(gap) else f"{gap:.2%}"
+    return f"Within {share} of the {best} placement possible among these candidates."
 
 
 def target_weights(site: Site, goal: Objective) -> NDArray[np.float64]:

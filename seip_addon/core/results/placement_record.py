@@ -8,7 +8,7 @@ import math
 import os
 import platform
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache
@@ -71,6 +71,12 @@ def versions(**more: str) -> dict[str, str]:
     there = {name for name in LIBRARIES if importlib.util.find_spec(name)}  # HiGHS need not be
     libraries = {name: metadata.version(name) for name in LIBRARIES if name in there}
     return {"seip": program, "python": platform.python_version(), **libraries, **more}
+
+
+def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen: Iterable[str]) -> list[str]:
+    """Return the warnings but those of sensor types that were considered and not chosen; types are catalogue keys."""
+    others = set(considered) - set(chosen)
+    return [warning for warning in warnings if warning.partition(":")[0] not in others]
 
 
 @lru_cache(maxsize=8)
