@@ -8,9 +8,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from headless import session
+from headless import runtime
 from headless.lab.benchmark.charts import save_charts
-from headless.lab.benchmark.programme import BenchmarkScope, measure
+from headless.lab.benchmark.measurements import BenchmarkScope, measure
 from headless.lab.benchmark.report import bars, save_json, save_page
 
 import bpy
@@ -28,20 +28,20 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     parser.add_argument("--places", type=int, default=12, help="how many places are sampled; a full scan takes seconds")
     parser.add_argument("--time-limit", type=float, default=60.0, help="for each answer of a solver, in seconds")
     options = parser.parse_args(argv)
-    session.check_folder(options.output / "benchmark")
-    session.open_scene(options.scene)
+    runtime.check_folder(options.output / "benchmark")
+    runtime.open_scene(options.scene)
     findings, names = measure(
         read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope or BenchmarkScope()
     )
     held = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in held:
-        session.say(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
-    with session.writing(options.output):
+        runtime.say(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
+    with runtime.writing(options.output):
         save_charts(options.output / "benchmark", findings)
         save_json(options.output / "benchmark" / "benchmark.json", findings, held)
         save_page(options.output / "benchmark.md", findings, held, "benchmark")
-    session.say(f"results: {options.output / 'benchmark.md'}")
+    runtime.say(f"results: {options.output / 'benchmark.md'}")
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

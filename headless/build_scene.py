@@ -15,7 +15,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session
+from headless import runtime
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
@@ -40,15 +40,15 @@ def main(argv: list[str]) -> None:
     if asked.level:
         description = replace(description, level=tuple(asked.level))
     check_name(asked.output)
-    with session.progress_bar() as report:
+    with runtime.progress_bar() as report:
         model = finish(site_model(read_map(map_path), description), report)
         finish(build_scene(new_file(), model, map_path.name), report)
     save_blend(asked.output)
     for note in model.notes:
-        session.say(f"note: {note}")
-    session.warn(model.warnings)
+        runtime.say(f"note: {note}")
+    runtime.warn(model.warnings)
     x, y, z = model.origin + 0.0  # no negative zero
-    session.say(
+    runtime.say(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
         f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )
@@ -87,4 +87,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -13,7 +13,7 @@ import time
 from collections.abc import Generator
 from dataclasses import replace
 
-from headless import evaluate, session
+from headless import evaluate, runtime
 from headless.charts.detection import DetectorSetting, save_setting_chart
 from headless.detection import case_study
 from headless.detection.detector import Detector
@@ -82,11 +82,11 @@ def main(argv: list[str]) -> None:
     title = (
         f"{study.surveyed.layout.site.name}: mean over {len(study.configurations)} placements, {options.steps} steps"
     )
-    with session.writing(options.output):
+    with runtime.writing(options.output):
         save_setting_chart(options.output / "settings.png", settings, title)
         save_json(options.output / "settings.json", [vars(setting) for setting in settings])
     for setting in settings:
-        session.say(
+        runtime.say(
             f"{setting.family}, {setting.name}: AP {setting.average_precision:.1%}, "
             f"training {setting.training:.0f} s, inference {setting.inference:.0f} ms"
         )
@@ -129,4 +129,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -16,7 +16,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.claims import save_claims
 from headless.coverage_study.cells import NUMBERS
 from headless.detection import case_study, study_results
@@ -58,12 +58,12 @@ def main(argv: list[str]) -> None:
     trained = watch.run("training", case_study.train_all(models, training_set, folder, device=options.device))
     detectors = [one.detector for one in trained]
     for name, sentences in case_study.suitability_by_configuration(simulator, models, detectors, study.traffic).items():
-        session.warn(f"{name}: {sentence}" for sentence in sentences)
+        runtime.warn(f"{name}: {sentence}" for sentence in sentences)
     outcomes = watch.run("evaluation", case_study.evaluate_all(simulator, models, detectors, study.traffic))
     claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
     site = study.surveyed.layout.site
-    with session.writing(folder):
+    with runtime.writing(folder):
         results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
@@ -76,11 +76,11 @@ def main(argv: list[str]) -> None:
         )
         save_claims(folder / "claims_5_to_9.md", claims, site.name)
     for line in study_results.in_words(results):
-        session.say(line)
+        runtime.say(line)
     for claim in claims:
-        session.say(claim.describe())
-    session.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
-    session.say(f"written to {folder}/")
+        runtime.say(claim.describe())
+    runtime.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    runtime.say(f"written to {folder}/")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=NUMBERS[-1])))
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
-    session.LOG.info(traffic.overlap())
+    runtime.LOG.info(traffic.overlap())
     steps = case_study.place_all(
         surveyed.layout.site,
         surveyed.layout.models,
@@ -150,4 +150,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

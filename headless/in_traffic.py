@@ -13,7 +13,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.charts.traffic import save_promise_chart, save_time_map
 from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
@@ -38,19 +38,19 @@ def main(argv: list[str]) -> None:
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     layout = surveyed.layout
     runs = _read_runs(options, layout)
-    session.LOG.info(runs.overlap)
+    runtime.LOG.info(runs.overlap)
     steps = place_in_traffic(layout, surveyed.grid, goal, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)
     plan, study = placed.plan, placed.study
-    session.say(_in_words(study, plan))
-    with session.writing(options.output):
+    runtime.say(_in_words(study, plan))
+    with runtime.writing(options.output):
         name = layout.site.name
         title = f"{name}: for how long the placement sees what, {study.road_users:.0f} road users at a time"
         save_time_map(options.output / CHARTS[0], layout.geometry, layout.site, plan.deployment, study.traffic, title)
         sensors = f"{len(plan.deployment.sensors)} sensors"
         save_promise_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
         survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
-    session.say(f"written to {options.output}/")
+    runtime.say(f"written to {options.output}/")
 
 
 def _read_runs(options: argparse.Namespace, layout: Layout) -> TrafficRuns:
@@ -95,4 +95,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -19,7 +19,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.convergence import coarsest_settings
 from headless.options import add_goal, add_settings, new_parser, read_goal
 
@@ -35,10 +35,10 @@ def main(argv: list[str]) -> None:
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal), refine)
     steps = place(surveyed.layout, surveyed.grid, goal, pose_errors=options.pose_errors)
     plan = surveyed.stopwatch.run("placement", steps)
-    session.say(_in_words(plan))
-    with session.writing(options.output):
+    runtime.say(_in_words(plan))
+    with runtime.writing(options.output):
         survey.save_plan(surveyed, plan, options.output, render=not options.no_render, pose_errors=options.pose_errors)
-    session.say(f"written to {options.output}/")
+    runtime.say(f"written to {options.output}/")
 
 
 def _in_words(plan: Solution) -> str:
@@ -77,4 +77,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

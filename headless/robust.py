@@ -14,7 +14,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
 from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
@@ -35,14 +35,14 @@ def main(argv: list[str]) -> None:
     steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
     plan, study = robust.plan, robust.study
-    session.say(_in_words(robust))
-    with session.writing(options.output):
+    runtime.say(_in_words(robust))
+    with runtime.writing(options.output):
         layout = surveyed.layout
         save_spread_chart(options.output / CHARTS[0], study, f"{layout.site.name}: coverage under pose errors")
         save_blame_chart(options.output / CHARTS[1], robust.judged, f"{layout.site.name}: what costs coverage")
         save_frontier_chart(options.output / CHARTS[2], study, f"{layout.site.name}: what robustness costs and saves")
         survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
-    session.say(f"written to {options.output}/")
+    runtime.say(f"written to {options.output}/")
 
 
 def _in_words(robust: RobustPlan) -> str:
@@ -93,4 +93,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -16,7 +16,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session
+from headless import runtime
 from headless.options import add_settings, new_parser, read_settings
 
 import bpy
@@ -37,23 +37,23 @@ from seip_addon.scene.traffic import read_traffic
 def main(argv: list[str]) -> None:
     """Simulate the frames of a run and write them to a folder."""
     options = _parser().parse_args(argv)
-    session.check_folder(options.output)
+    runtime.check_folder(options.output)
     if options.dataset is not None:
-        session.check_folder(options.dataset)
-    session.open_scene(options.scene)
+        runtime.check_folder(options.dataset)
+    runtime.open_scene(options.scene)
     settings = _settings(options)
     run = _run(options, settings)
     check_run_folder(options.output, run)
-    session.LOG.info(_in_words(run))
-    with session.progress_bar() as report:
+    runtime.LOG.info(_in_words(run))
+    with runtime.progress_bar() as report:
         simulation = finish(simulation_of(run), report)
-    session.warn(simulation.warnings)
-    with session.progress_bar() as report:
+    runtime.warn(simulation.warnings)
+    with runtime.progress_bar() as report:
         manifest = finish(record(options.output, run, simulation, settings), report)
-    session.say(_summary(manifest))
+    runtime.say(_summary(manifest))
     for key in settings.formats:
-        session.say(f"{FORMATS[key].name}: {dataset_folder(options.output, settings, key)}/")
-    session.say(f"written to {options.output}/")
+        runtime.say(f"{FORMATS[key].name}: {dataset_folder(options.output, settings, key)}/")
+    runtime.say(f"written to {options.output}/")
 
 
 def _settings(options: argparse.Namespace) -> RecordingSettings:
@@ -64,10 +64,10 @@ def _settings(options: argparse.Namespace) -> RecordingSettings:
 def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
     """Read what the frames follow from: the scene, its sensors, and its traffic."""
     reading = read_scene(bpy.context.scene)
-    session.warn(reading.warnings)
+    runtime.warn(reading.warnings)
     sensors = read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
     if options.traffic is None:
-        with session.progress_bar() as report:
+        with runtime.progress_bar() as report:
             trajectories = finish(read_traffic(bpy.context.scene), report)
     else:
         trajectories = load_trajectories(options.traffic, reading.geometry)
@@ -114,4 +114,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -15,7 +15,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.lab.stability.chapters import StabilityScope, StudiedScene, chapters, introduction
 from headless.lab.stability.page import load_chapter, save_chapter, save_page
 from headless.options import new_parser
@@ -36,7 +36,7 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     charts = options.output / CHARTS
     for other in options.other:
         _check_other(other)
-    session.check_folder(charts)
+    runtime.check_folder(charts)
     surveyed = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
         lambda site, models: check_objective(site, models, Objective(count=DEFAULT_COUNT)),
@@ -57,11 +57,11 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
         if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
             kept = surveyed.stopwatch.run(name, work(stage))
             save_chapter(options.work / f"{name}.json", kept, made_from)
-            session.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
+            runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
         done.append(kept)
-    with session.writing(options.output):
+    with runtime.writing(options.output):
         save_page(options.output / PAGE, introduction(stage), done, CHARTS)
-    session.say(f"written to {options.output / PAGE}")
+    runtime.say(f"written to {options.output / PAGE}")
 
 
 def _check_other(scene: Path) -> None:
@@ -86,4 +86,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -13,7 +13,7 @@ from pathlib import Path
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.claims import save_claims
 from headless.coverage_study.cells import NUMBERS, WEIGHT_SHOWN, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
@@ -34,7 +34,7 @@ def main(argv: list[str]) -> None:
     study = surveyed.stopwatch.run("study", steps)
     claims = coverage_claims(study)
 
-    with session.writing(folder):
+    with runtime.writing(folder):
         save_study_table(folder / "coverage.csv", study)
         save_height_chart(folder / "heights.png", study, site.name)
         weighted = site.targets.central.any()
@@ -48,8 +48,8 @@ def main(argv: list[str]) -> None:
                     save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
-        session.say(claim.describe())
-    session.say(f"written to {folder}/")
+        runtime.say(claim.describe())
+    runtime.say(f"written to {folder}/")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -60,4 +60,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-from headless import session
+from headless import runtime
 from headless.convergence import Convergence
 from headless.options import add_settings, read_settings
 
@@ -29,8 +29,8 @@ from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid
-from seip_addon.core.visibility.needed_triangles import triangles_sentence
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.triangle_culling import triangles_sentence
 from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
@@ -55,7 +55,7 @@ class Stopwatch:
 
     def run(self, step: str, steps: Generator[Progress, None, Result]) -> Result:
         """Run work in steps to its end behind a progress bar."""
-        with session.progress_bar() as report:
+        with runtime.progress_bar() as report:
             return self.time(step, lambda: finish(steps, report))
 
 
@@ -128,8 +128,8 @@ def survey(
     """
     settings = _settings(options)
     settings.models()  # refuses unknown types before the scene is read
-    session.check_folder(options.output)
-    session.open_scene(options.scene)
+    runtime.check_folder(options.output)
+    runtime.open_scene(options.scene)
 
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
@@ -138,7 +138,7 @@ def survey(
         LOG.info(settings.spacings_because)
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
     LOG.info(_in_words(layout.site))
-    session.warn(layout.warnings)
+    runtime.warn(layout.warnings)
     check(layout.site, layout.models)
     grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
     LOG.info(triangles_sentence(grid.parameters["triangles"]))

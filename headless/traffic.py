@@ -23,7 +23,7 @@ from typing import TypeVar
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session
+from headless import runtime
 from headless.options import new_parser
 from headless.sumo.demand import Demand
 from headless.sumo.simulation import Scenario, SignalPlan, simulate
@@ -59,20 +59,20 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     if options.animate is not None:
         check_name(options.animate)
-    session.open_scene(options.scene)
+    runtime.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
     trajectories = _simulated(options, geometry) if options.fcd is None else _imported(options, geometry)
     trajectories.save(options.output)
     if options.animate is not None:
         animate(bpy.context.scene, trajectories)
         save_blend(options.animate)
-    session.say(f"{options.output}: {_in_words(trajectories)}")
+    runtime.say(f"{options.output}: {_in_words(trajectories)}")
 
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
     files = TrafficFiles(options.fcd, tuple(options.routes), options.net, options.begin, options.end)
     loaded = _run(load_traffic(files, geometry))
-    session.warn(loaded.warnings)
+    runtime.warn(loaded.warnings)
     return loaded.trajectories
 
 
@@ -88,18 +88,18 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         window = Extent(options.warm_up, end, road_bounds(geometry, MARGIN))
         read = _run(read_sumo(files, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
-    session.warn((*read.warnings, *fit.warnings))
+    runtime.warn((*read.warnings, *fit.warnings))
     simulated = fit.trajectories
     apart, collided = _run(without_overlaps(simulated))
     if collided:
-        session.LOG.info(
+        runtime.LOG.info(
             f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {listed(collided)}"
         )
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))
 
 
 def _run(steps: Generator[Progress, None, Result]) -> Result:
-    with session.progress_bar() as report:
+    with runtime.progress_bar() as report:
         return finish(steps, report)
 
 
@@ -148,4 +148,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

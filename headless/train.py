@@ -19,7 +19,7 @@ from typing import Any
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import session
+from headless import runtime
 from headless.charts.detection import save_training_chart
 from headless.detection.average_precision import evaluate
 from headless.detection.cloud_in_plan import CloudInPlan
@@ -55,13 +55,13 @@ def main(argv: list[str]) -> None:
         name: [recording_of(folder) for folder in getattr(options, name)] for name in ("train", "validation", "test")
     }
     require_separate(splits)
-    session.LOG.info(require_independent_splits(splits))
+    runtime.LOG.info(require_independent_splits(splits))
     check_device(options.device)
-    session.check_folder(options.output)
-    session.open_scene(options.scene)
+    runtime.check_folder(options.output)
+    runtime.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
     grid = grid_of(geometry, network.pillar)
-    session.LOG.info(
+    runtime.LOG.info(
         f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m, from {grid.bottom:.1f} to {grid.top:.1f} m"
     )
 
@@ -74,10 +74,10 @@ def main(argv: list[str]) -> None:
         for name in ("train", "validation")
     )
     steps = train(learning, aside, network, training, device=options.device, store=path)
-    with session.progress_bar() as report:
+    with runtime.progress_bar() as report:
         trained = finish(steps, report)
     best = trained.curve.best
-    session.say(
+    runtime.say(
         f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} on validation frames"
     )
     save_training_chart(
@@ -86,7 +86,7 @@ def main(argv: list[str]) -> None:
     if options.test:
         figures = _evaluated(trained.detector, options.test, geometry)
         save_json(options.output / "evaluation.json", figures)
-    session.say(f"written to {options.output}/")
+    runtime.say(f"written to {options.output}/")
 
 
 def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry) -> dict[str, dict[str, float]]:
@@ -95,11 +95,11 @@ def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry
     for folder in runs:
         recording = recording_of(folder, geometry.name)
         doubts = suitability_warnings(detector, recording.sensors, recording.site, recording.frames[0].points)
-        session.warn(f"{folder}: {doubt}" for doubt in doubts)
+        runtime.warn(f"{folder}: {doubt}" for doubt in doubts)
         results = _results(detector, folder, geometry.region)
         figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
         words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
-        session.say(f"{folder}: {words}")
+        runtime.say(f"{folder}: {words}")
     return figures
 
 
@@ -138,4 +138,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    session.run(main)
+    runtime.run(main)

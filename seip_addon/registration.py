@@ -85,6 +85,6 @@ def _forget(*_: object) -> None:
 
 def _incomplete(error: ImportError) -> ModuleType:
     """Return the part that stands in for all others where a package is missing or broken."""
-    part = importlib.import_module(".panels.incomplete", __package__)
+    part = importlib.import_module(".panels.missing_package", __package__)
     part.MISSING = error.name or str(error)  # type: ignore[attr-defined]  # the panel's one fact
     return part

@@ -1,7 +1,8 @@
-"""Surveys of scenes: the work that reads a scene, lays it out, and finds its visibility and placement.
+"""Background jobs that read a scene and compute its layout, visibility grid and placement.
 
-Each function returns work for a thread: it touches neither Blender's data nor
-the session, and returns a `SceneSurvey` that its operator keeps.
+Each public function returns a generator that may run in a thread: it touches
+neither Blender's data nor the session, and returns a `SceneSurvey`, which the
+operator keeps.
 """
 
 from __future__ import annotations
@@ -20,24 +21,24 @@ from .core.placement.objective import MOVED
 from .core.progress import Progress
 from .core.results.placement_record import Record, parsed_record
 from .core.visibility.grid import VisibilityGrid
-from .core.workflows.by_hand import restored_by_hand
+from .core.workflows.moved_sensors import restored_by_hand
 from .core.workflows.survey import SurveySettings, inputs_of, lay_out, restored_plan, see
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, is_of, obstacle, same_grid
 from .session import Resources, SceneSurvey, session
 
-SOON = 0.2
+LOAD_DELAY = 0.2
 """Seconds from the opening of a file to the work on it."""
 
 
 def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
-    """Return the work that lays out a scene as its panel asks; the scene is read at once, if it must be read at all.
+    """Return a job that lays out a scene with the panel's settings; the scene is read at once, if it has changed.
 
     Raises
     ------
     SeipError
-        The scene lacks something, or the panel asks for what makes no sense.
+        The scene lacks something, or a setting of the panel is invalid.
     """
     settings = scene.seip.survey.settings()
     settings.models()  # refuses before the scene is read
@@ -68,7 +69,7 @@ def with_visibility(known: SceneSurvey) -> Generator[Progress, None, tuple[Scene
 
 
 def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
-    """Return the work that finds all about a scene's placement again, from what the file and the cache keep.
+    """Return a job that restores a scene's placement from the record in the file and the cached grid.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSur
 
 
 def with_grid_of_placement(scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
-    """Return the work that finds again what a scene's placement was chosen from; raises as `with_placement` does."""
+    """Return a job that restores the grid of a scene's placement; raises as `with_placement` does."""
     return _grid_again(survey(scene), parsed_record(scene.seip.result.record))
 
 
@@ -136,7 +137,7 @@ def _restored(surveying: Generator[Progress, None, SceneSurvey], text: str) -> G
 def _after_load(*_: object) -> None:
     """Compare the placement of the file with its scene, soon: Blender is not ready for work yet."""
     if not bpy.app.background and not bpy.app.timers.is_registered(_compare):
-        bpy.app.timers.register(_compare, first_interval=SOON)
+        bpy.app.timers.register(_compare, first_interval=LOAD_DELAY)
 
 
 def _compare() -> None:
@@ -155,7 +156,7 @@ def _compare() -> None:
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def _before_save(*_: object) -> None:
-    """Say in the file by which layout its properties are to be read: Blender saves no defaults."""
+    """Store the version of the properties' layout in the file: Blender saves no defaults."""
     for scene in bpy.data.scenes:
         if scene.library is None and scene.seip.version <= FILE_VERSION and scene.is_property_set("seip"):
             scene.seip.version = FILE_VERSION

@@ -12,7 +12,7 @@ import numpy as np
 from .core.arrays import Float
 from .core.errors import SeipError
 from .core.results.placement_record import parsed_record
-from .core.workflows.by_hand import BY_HAND, recorded_orientation
+from .core.workflows.moved_sensors import BY_HAND, recorded_orientation
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of
 

@@ -399,7 +399,7 @@ def _read_manifest(path: Path, _: bytes) -> None:
 
 
 def _blends(folder: Path) -> list[bytes]:
-    import headless.session  # noqa: F401, PLC0415  # names the system libraries that bpy needs
+    import headless.runtime  # noqa: F401, PLC0415  # names the system libraries that bpy needs
 
     import bpy  # noqa: PLC0415
 
@@ -429,7 +429,7 @@ def _mutate_blend(random: Random, content: bytes) -> Case:
 
 
 def _read_blend(path: Path, _: bytes) -> None:
-    import headless.session  # noqa: F401, PLC0415
+    import headless.runtime  # noqa: F401, PLC0415
 
     import bpy  # noqa: PLC0415
 

@@ -39,7 +39,7 @@ from .detector import Detector
 from .frame_results import Detections, FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
-from .kitti import kitti
+from .kitti_precision import kitti
 from .matching import Rule
 from .pillars import PillarGrid
 from .recordings import SampledRun, SensorConfiguration, Simulator

@@ -36,26 +36,26 @@ VALIDATION_FRAMES = 18
 """Frames, spread over the recordings set aside, that each validation looks at."""
 
 MARGIN = 1.6
-"""Metres at the border of a window in which nothing is learnt: much of what is there lies outside."""
+"""Metres at the border of a window for which no loss is computed: much of what is there lies outside."""
 
-JITTER = 0.25
+MAX_CROP_SHIFT = 0.25
 """Share of a window that it lies beside its road user at most."""
 
-TURN, STRETCH = math.radians(8.0), 0.05
+MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05
 """Largest turn beyond quarter turns, and largest stretch, of what is learnt from."""
 
-STEEPEST = 10.0
+MAX_GRADIENT_NORM = 10.0
 """Norm beyond which a gradient is cut, as published."""
 
 
 @dataclass(frozen=True)
 class LearningCurve:
-    """How a training went.
+    """Training loss of each step, and validation precision by step.
 
     Parameters
     ----------
     loss : list of float
-        Of each step.
+        Total loss of step i.
     validation : dict of int to float
         Average precision on the frames set aside, at `matching.Rule`'s overlap, after so many steps.
     """
@@ -92,16 +92,16 @@ def train(
     device: str = "cpu",
     store: str | os.PathLike[str] | None = None,
 ) -> Generator[Progress, None, TrainedDetector]:
-    """Train a detector.
+    """Train a PointPillars detector until its precision on recordings set aside stops growing.
 
     Parameters
     ----------
     recordings, validation : sequence of SampledRecording
-        To learn from, and to see by when it is enough; on one grid and from separate runs of traffic.
+        Training and validation recordings; on one pillar grid, from separate runs of traffic.
     device : str
-        Of torch: ``cpu``, ``cuda``.
+        PyTorch device: ``cpu``, ``cuda``.
     store : path, optional
-        Where the state is kept at each validation, and where an earlier one is taken up.
+        Checkpoint: written at each validation; training resumes from it if it exists.
 
     Yields
     ------
@@ -175,7 +175,7 @@ class _Run:
         loss = self._loss(batch)
         self.optimiser.zero_grad()
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(self.detector.parameters(), STEEPEST)
+        torch.nn.utils.clip_grad_norm_(self.detector.parameters(), MAX_GRADIENT_NORM)
         self.optimiser.step()
         self.schedule.step()
         self.curve.loss.append(float(loss.detach()))
@@ -297,15 +297,15 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
     focus = np.array(window.centre)
     if len(sample.boxes):
         focus = sample.boxes[int(random.integers(len(sample.boxes))), :2]
-    focus = focus + random.uniform(-JITTER, JITTER, 2) * size
-    angle = random.integers(4) * math.pi / 2 + random.uniform(-TURN, TURN)
+    focus = focus + random.uniform(-MAX_CROP_SHIFT, MAX_CROP_SHIFT, 2) * size
+    angle = random.integers(4) * math.pi / 2 + random.uniform(-MAX_ROTATION, MAX_ROTATION)
     mirrored = bool(random.integers(2))
-    scale = float(random.uniform(1 - STRETCH, 1 + STRETCH))
+    scale = float(random.uniform(1 - MAX_STRETCH, 1 + MAX_STRETCH))
 
     matrix = scale * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     if mirrored:
         matrix = matrix @ np.diag((1.0, -1.0))
-    reach = size * math.sqrt(0.5) / (1 - STRETCH)
+    reach = size * math.sqrt(0.5) / (1 - MAX_STRETCH)
     near = (np.abs(sample.points[:, :2] - focus) <= reach).all(axis=1)
     points = sample.points[near]
     middle = np.array(window.centre)

@@ -24,7 +24,7 @@ from ..core.scans.sensor import MountedSensor
 from ..core.storage.files import check_folder, digest
 from ..core.visibility.grid import VisibilityGrid
 from ..core.visibility.visibility_model import VisibilityModel, visibility_model
-from ..core.workflows.by_hand import judge
+from ..core.workflows.moved_sensors import judge
 from ..core.workflows.survey import Provenance, record_of, recorded_goal
 from ..scene.blend_file import save_blend
 from ..scene.render import render_elsewhere
@@ -41,7 +41,7 @@ EYE_DISTANCE = 10.0
 
 
 class ForPlacement:
-    """A mixin: a button that works where there is a placement."""
+    """Mixin that enables an operator only where the scene has a placement."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -110,7 +110,7 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ran
     bl_label = "Rank Candidates"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, list[Ranked]]]:
-        """Find the placement again."""
+        """Return the job that restores the placement."""
         return _ranked(scene_survey.with_placement(scene), scene.seip.result.order)
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, list[Ranked]]) -> None:
@@ -260,14 +260,14 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Visibilit
         return super().execute(context)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityModel]]:
-        """Find the placement again."""
+        """Return the job that restores the placement."""
         return _set_up(scene_survey.with_placement(scene))
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, VisibilityModel]) -> None:
         """Begin to follow."""
-        known, looker = result
+        known, model = result
         session.keep_survey(scene, known)
-        live_coverage.start(scene, known, looker)
+        live_coverage.start(scene, known, model)
 
 
 def _set_up(
@@ -280,7 +280,7 @@ def _set_up(
 
 
 class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
-    """Take the sensors as hands have moved, deleted and added them for the placement: what they see there counts"""
+    """Evaluate the sensors where they are now, moved, deleted and added by hand, and make them the placement"""
 
     bl_idname = "seip.judge_sensors"
     bl_label = "Evaluate Moved Sensors"

@@ -125,7 +125,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneSurvey], bpy.types.Op
     sensor: bpy.props.EnumProperty(name="Sensor", description="From which the lines start", items=_sensors)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
-        """Find the placement again."""
+        """Return the job that restores the placement."""
         return scene_survey.with_placement(scene)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:

@@ -42,7 +42,7 @@ def begun(steps: Generator[Progress, None, Result]) -> Generator[Progress, None,
 
 
 class ForReadyScene:
-    """A mixin: a button that works where the scene has what any computation needs."""
+    """Mixin that enables an operator only where the scene has what any computation needs."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -12,8 +12,8 @@ from ..operators.results import SEIP_OT_judge_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sentence import draw_sentence
 from .sidebar import RowList, Sidebar, settings_column
+from .wrapped_text import draw_sentence
 
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):

@@ -8,8 +8,8 @@ from ..core.results.placement_record import Record, parsed_record
 from ..operators import results
 from ..session import FollowedSensors, session
 from .run_button import draw_run
-from .sentence import draw_sentence
 from .sidebar import RowList, Sidebar
+from .wrapped_text import draw_sentence
 
 
 class SEIP_UL_chosen(RowList, bpy.types.UIList):

@@ -16,8 +16,8 @@ from ..operators.sensors import (
 )
 from ..session import session
 from ..viewport import beam_preview
-from .sentence import draw_sentence
 from .sidebar import RowList, Sidebar, settings_column
+from .wrapped_text import draw_sentence
 
 
 class SEIP_UL_sensor_types(RowList, bpy.types.UIList):

@@ -20,8 +20,8 @@ from ..operators.site import (
 )
 from ..scene import roles
 from .run_button import draw_run
-from .sentence import draw_sentence
 from .sidebar import RowList, Sidebar, settings_column
+from .wrapped_text import draw_sentence
 
 
 class SEIP_PT_site(Sidebar, bpy.types.Panel):

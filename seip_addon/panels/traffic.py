@@ -16,8 +16,8 @@ from ..operators.traffic import (
 )
 from ..session import session
 from .run_button import draw_run
-from .sentence import draw_sentence
 from .sidebar import Sidebar, settings_column
+from .wrapped_text import draw_sentence
 
 
 class SEIP_PT_traffic(Sidebar, bpy.types.Panel):

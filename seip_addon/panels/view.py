@@ -19,8 +19,8 @@ from ..session import session
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
 from .run_button import draw_run, is_running
-from .sentence import draw_sentence
 from .sidebar import Sidebar
+from .wrapped_text import draw_sentence
 
 ASPECTS = ("seen", "times", "weights")
 

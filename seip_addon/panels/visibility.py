@@ -9,8 +9,8 @@ from ..core.visibility.estimate import Estimate
 from ..operators.visibility import SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility
 from ..session import session
 from .run_button import draw_run, in_words
-from .sentence import draw_sentence
 from .sidebar import Sidebar, settings_column
+from .wrapped_text import draw_sentence
 
 
 class SEIP_PT_visibility(Sidebar, bpy.types.Panel):

@@ -10,7 +10,7 @@ from seip_addon import live_coverage, preferences, registration, scene_status, s
 from seip_addon.background import Background
 from seip_addon.core.progress import Progress, finish
 from seip_addon.operators import results, work
-from seip_addon.panels import incomplete
+from seip_addon.panels import missing_package
 from seip_addon.scene import contract
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import RunningWork, session
@@ -126,7 +126,7 @@ def test_a_broken_package_is_named_in_the_sidebar(monkeypatch):
     monkeypatch.setattr(registration.importlib, "import_module", broken)
     registration.register()
     assert hasattr(bpy.types, "SEIP_PT_incomplete")
-    assert incomplete.MISSING == "shapely.lib"
+    assert missing_package.MISSING == "shapely.lib"
     registration.unregister()
     assert not hasattr(bpy.types, "SEIP_PT_incomplete")
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from told_frames import SIZES, box, detected, frame, traffic, truth
+from labelled_frames import SIZES, box, detected, frame, traffic, truth
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
@@ -17,7 +17,7 @@ from headless.detection.average_precision import (
     evaluate,
     precision_recall,
 )
-from headless.detection.kitti import kitti
+from headless.detection.kitti_precision import kitti
 from headless.detection.matching import NOBODY, VEHICLES, Rule, match
 
 from seip_addon.core.errors import SeipError

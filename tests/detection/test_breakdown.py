@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from told_frames import box, detected, frame, traffic, truth
+from labelled_frames import box, detected, frame, traffic, truth
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from told_frames import box, detected, frame, truth
+from labelled_frames import box, detected, frame, truth
 
 pytest.importorskip("torch", reason="the detector's torch is optional")
 

@@ -7,7 +7,7 @@ from headless.detection.matching import Rule
 from headless.lab.detector.paired_change import DRAWS, ResampledPrecision, change, level
 
 import pytest
-from told_frames import box, detected, frame, traffic, truth
+from labelled_frames import box, detected, frame, traffic, truth
 
 from seip_addon.core.estimates import percentiles, student_quantile
 

@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from headless import place, session
+from headless import place, runtime
 
 import bpy
 import pytest
@@ -212,7 +212,7 @@ def start(*options):
 def test_a_mistake_ends_the_process_with_one_line_and_status_1(small_scene, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["place.py", str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "0"])
     with pytest.raises(SystemExit) as end:
-        session.run(place.main)
+        runtime.run(place.main)
     assert end.value.code == 1
     complaint = capsys.readouterr().err
     assert complaint.strip().splitlines()[-1].startswith("error: asked for 0 sensors")

@@ -7,14 +7,14 @@ from functools import partial
 from pathlib import Path
 
 from headless import benchmark
-from headless.lab.benchmark.alone import alone
 from headless.lab.benchmark.approximations import bounding_box, decimated, every_other_channel, thinner
-from headless.lab.benchmark.expense import Expense, peak_memory
+from headless.lab.benchmark.baselines import RIVALS, can_run
+from headless.lab.benchmark.fresh_process import alone
 from headless.lab.benchmark.growth import repeated
+from headless.lab.benchmark.measurements import BenchmarkScope
 from headless.lab.benchmark.placement import SolverRun, compare
-from headless.lab.benchmark.programme import BenchmarkScope
 from headless.lab.benchmark.report import bars
-from headless.lab.benchmark.rivals import RIVALS, can_run
+from headless.lab.benchmark.resource_usage import Expense, peak_memory
 from headless.lab.benchmark.scans import ScanCost
 from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import Cost

@@ -23,8 +23,8 @@ from seip_addon.core.scans import MountedSensor, static_scene
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.visibility import ray_casting
+from seip_addon.core.visibility.float32_precision import rounding_warnings
 from seip_addon.core.visibility.ray_casting import Engine
-from seip_addon.core.visibility.rounding import rounding_warnings
 from seip_addon.core.workflows.survey import SurveySettings, grid_key, lay_out
 
 SCENES = {scene.name: scene for scene in hard_scenes(1500, np.random.default_rng(1))}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from headless import build_scene, session
+from headless import build_scene, runtime
 from headless.lab.benchmark.visibility import visibility_costs
 
 import bpy
@@ -25,7 +25,7 @@ TOWN05 = Path(os.environ.get("SEIP_MAPS") or ROOT.parent / "shared" / "opendrive
 
 
 def site_of(scene: Path, grid: float = 1.0) -> Site:
-    session.open_scene(scene)
+    runtime.open_scene(scene)
     return make_site(read_scene(bpy.context.scene).geometry, CandidateSettings(), grid)
 
 

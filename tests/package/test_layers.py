@@ -116,7 +116,7 @@ def test_what_is_imported_is_pinned():
     by_file = {
         "executors.py": {"dask", "distributed"},
         "lock_wheels.py": {"packaging"},
-        "rivals.py": {"spopt"},
+        "baselines.py": {"spopt"},
     }
 
     def allowed(path, name):

@@ -62,7 +62,7 @@ def test_a_disk_without_room_has_its_sentence_and_keeps_what_was_there(tmp_path)
     """A limit on the size of files stands for a full disk."""
     script = (
         "import resource, sys; from pathlib import Path\n"
-        "import headless.session, bpy\n"
+        "import headless.runtime, bpy\n"
         "from seip_addon.core.errors import SeipError\n"
         "from seip_addon.scene.blend_file import new_file, save_blend\n"
         "new_file()\n"

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from headless.lab.benchmark.alone import alone
-from headless.lab.benchmark.expense import Expense, peak_memory
+from headless.lab.benchmark.baselines import ours
+from headless.lab.benchmark.fresh_process import alone
 from headless.lab.benchmark.pareto_front import growth_exponent
-from headless.lab.benchmark.rivals import ours
+from headless.lab.benchmark.resource_usage import Expense, peak_memory
 from headless.lab.benchmark.street_visibility import street_problem
 
 import numpy as np
@@ -20,9 +20,9 @@ from seip_addon.core.lidar import LidarModel
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
-from seip_addon.core.visibility.needed_triangles import needed_triangles
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.triangle_culling import needed_triangles
 from seip_addon.core.visibility.visibility_model import VisibilityModel
 
 STREET_SENSORS = 4

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from headless.lab.benchmark.expense import Expense, peak_memory
-from headless.lab.benchmark.rivals import RIVALS
+from headless.lab.benchmark.baselines import RIVALS
+from headless.lab.benchmark.resource_usage import Expense, peak_memory
 
 from seip_addon.core.placement import PlacementProblem
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from headless.lab.benchmark.expense import Expense
+from headless.lab.benchmark.resource_usage import Expense
 from headless.lab.benchmark.visibility import ENGINES
 
 import numpy as np

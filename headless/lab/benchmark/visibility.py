@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from headless.lab.benchmark.approximations import Approximation
-from headless.lab.benchmark.expense import Expense
+from headless.lab.benchmark.resource_usage import Expense
 
 import numpy as np
 

@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from headless import session, survey
+from headless import runtime, survey
 from headless.detection import case_study
 from headless.detection.average_precision import balanced_score
 from headless.detection.detector import on_grid
@@ -110,7 +110,7 @@ def _on_other_scene(
 ) -> Generator[Progress, None, OtherSite]:
     """Place as many sensors of the same type there, and bring the detectors."""
     settings = surveyed.layout.settings
-    session.open_scene(scene)
+    runtime.open_scene(scene)
     reading = read_scene(bpy.context.scene)
     candidates = replace(settings.candidates, sensors=(main.case.sensor,))
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)

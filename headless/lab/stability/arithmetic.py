@@ -19,9 +19,9 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern, LidarModel
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Candidates, Site, Targets
+from seip_addon.core.visibility.float32_precision import NOTICEABLE, STEP
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.visibility.rounding import NOTICEABLE, STEP
 from seip_addon.core.visibility.settings import WIDEST_DELTA, VisibilitySettings
 
 from .float64_rays import FirstHits, first_hits

@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter
 from seip_addon.core.pictures.palette import INK, SOFT_INK
 from seip_addon.core.placement.near_optimal import NearOptimalSet
 from seip_addon.core.placement.problem import TIE
-from seip_addon.core.visibility.rounding import NOTICEABLE, STEP
+from seip_addon.core.visibility.float32_precision import NOTICEABLE, STEP
 
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy

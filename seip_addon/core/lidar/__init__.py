@@ -7,7 +7,7 @@ drop-off are for scans of traffic, and seeded by the generator that is passed in
 from .beams import BeamPattern, beam_directions
 from .catalogue import find_models, load_catalogue
 from .model import LidarModel
-from .returns import measured_returns, return_chance, return_intensity
+from .noisy_returns import measured_returns, return_chance, return_intensity
 
 __all__ = [
     "BeamPattern",

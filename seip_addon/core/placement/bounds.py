@@ -27,8 +27,8 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..progress import Progress
-from .clock import Clock
-from .instance import Instance
+from .reduced_problem import Instance
+from .search_limits import Clock
 
 ITERATIONS = 1000
 PATIENCE = 20

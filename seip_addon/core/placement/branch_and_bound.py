@@ -43,9 +43,9 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import Bound, lagrangian_bound, select
-from .clock import Clock
-from .instance import EXACT, Instance, Numbers
 from .problem import TIE
+from .reduced_problem import EXACT, Instance, Numbers
+from .search_limits import Clock
 
 RELAXED = 3
 """With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""

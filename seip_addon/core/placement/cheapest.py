@@ -12,14 +12,14 @@ from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from .bounds import bound_from, can_reach, lagrangian_bound, least_price
-from .clock import DEFAULT_LIMITS, Clock, SolverLimits
 from .feasibility import starting_choice
 from .greedy import drop_redundant, greedy, greedy_with_swaps
-from .instance import Instance, common_unit, make_instance
 from .integer_program import check_solver, reaching
 from .problem import TIE, Placement, PlacementProblem, assess
+from .reduced_problem import Instance, common_unit, make_instance
+from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
-from .ties import fewest
+from .tie_breaking import fewest
 
 FINISH = 1.0
 """Seconds, or units of work, that choosing among equally cheap placements may always take."""

@@ -25,9 +25,9 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import SMALLEST_STEP, SubgradientDescent
-from .clock import Clock
 from .greedy import greedy
-from .instance import Instance, Numbers
+from .reduced_problem import Instance, Numbers
+from .search_limits import Clock
 
 ITERATIONS = 2000
 

@@ -12,10 +12,10 @@ import numpy as np
 from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from .clock import Clock
-from .instance import Instance
 from .integer_program import CoverProgram
 from .problem import PlacementProblem
+from .reduced_problem import Instance
+from .search_limits import Clock
 
 SECONDS = 20.0
 """Time for a program without targets: far more than it takes, and apart from the user's time limit."""

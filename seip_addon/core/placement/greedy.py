@@ -10,9 +10,9 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import select
-from .clock import Clock
-from .instance import Instance
 from .problem import TIE
+from .reduced_problem import Instance
+from .search_limits import Clock
 
 STARTS = 8
 """Candidates to begin a greedy choice with, before swaps."""

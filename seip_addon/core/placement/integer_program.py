@@ -23,9 +23,9 @@ from pulp.apis.coin_api import pulp_cbc_path
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress, in_thread
-from .clock import OPERATIONS, Clock
-from .instance import Instance
 from .problem import TIE
+from .reduced_problem import Instance
+from .search_limits import OPERATIONS, Clock
 
 SCALE = 1e4
 """Total weight in a program: far above the solvers' absolute tolerances of 1e-6."""

@@ -12,9 +12,9 @@ from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from .branch_and_bound import Search, is_worthwhile
-from .clock import Clock
-from .instance import Instance, make_instance
 from .problem import PlacementProblem
+from .reduced_problem import Instance, make_instance
+from .search_limits import Clock
 
 MOST_LISTED = 10_000
 """Placements that are listed at most."""

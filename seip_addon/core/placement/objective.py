@@ -17,8 +17,8 @@ from ..progress import Progress
 from ..settings import setting
 from ..site.site import Candidates, Site
 from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
-from .clock import DEFAULT_LIMITS, SolverLimits
 from .deployment import Deployment, deploy
+from .search_limits import DEFAULT_LIMITS, SolverLimits
 
 DEFAULT_COUNT = 4
 """Sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four."""

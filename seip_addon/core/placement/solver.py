@@ -12,14 +12,14 @@ from ..arrays import Integer
 from ..progress import Progress, finish
 from .bounds import Bound, can_reach, lagrangian_bound
 from .branch_and_bound import BestPlacements, is_worthwhile
-from .clock import DEFAULT_LIMITS, Clock, SolverLimits
 from .decomposition import decomposition_bound
 from .feasibility import starting_choice
 from .greedy import drop_redundant, greedy_bound, greedy_steps, greedy_with_swaps, orders, swap_search, tabu_search
-from .instance import Instance, common_unit, make_instance
 from .integer_program import CoverProgram, check_solver
 from .problem import TIE, Placement, PlacementProblem, assess
-from .ties import MANY, canonical_optimum
+from .reduced_problem import Instance, common_unit, make_instance
+from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
+from .tie_breaking import MANY, canonical_optimum
 
 BRANCHING = 0.15
 """Share of what is left of the limits for a first branch and bound, which goes on after the other methods."""

@@ -40,11 +40,11 @@ from ..errors import SeipError
 from ..placement import Placement, PlacementProblem, solve
 from ..placement.bounds import lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS
-from ..placement.clock import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
-from ..placement.instance import Instance, common_unit, make_instance, merge_targets
 from ..placement.problem import TIE, assess, relative_gap
+from ..placement.reduced_problem import Instance, common_unit, make_instance, merge_targets
+from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.solver import solve_within
 from ..progress import Progress, within
 from .risk import Risk

@@ -23,9 +23,9 @@ import numpy as np
 from ..arrays import Integer
 from ..placement.bounds import Bound
 from ..placement.branch_and_bound import Search
-from ..placement.clock import Clock
 from ..placement.greedy import addable, swap_gains, swap_search
-from ..placement.instance import Instance
+from ..placement.reduced_problem import Instance
+from ..placement.search_limits import Clock
 from ..progress import Progress
 
 STARTS, FIRST = 8, 100

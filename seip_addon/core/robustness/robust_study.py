@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Float
 from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
-from ..placement.clock import DEFAULT_LIMITS
+from ..placement.search_limits import DEFAULT_LIMITS
 from ..progress import Progress, within
 from ..settings import setting
 from .pose_errors import PoseErrors, require_draws

@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..estimates import IntervalEstimate, mean_over_time
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
-from ..placement.clock import DEFAULT_LIMITS
+from ..placement.search_limits import DEFAULT_LIMITS
 from ..progress import Progress
 from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust

@@ -25,7 +25,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..lidar import BeamPattern
 from ..progress import Progress
-from ..scans.beam_windows import BeamWindows
+from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation
 from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
 from ..visibility.scanning import ScanPosition

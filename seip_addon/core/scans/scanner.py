@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..arrays import Boolean, Float, Integer
 from ..lidar import BeamPattern, return_chance, return_intensity
 from ..visibility.ray_casting import RayCaster
-from .beam_windows import BeamWindows
+from .beam_culling import BeamWindows
 from .frame import STATIC
 from .motion import Motion
 from .sensor import MountedSensor

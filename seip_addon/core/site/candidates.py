@@ -23,7 +23,7 @@ _ABOVE_POLE = 0.5
 """Metres that a sensor may hang above the top of its pole, on a short mast."""
 
 HIGHEST = 100.0
-"""Metres: a sensor higher than this is a slip of the keyboard."""
+"""Metres: a sensor higher than this is taken for a typing error."""
 
 ASSUMED_POLES = "assumed poles"
 """Why poles that stand in no map are dropped."""
@@ -163,7 +163,7 @@ def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
 
 
 _FINEST = 0.01
-"""Metres or degrees: a finer range is a slip of the keyboard."""
+"""Metres or degrees: a finer range is taken for a typing error."""
 
 
 def _named_by(text: str, above: float, most: float) -> list[float]:
@@ -183,7 +183,7 @@ def _named_by(text: str, above: float, most: float) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Where a sensor may hang: positions (in plan), and poses (position × height × tilt × sensor type).
+    """The p mounting positions of a site and its c candidate poses (position × height × tilt × sensor type).
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class Candidates:
     on_pole : (p,) bool
         Whether the position is an existing pole.
     pole_source : (p,) str
-        Who says that the pole stands there, as in `Pole`; empty for new posts.
+        Source of the pole, as in `Pole`; empty for new posts.
     position_of : (c,) int64
         Position of each pose.
     sensor : (c,) str
@@ -373,7 +373,7 @@ def _towards(point: Float, region: BaseGeometry) -> Float:
 
 
 def _yaws(tilt: Float, position_of: Integer, foot: Float, region: BaseGeometry) -> Float:
-    """Return the yaw of each pose, (c,) radians: zero where it is upright, else that which has the region before it."""
+    """Return the yaw of each pose, (c,) radians: zero for upright ones, else the direction to the region."""
     if not tilt.any():
         return np.zeros(len(tilt))
     way = np.array([_towards(point[:2], region) for point in foot])

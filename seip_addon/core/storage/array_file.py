@@ -57,11 +57,11 @@ class ArrayRule:
     dtype : str
         NumPy's name of its type; ``U`` is text of any length up to `LONGEST_TEXT`.
     shape : tuple of int and str
-        Its lengths. Those of the same name are the same number in all arrays of a file.
+        Length of each axis; a text is a variable that has one value across all arrays of a file.
     least, most : float
-        Between which all values lie. NaN never does.
+        Allowed range, inclusive.
     nan : bool
-        Whether values may be NaN.
+        Whether NaN is allowed as well.
     """
 
     dtype: str
@@ -86,14 +86,14 @@ class ArrayRule:
 class ArrayFile:
     """A kind of file that holds named arrays and a header: npz, with JSON as the text ``header``.
 
-    The header holds a digest of itself and of the arrays, but in files of version 1.
+    The header holds a digest of itself and of the arrays; that of version 1 holds none.
 
     Parameters
     ----------
     schema : str
-        What the files are, for programs.
+        Identifier of the format, written to the header.
     version : int
-        Of their layout.
+        Version of the format.
     what : str
         What a file holds, for messages: "visibility grid".
     remedy : str
@@ -101,7 +101,7 @@ class ArrayFile:
     arrays : mapping of str to ArrayRule
         All arrays of a file, by name.
     compressed : bool
-        Not worth its time for arrays of measurements, whose noise does not compress.
+        Whether arrays are deflated; noisy measurements hardly compress.
     undigested : bool
         Whether files of version 1 are read as well. Those of other versions are refused.
     """

@@ -1,4 +1,4 @@
-"""Roads above roads: which roads of a place lie on the level that is studied, told by how they connect."""
+"""Grade separation: the roads on the studied level of a place, from how roads connect and from their heights."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ def split_levels(
 ) -> Levels:
     """Tell the lanes on the level of a place from those that cross above or below it.
 
-    Of two roads that cross, the one that fewer roads join to the place is on
-    its level, and so is every road that is joined to it by fewer roads than to
-    the other one; where both are as near, the height decides.
+    Of two crossing roads the one that is fewer joints away from the anchors in
+    the graph of roads is on the studied level. Each other road takes the level of
+    the crossing road that is fewer joints away; ties are decided by height.
 
     Parameters
     ----------

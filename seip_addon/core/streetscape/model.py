@@ -24,8 +24,8 @@ from ..progress import Progress
 from ..site.obstruction import BARE, can_hide
 from ..site.scene_geometry import ASSUMED, DESCRIBED
 from . import road_surface, street_furniture
-from .degrees import in_metres
 from .description import Poles, SiteDescription
+from .geographic_position import in_metres
 from .levels import APART, Levels
 from .map_furniture import (
     CROWN_SHARE,

@@ -16,8 +16,8 @@ from ..opendrive import Junction, LaneSurface, RoadMap, find_junction, junction_
 from ..site.scene_geometry import DEFAULT_WEIGHT
 from . import road_surface
 from .approaches import approach_lanes
-from .degrees import looks_like_degrees
 from .description import DEFAULT_RADIUS, SiteDescription
+from .geographic_position import looks_like_degrees
 from .levels import Levels, split_levels
 
 MARGIN = 40.0

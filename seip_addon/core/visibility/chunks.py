@@ -22,12 +22,12 @@ _POSITIONS_IN_A_CHUNK = 16  # a second's work or less
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What some poses see.
+    """Rows of the visibility grid for k candidate poses, bit-packed.
 
     Parameters
     ----------
     packed : (k, ceil(t / 8)) uint8
-        Bits of V, as `numpy.packbits` packs them.
+        Visibility of t targets from each pose, packed along axis 1 by `numpy.packbits`.
     rays : int
         How many rays were cast for it.
     """
@@ -125,7 +125,7 @@ def compute_chunks(
     pending = set(numbers)
     try:
         while pending:
-            finished, pending = wait(pending, PAUSE, FIRST_COMPLETED)  # so that whoever steps this can stop it soon
+            finished, pending = wait(pending, PAUSE, FIRST_COMPLETED)  # so that the caller can cancel soon
             for future in finished:
                 number = numbers[future]
                 rows[number] = future.result()

@@ -22,9 +22,9 @@ from ..progress import PAUSE, Progress
 from ..site.site import Site
 from .chunks import Rows, sharing_rays
 from .executors import VisibilityTask, threads_of
-from .needed_triangles import needed_triangles
 from .ray_casting import Engine, engine_name
 from .settings import VisibilitySettings
+from .triangle_culling import needed_triangles
 
 SAMPLING = 0.8
 """Seconds that sample places may take, beyond the first of each thread."""

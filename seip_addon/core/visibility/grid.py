@@ -27,10 +27,10 @@ from ..storage.files import digest
 from ..storage.source_digest import source_digest
 from .chunks import Checkpoint, chunks_of, compute_chunks
 from .executors import VisibilityTask, cluster, threads_of
-from .needed_triangles import needed_triangles
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import ScanPosition
 from .settings import VisibilitySettings
+from .triangle_culling import needed_triangles
 from .visibility_model import seen_by_tilted_full_scan
 
 FILE = ArrayFile(

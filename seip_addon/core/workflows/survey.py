@@ -14,11 +14,11 @@ import numpy as np
 from ..errors import SeipError
 from ..lidar import LidarModel, find_models, load_catalogue
 from ..placement import Placement
-from ..placement.clock import SolverLimits
 from ..placement.deployment import deploy
 from ..placement.integer_program import check_solver
 from ..placement.near_optimal import near_optimal_set
 from ..placement.objective import Objective, Solution, optimise, placement_problem, target_weights
+from ..placement.search_limits import SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
 from ..results.placement_record import Record, Run, placement_record
@@ -32,10 +32,10 @@ from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
 from ..storage.files import digest
 from ..visibility.estimate import Estimate, estimate_visibility
+from ..visibility.float32_precision import rounding_warnings
 from ..visibility.grid import VisibilityGrid, visibility_key
 from ..visibility.ray_casting import Engine, engine_name
 from ..visibility.ring_resolution import resolution_warnings
-from ..visibility.rounding import rounding_warnings
 from ..visibility.settings import VisibilitySettings
 from ..visibility.store import stored_visibility
 

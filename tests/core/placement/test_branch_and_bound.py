@@ -16,8 +16,8 @@ from random_cases import cases
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import branch_and_bound
 from seip_addon.core.placement.branch_and_bound import BestPlacements, FirstInOrder, merit
-from seip_addon.core.placement.clock import Clock
-from seip_addon.core.placement.instance import make_instance
+from seip_addon.core.placement.reduced_problem import make_instance
+from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import finish
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from seip_addon.core.placement.clock import OPERATIONS, Clock
+from seip_addon.core.placement.search_limits import OPERATIONS, Clock
 
 
 def test_work_counts_alike_on_every_machine() -> None:

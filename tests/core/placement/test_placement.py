@@ -25,11 +25,11 @@ from seip_addon.core.placement import (
     solve,
     solve_greedy,
     solver,
-    ties,
+    tie_breaking,
 )
-from seip_addon.core.placement.clock import Clock
-from seip_addon.core.placement.instance import common_unit, make_instance, merge_targets
 from seip_addon.core.placement.integer_program import Outcome, cover_by_cliques
+from seip_addon.core.placement.reduced_problem import common_unit, make_instance, merge_targets
+from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import Progress, finish
 
 if TYPE_CHECKING:
@@ -273,7 +273,7 @@ def test_a_time_limit_is_positive(limit: float) -> None:
 @pytest.mark.parametrize("solver", ["highs", "cbc"])
 def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
-    monkeypatch.setattr(ties, "is_worthwhile", lambda *_: False)
+    monkeypatch.setattr(tie_breaking, "is_worthwhile", lambda *_: False)
     problem = street_problem(12, 100, blocks=1, count=3)
     placement = finish(solve(problem, SolverLimits(solver=solver, time_limit=math.inf)))
     assert placement.status == "optimal"

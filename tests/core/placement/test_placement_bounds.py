@@ -15,10 +15,10 @@ from random_cases import cases
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import bounds
 from seip_addon.core.placement.bounds import lagrangian_bound
-from seip_addon.core.placement.clock import Clock
 from seip_addon.core.placement.decomposition import decomposition_bound
 from seip_addon.core.placement.greedy import greedy, tabu_search
-from seip_addon.core.placement.instance import make_instance
+from seip_addon.core.placement.reduced_problem import make_instance
+from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import finish
 
 

@@ -13,14 +13,21 @@ from placement_oracle import all_placements, covered, merit, small_problems
 from random_cases import cases
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem, SolverLimits, cheapest_for_coverage, solve, solve_greedy, ties
+from seip_addon.core.placement import (
+    PlacementProblem,
+    SolverLimits,
+    cheapest_for_coverage,
+    solve,
+    solve_greedy,
+    tie_breaking,
+)
 from seip_addon.core.progress import finish
 
 thorough = cases(150)
 quick = cases(40)
 
 
-@pytest.mark.parametrize("listed", [1, ties.MANY], ids=["ties by programs", "ties listed"])
+@pytest.mark.parametrize("listed", [1, tie_breaking.MANY], ids=["ties by programs", "ties listed"])
 @thorough
 @given(st.data())
 def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObject) -> None:
@@ -31,7 +38,7 @@ def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObjec
             finish(solve(problem))
         return
     best = min(feasible, key=lambda choice: merit(problem, choice))
-    with patch.object(ties, "MANY", listed):
+    with patch.object(tie_breaking, "MANY", listed):
         found = finish(solve(problem))
     assert found.status == "optimal"
     assert merit(problem, tuple(found.chosen)) == merit(problem, best)

@@ -14,8 +14,8 @@ from random_cases import cases
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import PlacementProblem, SolverLimits, solve
 from seip_addon.core.placement.bounds import lagrangian_bound
-from seip_addon.core.placement.clock import Clock
-from seip_addon.core.placement.instance import make_instance
+from seip_addon.core.placement.reduced_problem import make_instance
+from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_placement import solve_robust

@@ -30,7 +30,7 @@ from seip_addon.core.scans import (
     prepare,
     static_scene,
 )
-from seip_addon.core.scans.beam_windows import BeamWindows
+from seip_addon.core.scans.beam_culling import BeamWindows
 from seip_addon.core.scans.frame import STATIC
 from seip_addon.core.scans.motion import rotations
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry

@@ -85,7 +85,7 @@ def test_a_grid_has_another_key_where_its_code_has_changed(copy, changed, other)
 
 def test_scans_have_another_key_where_their_code_has_changed(copy):
     before = key(copy, "scans.run_folder")
-    path = copy / "seip_addon" / "core" / "lidar" / "returns.py"
+    path = copy / "seip_addon" / "core" / "lidar" / "noisy_returns.py"
     path.write_text(path.read_text(encoding="utf-8") + "\nCHANGED = True\n", encoding="utf-8")
     assert key(copy, "scans.run_folder") != before
 

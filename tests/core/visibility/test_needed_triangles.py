@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from random_cases import cases
 
-from seip_addon.core.visibility.needed_triangles import needed_triangles, triangles_sentence
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
+from seip_addon.core.visibility.triangle_culling import needed_triangles, triangles_sentence
 
 
 @each_engine

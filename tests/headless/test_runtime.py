@@ -11,7 +11,7 @@ pytest.importorskip("bpy")
 
 from typing import Never
 
-from headless import session
+from headless import runtime
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress, finish
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_plain_python_passes_on_all_but_the_program_name() -> None:
-    assert session.arguments(["place.py", "site.blend", "--count", "4"]) == ["site.blend", "--count", "4"]
+    assert runtime.arguments(["place.py", "site.blend", "--count", "4"]) == ["site.blend", "--count", "4"]
 
 
 @pytest.mark.parametrize(
@@ -32,8 +32,8 @@ def test_plain_python_passes_on_all_but_the_program_name() -> None:
     ],
 )
 def test_blender_passes_on_what_follows_the_two_dashes(argv, own, monkeypatch) -> None:
-    monkeypatch.setattr(session, "in_blender", lambda: True)
-    assert session.arguments(argv) == own
+    monkeypatch.setattr(runtime, "in_blender", lambda: True)
+    assert runtime.arguments(argv) == own
 
 
 def test_a_mistake_is_one_line_and_status_1(capsys) -> None:
@@ -41,26 +41,26 @@ def test_a_mistake_is_one_line_and_status_1(capsys) -> None:
         raise SeipError("there is no lane here; move the point")
 
     with pytest.raises(SystemExit) as end:
-        session.run(main)
+        runtime.run(main)
     assert end.value.code == 1
     assert capsys.readouterr().err == "error: there is no lane here; move the point\n"
 
 
 def test_success_is_status_0() -> None:
     with pytest.raises(SystemExit) as end:
-        session.run(lambda _argv: None)
+        runtime.run(lambda _argv: None)
     assert end.value.code == 0
 
 
 def test_a_defect_keeps_its_traceback() -> None:
     with pytest.raises(ZeroDivisionError):
-        session.run(lambda _argv: 1 / 0)
+        runtime.run(lambda _argv: 1 / 0)
 
 
 def test_control_c_ends_with_130_and_one_line() -> None:
     script = (
-        "import time\nfrom headless import session\n"
-        "def main(argv):\n    print('ready', flush=True)\n    time.sleep(60)\nsession.run(main)\n"
+        "import time\nfrom headless import runtime\n"
+        "def main(argv):\n    print('ready', flush=True)\n    time.sleep(60)\nruntime.run(main)\n"
     )
     with subprocess.Popen(  # noqa: S603  # our own interpreter and script
         [sys.executable, "-c", script], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -87,7 +87,7 @@ def two_works():
 def test_a_terminal_sees_one_bar_on_one_line(monkeypatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with session.progress_bar() as report:
+    with runtime.progress_bar() as report:
         finish(two_works(), report)
     shown = terminal.getvalue()
     assert "part of 3:" in shown
@@ -97,8 +97,8 @@ def test_a_terminal_sees_one_bar_on_one_line(monkeypatch) -> None:
 
 def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> None:
     clock = iter(range(0, 100, 4))
-    monkeypatch.setattr(session.time, "monotonic", lambda: next(clock))
-    with session.progress_bar() as report:
+    monkeypatch.setattr(runtime.time, "monotonic", lambda: next(clock))
+    with runtime.progress_bar() as report:
         for done in range(8):
             report(Progress(done, 8, "cast"))
         for _ in range(3):
@@ -110,6 +110,6 @@ def test_a_log_gets_a_line_every_ten_seconds_at_most(capsys, monkeypatch) -> Non
 
 
 def test_what_is_logged_goes_to_the_output_and_warnings_say_so(capsys) -> None:
-    session.LOG.info("read")
-    session.warn(["the road is bare"])
+    runtime.LOG.info("read")
+    runtime.warn(["the road is bare"])
     assert capsys.readouterr().out == "read\nwarning: the road is bare\n"

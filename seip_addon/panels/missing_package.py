@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from .sentence import draw_sentence
 from .sidebar import Sidebar
+from .wrapped_text import draw_sentence
 
 MISSING = ""
 """Name of the package, set by `registration`."""

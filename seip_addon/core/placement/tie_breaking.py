@@ -18,10 +18,10 @@ from ..arrays import Integer
 from ..progress import Progress
 from .bounds import lagrangian_bound
 from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
-from .clock import Clock
 from .greedy import drop_redundant, drop_weakest, swap_search
-from .instance import Instance
 from .integer_program import reaching
+from .reduced_problem import Instance
+from .search_limits import Clock
 
 MANY = 2_000
 """Ties that branch and bound lists; of more it looks for the first in order."""

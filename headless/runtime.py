@@ -63,7 +63,7 @@ _LOCKS: dict[Path, int] = {}
 
 
 def in_blender() -> bool:
-    """Return whether the real program runs this, not Python with the bpy module."""
+    """Return whether this runs inside Blender rather than with the bpy package, not Python with the bpy module."""
     return not bpy.app.module
 
 
@@ -90,7 +90,7 @@ def open_scene(path: Path | None) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """See that a folder can be written, and that no other run writes into it until this process ends.
+    """Check that a folder can be written, and lock it against other runs until this process ends.
 
     Raises
     ------

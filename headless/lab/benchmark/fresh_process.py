@@ -1,4 +1,4 @@
-"""SolverRun work in a fresh process, whose memory nothing else has touched.
+"""Run work in a fresh process, whose memory nothing else has touched.
 
 Not by `multiprocessing`: that hands on the search path, in which bpy has put Blender's scripts before itself.
 """

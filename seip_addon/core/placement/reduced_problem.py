@@ -1,4 +1,4 @@
-"""The problem in canonical order, after exact reductions."""
+"""Reduced placement problem that all algorithms work on: sorted candidates, merged targets, none dominated."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Numbers = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """What the algorithms see: candidates in canonical order, targets merged.
+    """A reduced maximal covering instance: c candidates in canonical order, t merged targets, g mandatory groups.
 
     Parameters
     ----------

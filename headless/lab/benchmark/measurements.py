@@ -8,12 +8,12 @@ import os
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from headless.lab.benchmark.alone import alone
 from headless.lab.benchmark.approximations import approximations
+from headless.lab.benchmark.baselines import RIVALS, can_run
+from headless.lab.benchmark.fresh_process import alone
 from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
 from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import Findings
-from headless.lab.benchmark.rivals import RIVALS, can_run
 from headless.lab.benchmark.scans import scan_costs
 from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
