@@ -30,7 +30,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "core")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 SECONDS = 60.0
 """After which an input hangs."""
@@ -208,7 +208,7 @@ def _read_catalogue(path: Path, _: bytes) -> None:
 
 
 def _floating_car_data(_: Path) -> list[bytes]:
-    from test_traffic_files import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
+    from sumo_text import CONVERTED_CSV, FCD, NATIVE_CSV  # noqa: PLC0415
 
     return [text.encode() for text in (FCD, NATIVE_CSV, CONVERTED_CSV)] + [gzip.compress(FCD.encode(), mtime=0)]
 
@@ -238,7 +238,7 @@ def _read_floating_car_data(path: Path, content: bytes) -> None:
 
 
 def _routes(_: Path) -> list[bytes]:
-    from test_traffic_files import NET, ROUTES  # noqa: PLC0415
+    from sumo_text import NET, ROUTES  # noqa: PLC0415
 
     return [ROUTES.encode(), NET.encode()]
 
@@ -265,8 +265,7 @@ def _read_routes(path: Path, content: bytes) -> None:
 
 
 def _arrays(folder: Path) -> list[bytes]:
-    from test_array_file import USERS  # noqa: PLC0415
-    from traffic_by_hand import make_trajectories  # noqa: PLC0415
+    from traffic_by_hand import USERS, make_trajectories  # noqa: PLC0415
 
     from seip_addon.core.scans.frame import Frame, Labels  # noqa: PLC0415
     from seip_addon.core.visibility.grid import VisibilityGrid  # noqa: PLC0415

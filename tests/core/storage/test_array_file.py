@@ -12,15 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from npz_by_hand import claiming, contents, write
-from traffic_by_hand import make_trajectories
+from traffic_by_hand import USERS, make_trajectories
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.storage import array_file
-from seip_addon.core.traffic import RoadUser, Trajectories
+from seip_addon.core.traffic import Trajectories
 
 ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = ROOT / "scenes" / "junction_traffic" / "run-1.npz"
-USERS = (RoadUser("a", "car", 4.5, 1.8, 1.5), RoadUser("b", "bus", 12.0, 2.5, 3.4))
 
 
 @pytest.fixture
