@@ -116,6 +116,7 @@ def test_the_same_run_in_another_process_is_the_same_bytes(folder, run):
         assert one[name] == other[name], name
 
 
+@pytest.mark.slow
 def test_a_started_run_is_finished(folder, run):
     frame = folder / "run" / "frames" / "000001.npz"
     before = contents(run)
@@ -186,6 +187,7 @@ def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
         simulate.main([str(folder / "placed.blend"), "-o", str(folder / "wrong")])
 
 
+@pytest.mark.slow
 def test_a_disk_without_room_has_its_sentence(folder):
     """A limit on the size of files stands for a full disk."""
     command = [sys.executable, "-m", "headless.simulate", *arguments(folder, "full")]

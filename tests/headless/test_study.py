@@ -10,6 +10,8 @@ from matplotlib.image import imread
 
 from seip_addon.core.errors import SeipError
 
+pytestmark = pytest.mark.slow  # a whole study; its parts are in test_coverage_study.py and test_study_claims.py
+
 TYPES, HEIGHTS = ("type1", "type2"), (3.5, 8.0)
 COARSE = ["--sensor", *TYPES, "--heights", *map(str, HEIGHTS), "--grid", "5", "--spacing", "20"]
 

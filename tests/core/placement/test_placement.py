@@ -283,6 +283,7 @@ def test_there_may_be_no_time_limit(solver: str, monkeypatch: pytest.MonkeyPatch
     )
 
 
+@pytest.mark.slow
 def test_a_long_program_can_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("seip_addon.core.placement.solver.is_worthwhile", lambda *_: False)
     before = set(threading.enumerate())

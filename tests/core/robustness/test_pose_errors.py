@@ -168,6 +168,7 @@ def test_without_errors_every_draw_covers_what_was_planned(placed):
     assert pose_warnings(study) == ()
 
 
+@pytest.mark.slow
 def test_a_study_says_who_is_to_blame(placed):
     study = study_of(placed, errors=PoseErrors(tilt=math.radians(8)))
     assert set(study.by_kind) == set(KINDS)

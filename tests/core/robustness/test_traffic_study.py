@@ -76,6 +76,7 @@ def test_the_empty_road_is_where_both_begin(laid_out, study):
     assert found.empty.seen[scenarios.layer].empty == pytest.approx(static.covered / len(around.site.targets))
 
 
+@pytest.mark.slow
 def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study):
     around, _ = laid_out
     _, found = study

@@ -86,6 +86,7 @@ def test_a_region_beside_the_road_is_an_error_and_one_of_two_a_warning():
     assert one(found(*SOUND.surfaces, beside), "no road within") == ("WARNING", "beside")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "complains"), [(0.05, True), (1.0, False), (300.0, True)])
 def test_a_region_of_no_earthly_size(factor, complains):
     surfaces = [dataclasses.replace(each, triangles=each.triangles * factor) for each in SOUND.surfaces]

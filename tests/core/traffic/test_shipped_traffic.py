@@ -42,6 +42,7 @@ def test_runs_differ():
     assert len({path.read_bytes() for path in RUNS}) == len(RUNS)
 
 
+@pytest.mark.slow
 def test_a_run_lies_on_its_road(run, geometries):
     geometry = geometries[run.parent.name.partition("_")[0]]
     trajectories = Trajectories.load(run)

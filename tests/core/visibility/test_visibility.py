@@ -211,6 +211,7 @@ def test_pieces_of_another_grid_and_damaged_ones_are_not_used(tmp_path: Path) ->
     assert not path.exists()
 
 
+@pytest.mark.slow
 @each_engine
 def test_same_as_plain_arithmetic_but_for_borderline_targets(engine: Engine) -> None:
     borderline = seen = total = 0
