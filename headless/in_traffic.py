@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -43,7 +44,7 @@ def main(argv: list[str]) -> None:
         save_time_map(options.output / CHARTS[0], layout.geometry, layout.site, plan.deployment, study.traffic, title)
         sensors = f"{len(plan.deployment.sensors)} sensors"
         save_promise_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
-        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
+        survey.save_plan(surveyed, plan, options.output, render=not options.no_render, traffic=asdict(settings))
     runtime.say(f"written to {options.output}/")
 
 

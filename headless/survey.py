@@ -6,7 +6,7 @@ import argparse
 import logging
 import math
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -137,8 +137,16 @@ def survey(
     return Survey(layout, grid, watch)
 
 
-def save_plan(surveyed: Survey, plan: Solution, folder: Path, *, render: bool, pose_errors: bool = False) -> None:
-    """Write a plan of a survey, with its record, to the folder of results."""
+def save_plan(
+    surveyed: Survey,
+    plan: Solution,
+    folder: Path,
+    *,
+    render: bool,
+    pose_errors: bool = False,
+    traffic: Mapping[str, object] | None = None,
+) -> None:
+    """Write a plan of a survey, with its record (see `record_of`), to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
     now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
@@ -147,7 +155,7 @@ def save_plan(surveyed: Survey, plan: Solution, folder: Path, *, render: bool, p
         layout.geometry,
         layout.site,
         plan,
-        record_of(layout, grid, plan, now, render=render, pose_errors=pose_errors),
+        record_of(layout, grid, plan, now, render=render, pose_errors=pose_errors, traffic=traffic),
         visible=grid.visible,
         models=layout.models,
         render=render,
