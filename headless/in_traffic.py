@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -18,15 +19,9 @@ from headless.charts.traffic import save_promise_chart, save_time_map
 from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
 from seip_addon.core.placement.objective import Solution, check_objective
+from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
-from seip_addon.core.workflows.survey import Layout
-from seip_addon.core.workflows.traffic import (
-    TrafficRuns,
-    TrafficSettings,
-    independent_runs,
-    load_runs,
-    place_in_traffic,
-)
+from seip_addon.core.workflows.traffic import TrafficSettings, place_in_traffic, read_runs
 
 CHARTS = ("time_seen.png", "traffic.png")
 
@@ -37,7 +32,7 @@ def main(argv: list[str]) -> None:
     goal, settings = read_goal(options), read_settings(TrafficSettings, options)
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
     layout = surveyed.layout
-    runs = _read_runs(options, layout)
+    runs = finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout))
     runtime.LOG.info(runs.overlap)
     steps = place_in_traffic(layout, surveyed.grid, goal, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)
@@ -49,22 +44,14 @@ def main(argv: list[str]) -> None:
         save_time_map(options.output / CHARTS[0], layout.geometry, layout.site, plan.deployment, study.traffic, title)
         sensors = f"{len(plan.deployment.sensors)} sensors"
         save_promise_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
-        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
+        survey.save_plan(surveyed, plan, options.output, render=not options.no_render, traffic=asdict(settings))
     runtime.say(f"written to {options.output}/")
-
-
-def _read_runs(options: argparse.Namespace, layout: Layout) -> TrafficRuns:
-    paths = options.traffic or survey.runs_beside(options.scene)
-    loaded = load_runs(paths, layout.geometry.origin)
-    return independent_runs({str(path): run for path, run in zip(paths, loaded, strict=True)}, layout.site)
 
 
 def _in_words(study: TrafficStudy, plan: Solution) -> str:
     sensors = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    won = f"placing on traffic sees {study.won(study.layer).describe()} more of the {WHAT[study.layer]}"
-    doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)
-    return "\n".join([*sensors, *seen, won, plan.certificate, *doubt, *plan.placement.notes])
+    return "\n".join([*sensors, *seen, plan.certificate, *plan.placement.notes])
 
 
 def _share(placed: JudgedInTraffic) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from .. import scene_status
 from ..core.placement.objective import certificate
 from ..core.results.placement_record import Record, parsed_record, relevant_warnings
+from ..core.workflows.traffic import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_judge_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
@@ -14,6 +17,9 @@ from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sidebar import RowList, Sidebar, settings_column
 from .wrapped_text import draw_sentence
+
+_ERRING = ("position_error", "tilt_error", "seen_by", "failure")
+_IN_TRAFFIC = ("layer", "weights_from_traffic", "instants", "judged_at")
 
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):
@@ -72,9 +78,13 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
         if goal.objective == "PLANNED":
             layout.prop(goal, "pose_errors")
             return
-        for name in ("position_error", "tilt_error", "seen_by", "failure"):
+        in_traffic = goal.objective == "TRAFFIC"
+        if in_traffic:
+            layout.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        for name in _IN_TRAFFIC if in_traffic else _ERRING:
             layout.prop(goal, name)
-        draw_sentence(layout, "This looks from every candidate in twenty draws and takes minutes.", icon="INFO")
+        looks = f"at {goal.instants} instants" if in_traffic else "in twenty draws"
+        draw_sentence(layout, f"This looks from every candidate {looks} and takes minutes.", icon="INFO")
 
 
 class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):

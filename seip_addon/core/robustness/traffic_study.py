@@ -28,7 +28,7 @@ NOTABLE = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
 
 IN_TRAFFIC = "in traffic"
-"""How sentences about traffic begin."""
+"""How the sentence of `tried_in_traffic` begins, and no other."""
 
 MOSTLY = 0.9
 """Share of time from which on a target counts as mostly seen."""
@@ -250,9 +250,8 @@ def _users(obstacles: Sequence[TrafficObstacles]) -> float:
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
     losses = tuple(
-        f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
-        f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
-        f"{seen.lost.value:.1%} less"
+        f"the best placement for the empty road sees {seen.held.value:.1%} of the {WHAT[layer]} on average over time "
+        f"in traffic ({study.road_users:.0f} road users at a time), not {seen.empty:.1%}: {seen.lost.value:.1%} less"
         for layer, seen in study.empty.seen.items()
         if seen.lost.value >= NOTABLE
     )
@@ -260,7 +259,7 @@ def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     if won.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
         return losses
     doubt = (
-        "in traffic that it was not chosen on this placement is not known to see more than the best one for the empty "
-        f"road: {won.describe()} more; choose on more --instants, or keep that one"
+        "this placement is not known to see more in traffic that it was not chosen on than the best one for the empty "
+        "road: choose on more instants, or keep that one"
     )
     return (*losses, doubt)

@@ -264,7 +264,7 @@ class Provenance:
     versions: Mapping[str, str]
 
 
-def record_of(  # what was asked for stands in the record
+def record_of(  # noqa: PLR0913  # what was asked for stands in the record
     layout: Layout,
     grid: VisibilityGrid,
     plan: Solution,
@@ -272,6 +272,7 @@ def record_of(  # what was asked for stands in the record
     *,
     render: bool,
     pose_errors: bool = False,
+    traffic: Mapping[str, object] | None = None,
 ) -> Record:
     """Return what ``placement.json`` holds of a plan.
 
@@ -281,8 +282,12 @@ def record_of(  # what was asked for stands in the record
         Whether a rendered view goes with it.
     pose_errors : bool
         Whether the plan was tried with pose errors; see `place`.
+    traffic : mapping of str to value, optional
+        The `TrafficSettings` that the plan was chosen with, by name; None for a plan that was not chosen on traffic.
     """
     asked = {"goal": asdict(plan.goal), "pose_errors": pose_errors, "render": render}
+    if traffic is not None:
+        asked["traffic"] = dict(traffic)
     run = Run(
         settings=layout.settings.as_record() | asked,
         created=circumstances.created,
