@@ -55,7 +55,13 @@ def no_placement(scene: bpy.types.Scene) -> str:
     """Say that there is no placement that can be shown; empty if there is one."""
     if scene_status.is_newer(scene):
         return scene_status.NEWER
-    return "" if scene.seip.result.record else "There is no placement yet: place sensors first."
+    if not scene.seip.result.record:
+        return "There is no placement yet: place sensors first."
+    try:
+        parsed_record(scene.seip.result.record)
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 def no_folder(scene: bpy.types.Scene) -> str:

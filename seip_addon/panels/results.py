@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.errors import SeipError
 from ..core.results.placement_record import PlacementRecord, parsed_record
 from ..operators import results
 from ..session import FollowedSensors, session
@@ -127,7 +128,11 @@ class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
         if not 0 <= seip.active_kept < len(seip.kept):
             draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
             return
-        kept = parsed_record(seip.kept[seip.active_kept].record)
+        try:
+            kept = parsed_record(seip.kept[seip.active_kept].record)
+        except SeipError as error:
+            draw_sentence(layout, str(error), icon="ERROR")
+            return
         _draw_table(layout, kept, parsed_record(seip.result.record))
         layout.operator("seip.show_comparison").back = False
         layout.operator("seip.show_comparison", text="Show Coverage").back = True
