@@ -44,11 +44,11 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     bpy.ops.wm.open_mainfile(filepath=str(path))
     seip = bpy.context.scene.seip
     panel = parsed_record(seip.result.record)
-    assert any(note.startswith("placing on traffic sees") for note in panel["notes"])
+    assert any(note.startswith("placing on traffic sees") for note in panel.notes)
     seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-1.npz")
     bpy.ops.seip.load_traffic()
     bpy.ops.seip.try_in_traffic()
-    assert parsed_record(seip.result.record)["notes"][:-1] == panel["notes"]
+    assert parsed_record(seip.result.record).notes[:-1] == panel.notes
     in_traffic.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
 
