@@ -31,13 +31,13 @@ GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)
 """Metres between posts on the pavement, from coarse to fine."""
 
-COARSE_CANDIDATES = 8.0
+COARSE_CANDIDATE_SPACING = 8.0
 """Metres between posts while the spacing of the targets is sought."""
 
-JUDGED_ON = 0.35
+EVALUATION_SPACING = 0.35
 """Metres between the targets on which answers are judged."""
 
-MOST_JUDGED = 400_000
+MAX_EVALUATION_TARGETS = 400_000
 """Targets to judge on; a larger place is judged on a coarser grid."""
 
 
@@ -146,10 +146,10 @@ def coarsest_settings(
         return (yield from judge.answer(tried))
 
     share = tolerance / 2
-    finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATES)
+    finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATE_SPACING)
     by_grid = yield from _until_as_good(
         GRID_SPACINGS,
-        lambda spacing: answer(spacing, COARSE_CANDIDATES),
+        lambda spacing: answer(spacing, COARSE_CANDIDATE_SPACING),
         lambda found: abs(found.own - found.judged) <= share and finest.judged - found.judged <= share,
         "spacing of the targets",
     )
@@ -184,7 +184,7 @@ class Judge:
     """
 
     def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Objective) -> None:
-        spacing = max(JUDGED_ON, math.sqrt(geometry.region.area / MOST_JUDGED))
+        spacing = max(EVALUATION_SPACING, math.sqrt(geometry.region.area / MAX_EVALUATION_TARGETS))
         wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
         self.site = make_site(geometry, wide, spacing, settings.reach())
         self.weights = target_weights(self.site, goal)

@@ -18,7 +18,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.claims import save_claims
-from headless.coverage_study.cells import NUMBERS
+from headless.coverage_study.cells import COUNTS
 from headless.detection import case_study, study_results
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
@@ -104,7 +104,7 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=NUMBERS[-1])))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=COUNTS[-1])))
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
     runtime.LOG.info(traffic.overlap())

@@ -18,7 +18,7 @@ from headless.charts.traffic import save_promise_chart, save_time_map
 from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
 
 from seip_addon.core.placement.objective import Solution, check_objective
-from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
+from seip_addon.core.robustness.traffic_study import LAYER_NAMES, JudgedInTraffic, TrafficStudy
 from seip_addon.core.workflows.survey import Layout
 from seip_addon.core.workflows.traffic import (
     TrafficRuns,
@@ -62,14 +62,14 @@ def _read_runs(options: argparse.Namespace, layout: Layout) -> TrafficRuns:
 def _in_words(study: TrafficStudy, plan: Solution) -> str:
     sensors = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    won = f"placing on traffic sees {study.won(study.layer).describe()} more of the {WHAT[study.layer]}"
+    won = f"placing on traffic sees {study.won(study.layer).describe()} more of the {LAYER_NAMES[study.layer]}"
     doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)
     return "\n".join([*sensors, *seen, won, plan.certificate, *doubt, *plan.placement.notes])
 
 
 def _share(placed: JudgedInTraffic) -> str:
     return "; ".join(
-        f"{seen.held.describe()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
+        f"{seen.held.describe()} of the {LAYER_NAMES[layer]} on average over time, {seen.empty:.2%} on the empty road"
         for layer, seen in placed.seen.items()
     )
 

@@ -50,9 +50,9 @@ except ImportError:
         raise
     sys.exit(f"error: {complaint(missing)}")
 
-STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
+EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
-ELAPSED = "{desc} [{elapsed}]"
+ELAPSED_FORMAT = "{desc} [{elapsed}]"
 """How progress of unknown length is shown."""
 
 LOG = logging.getLogger("headless")
@@ -155,7 +155,7 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     except SeipError as error:
         _end(1, f"error: {error}")
     except KeyboardInterrupt as stop:
-        _end(STOPPED, str(stop) or "stopped, no result written")
+        _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
     _end(0)
 
 
@@ -170,13 +170,13 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
     if not sys.stderr.isatty():
         yield _line_reporter()
         return
-    with tqdm(file=sys.stderr, leave=False, mininterval=0.1, maxinterval=0.1, bar_format=ELAPSED) as bar:
+    with tqdm(file=sys.stderr, leave=False, mininterval=0.1, maxinterval=0.1, bar_format=ELAPSED_FORMAT) as bar:
 
         def report(progress: Progress) -> None:
             known = progress.total > 0
             bar.set_description(progress.what, refresh=False)
             if (progress.total or None) != bar.total or (known and progress.done < bar.n):
-                bar.total, bar.bar_format = progress.total or None, None if known else ELAPSED
+                bar.total, bar.bar_format = progress.total or None, None if known else ELAPSED_FORMAT
                 bar.reset()
             bar.update(progress.done - bar.n if known else 1)
 
@@ -193,7 +193,7 @@ def _line_reporter() -> Callable[[Progress], None]:
         if now - shown < SECONDS_BETWEEN_LINES:
             return
         shown = now
-        style = None if progress.total else ELAPSED
+        style = None if progress.total else ELAPSED_FORMAT
         total = progress.total or None
         meter = tqdm.format_meter(progress.done, total, now - start, prefix=progress.what, bar_format=style)
         sys.stderr.write(f"{meter}\n")

@@ -29,7 +29,7 @@ from headless.detection.frames import SampledRecording, recording_of, require_in
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import grid_of
-from headless.detection.settings import GROUPS, NetworkSettings, TrainingSettings
+from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings
@@ -107,7 +107,7 @@ def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[Fra
     """Return what is there and what is detected in each frame of a run."""
     recording = recording_of(folder)
     sensors = np.array([sensor["local_m"] for sensor in load_manifest(folder)["sensors"]])
-    common: dict[str, Any] = {"classes": tuple(GROUPS.values()), "region": region, "sensors": sensors}
+    common: dict[str, Any] = {"classes": tuple(CLASS_CATEGORIES.values()), "region": region, "sensors": sensors}
     return [
         frame_result(
             frame,

@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
-from headless.coverage_study.cells import NUMBERS, Case, Cell, solve_cell
+from headless.coverage_study.cells import COUNTS, Case, Cell, solve_cell
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from .kitti_precision import kitti
 from .matching import Rule
 from .pillars import PillarGrid
 from .recordings import SampledRun, SensorConfiguration, Simulator
-from .settings import GROUPS, NetworkSettings, TrainingSettings
+from .settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from .suitability import suitability_warnings
 from .training import TrainedDetector, deterministic, train
 
@@ -55,15 +55,15 @@ RULES = {
 }
 """How average precision is taken; the first is the study's own."""
 
-MAIN = next(iter(RULES.values()))
+MAIN_RULE = next(iter(RULES.values()))
 
-FEWEST_RUNS = 4
+MIN_RUNS = 4
 """One to learn from, one for validation, two for tests."""
 
 WARM_UP = 2.0
 """Seconds from the first sample of a run to its first frame."""
 
-SIDE_BY_SIDE = (os.cpu_count() or 1) + 1
+PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1
 """Trainings at once on the CPU: one more than there are cores, as each also waits."""
 
 
@@ -110,9 +110,9 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     SeipError
         There are too few, or one is too short.
     """
-    if len(paths) < FEWEST_RUNS:
+    if len(paths) < MIN_RUNS:
         raise SeipError(
-            f"{len(paths)} runs of traffic are too few: name {FEWEST_RUNS} or more with --traffic, made by "
+            f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, made by "
             "headless/traffic.py with a seed each; the last two are for tests, the one before for validation"
         )
     runs = read_runs(paths, origin, every)
@@ -188,7 +188,7 @@ class DetectorOutcome:
     def precisions(self) -> dict[str, float]:
         """Average precision by every rule, and KITTI's figures for the study's own."""
         by_rule = {name: evaluate(self.frames, rule).average_precision for name, rule in RULES.items()}
-        figures = kitti(self.frames, MAIN)
+        figures = kitti(self.frames, MAIN_RULE)
         return by_rule | {"kitti_ap40": figures.ap40, "kitti_ap11": figures.ap11}
 
     @cached_property
@@ -232,7 +232,7 @@ def place_all(
         There are fewer positions than sensors, or a type sees nothing.
     """
     visible = grid.visible
-    cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in NUMBERS]
+    cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in COUNTS]
     placed: list[Case] = []
     for done, cell in enumerate(cells):
         progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
@@ -304,7 +304,7 @@ def train_all(
         Of torch.
     """
     trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
-    at_once = SIDE_BY_SIDE if device == "cpu" else 1
+    at_once = PARALLEL_TRAININGS if device == "cpu" else 1
     with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
         return (yield from side_by_side(trainings, at_once))
 
@@ -359,10 +359,10 @@ def _outcomes(
     judged: Mapping[tuple[str, str], list[FrameResult]],
 ) -> Iterator[DetectorOutcome]:
     names = [configuration.name for configuration in model.configurations]
-    score = balanced_score(evaluate([frame for name in names for frame in tried[model.name, name]], MAIN))
+    score = balanced_score(evaluate([frame for name in names for frame in tried[model.name, name]], MAIN_RULE))
     for configuration in model.configurations:
         frames = tuple(judged[model.name, configuration.name])
-        yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN), score)
+        yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN_RULE), score)
 
 
 def _result(
@@ -377,7 +377,7 @@ def _result(
         frame,
         cloud,
         found,
-        classes=tuple(GROUPS.values()),
+        classes=tuple(CLASS_CATEGORIES.values()),
         region=simulator.static.region,
         sensors=configuration.places,
         run=run.name,

@@ -13,22 +13,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from headless.claims import UNDECIDED, Claim, judge_above, judge_all, judge_within
-from headless.coverage_study.cells import NUMBERS
+from headless.coverage_study.cells import COUNTS
 
 import numpy as np
 
 from seip_addon.core.estimates import Interval, mean_interval
 
-ABOUT = 2.0
+FACTOR = 2.0
 """Factor up to which a figure is about another."""
 
-FEWEST_SEEDS = 3
+MIN_SEEDS = 3
 """Seeds below which nothing is decided."""
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
 """What the study gained from one to two and from two to four sensors, of the simplest type and the next."""
 
-FEW, SOME, MANY = NUMBERS
+FEW, SOME, MANY = COUNTS
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,10 @@ def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[s
 
 
 def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
-    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in NUMBERS}
+    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in COUNTS}
     more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
     sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse)) for count in (FEW, SOME)]
-    rows = [f"N = {count} {_mean(false[count]).plain()}" for count in NUMBERS]
+    rows = [f"N = {count} {_mean(false[count]).plain()}" for count in COUNTS]
     shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
     return Claim(
         8,
@@ -185,7 +185,7 @@ def _mean(of: BySeed) -> _Mean:
     values = list(of.values())
     if not values:
         return _Mean(np.nan, 0, None)
-    interval = mean_interval(values) if len(values) >= FEWEST_SEEDS else None
+    interval = mean_interval(values) if len(values) >= MIN_SEEDS else None
     return _Mean(float(np.mean(values)), len(values), interval)
 
 
@@ -223,7 +223,7 @@ def _seeds(gains: Sequence[_Mean]) -> str:
 
 
 def _about(mean: _Mean, expected: float) -> str:
-    return UNDECIDED if mean.interval is None else judge_within(mean.interval, expected / ABOUT, expected * ABOUT)
+    return UNDECIDED if mean.interval is None else judge_within(mean.interval, expected / FACTOR, expected * FACTOR)
 
 
 def _above(mean: _Mean, least: float = 0.0) -> str:

@@ -30,7 +30,7 @@ from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
 VEHICLES = ("car", "van", "truck", "bus")
 """Categories whose average precision the study compares."""
 
-NOBODY = -1
+NO_MATCH = -1
 """Index that stands for no match, of a detection and of a road user."""
 
 
@@ -65,9 +65,9 @@ class Match:
     counted : (g,) bool
         Whether the road user is one that had to be found.
     found_by : (g,) int64
-        The detection that found it, `NOBODY` where none did.
+        The detection that found it, `NO_MATCH` where none did.
     found : (k,) int64
-        The road user that each detection found, `NOBODY` where it found none that counts.
+        The road user that each detection found, `NO_MATCH` where it found none that counts.
     judged : (k,) bool
         Whether it is a hit or false; the rest neither helps nor harms.
     """
@@ -80,7 +80,7 @@ class Match:
     @property
     def hit(self) -> Boolean:
         """Whether each detection found a road user that counts, (k,) bool."""
-        hit: Boolean = self.found != NOBODY
+        hit: Boolean = self.found != NO_MATCH
         return hit
 
     def of_found(self, of_truth: NDArray[Any], own: NDArray[Any]) -> NDArray[Any]:
@@ -96,16 +96,16 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     counted = must_be_found(frame, rule)
     overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
     best = overlap.max(axis=1, initial=0.0)
-    found_by, found = np.full(len(truth), NOBODY), np.full(len(detected), NOBODY)
+    found_by, found = np.full(len(truth), NO_MATCH), np.full(len(detected), NO_MATCH)
     for row in np.lexsort((-best, -detected.score)):
         if best[row] <= rule.iou:
             continue
-        free = np.where(counted & (found_by == NOBODY), overlap[row], 0.0)
+        free = np.where(counted & (found_by == NO_MATCH), overlap[row], 0.0)
         if free.max() > rule.iou:
             found[row] = free.argmax()
             found_by[found[row]] = row
     excused = (overlap[:, ~counted] > rule.iou).any(axis=1) | ~detected.inside
-    return Match(counted, found_by, found, (found != NOBODY) | (of_its_kind(frame, rule) & ~excused))
+    return Match(counted, found_by, found, (found != NO_MATCH) | (of_its_kind(frame, rule) & ~excused))
 
 
 def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:

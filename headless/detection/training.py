@@ -30,12 +30,12 @@ from .heads import TrainingTargets
 from .inference import detect
 from .matching import Rule
 from .pillars import PillarGrid, Pillars, fill_pillars, stacked
-from .settings import GROUPS, STRIDE, NetworkSettings, TrainingSettings
+from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18
 """Frames, spread over the recordings set aside, that each validation looks at."""
 
-MARGIN = 1.6
+LOSS_MARGIN = 1.6
 """Metres at the border of a window for which no loss is computed: much of what is there lies outside."""
 
 MAX_CROP_SHIFT = 0.25
@@ -156,7 +156,7 @@ class _Run:
         self.schedule = torch.optim.lr_scheduler.OneCycleLR(
             self.optimiser, settings.learning_rate, total_steps=settings.steps + 1
         )
-        self.window = STRIDE * math.ceil(settings.window / (network.pillar * STRIDE) - 1e-9)
+        self.window = GRID_STRIDE * math.ceil(settings.window / (network.pillar * GRID_STRIDE) - 1e-9)
         self.step = 0
         self.curve = LearningCurve()
         self.best = _copied(self.detector.state_dict())
@@ -254,7 +254,7 @@ class _Run:
 
     def _loss(self, batch: _Batch) -> Tensor:
         output = self.detector(batch.pillars, (len(batch.targets), batch.grid.rows, batch.grid.columns))
-        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, MARGIN)
+        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, LOSS_MARGIN)
         return torch.stack(list(parts.values())).sum()
 
 
@@ -324,7 +324,7 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
 def result_of_sample(detector: Detector, sample: TrainingSample) -> FrameResult:
     """Return what a detector finds in a sample, all of which counts, beside what is there."""
     found = detect(detector, sample.points[:, :3], sample.points[:, 3])
-    names = np.array([members[0] for members in GROUPS.values()], dtype=np.str_)
+    names = np.array([members[0] for members in CLASS_CATEGORIES.values()], dtype=np.str_)
     return FrameResult(
         run="",
         time=0.0,

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from .. import selection
 from ..core.placement.objective import DEFAULT_COUNT, Objective
-from ..core.robustness.pose_errors import STEEPEST, PoseErrors
+from ..core.robustness.pose_errors import MAX_ANGLE_STD, PoseErrors
 from ..core.robustness.risk import Risk
 from ..core.robustness.robust_study import RobustnessSettings
 from .conversion import as_typed, of_setting
@@ -76,7 +76,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         ),
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
-    tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=STEEPEST)
+    tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=MAX_ANGLE_STD)
     seen_by: of_setting(Risk, "seen_by", "Seen by", max=8)
     failure: EnumProperty(
         name="Sensor Failure",

@@ -18,7 +18,7 @@ from headless.detection.average_precision import (
     precision_recall,
 )
 from headless.detection.kitti_precision import kitti
-from headless.detection.matching import NOBODY, VEHICLES, Rule, match
+from headless.detection.matching import NO_MATCH, VEHICLES, Rule, match
 
 from seip_addon.core.errors import SeipError
 
@@ -152,7 +152,7 @@ def test_frames_without_vehicles_or_detections():
     nothing = frame(truth([]), detected([], []))
     false = frame(truth([]), detected([box(0)], [0.9]))
     missed = frame(truth([box(0)]), detected([], []))
-    assert match(missed, AT_07).found_by.tolist() == [NOBODY]
+    assert match(missed, AT_07).found_by.tolist() == [NO_MATCH]
     assert average_precision([nothing, missed]) == 0
     assert average_precision([false, frame(truth([box(0)]), detected([box(0)], [0.5]))]) == 0.5
     assert balanced_score(evaluate([missed], AT_07)) == 0

@@ -7,9 +7,9 @@ from headless.detection.detector import Detector, keeping_at_most
 from headless.detection.pillars import grid_over
 from headless.detection.settings import NetworkSettings
 from headless.lab.detector.disturbances import (
-    DIAGONAL,
     DROP_INTENSITY,
-    NEAR,
+    DROP_RANGE,
+    ERROR_AXIS,
     CappedPillars,
     ClockOffset,
     Disturbance,
@@ -106,9 +106,9 @@ def test_rain_puts_drops_near_the_sensor_and_takes_more_from_afar(plain):
     places = np.array([sensor.xyz for sensor in sensors()])
     far = [np.linalg.norm(frame.points - places[frame.sensor], axis=1) for frame in (plain, wet)]
     drops = wet.intensity == np.float32(DROP_INTENSITY)
-    share = 1 - math.exp(-size / 1000 * NEAR)
+    share = 1 - math.exp(-size / 1000 * DROP_RANGE)
     assert abs(drops.sum() - share * len(wet)) < 4 * math.sqrt(len(wet) * share * (1 - share))
-    assert far[1][drops].max() <= NEAR + 1e-3
+    assert far[1][drops].max() <= DROP_RANGE + 1e-3
     assert (wet.instance[drops] == -1).all()
     left = [np.count_nonzero(far[1][~drops] >= r) / np.count_nonzero(far[0] >= r) for r in (10, 20)]
     assert left[1] < left[0] < 1
@@ -138,9 +138,9 @@ def test_points_of_a_tilted_sensor_keep_their_distance_and_what_lies_on_the_axis
     tilted, own = frame_under(TiltError(1.0, sensor=0)), plain.sensor == 0
     way, other = plain.points[own] - place, tilted.points[own] - place
     np.testing.assert_allclose(np.linalg.norm(other, axis=1), np.linalg.norm(way, axis=1), rtol=1e-5)
-    np.testing.assert_allclose(other @ DIAGONAL, way @ DIAGONAL, atol=1e-4)
+    np.testing.assert_allclose(other @ ERROR_AXIS, way @ ERROR_AXIS, atol=1e-4)
     # At right angles to the axis, on the ground: lifted or sunk by its distance times the angle.
-    across = way @ np.cross(DIAGONAL, [0.0, 0, 1])
+    across = way @ np.cross(ERROR_AXIS, [0.0, 0, 1])
     np.testing.assert_allclose(other[:, 2] - way[:, 2], -across * math.sin(math.radians(1.0)), atol=0.01)
 
 

@@ -21,13 +21,13 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.scans import Frame, MountedSensor, Simulation
-from seip_addon.core.scans.frame import STATIC
+from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.traffic import Trajectories
 
-DIAGONAL = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
+ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
 """Unit vector along which a sensor is misplaced and about which it is tilted: no street's own direction."""
 
-NEAR = 10.0
+DROP_RANGE = 10.0
 """Metres from a sensor within which a drop may return enough to be taken for something."""
 
 DROP_INTENSITY = 0.05
@@ -135,18 +135,18 @@ class Rain(Disturbance):
 
     def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
         """Return the frame with drops where rays ended on them."""
-        wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * NEAR)
+        wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * DROP_RANGE)
         near = random.random(len(frame))
         places = np.array([sensor.xyz for sensor in sensors])[frame.sensor]
         way = frame.points - places
         distance = np.linalg.norm(way, axis=1)
-        drop = places + way * (near * np.minimum(NEAR, distance) / np.maximum(distance, 1e-9))[:, None]
+        drop = places + way * (near * np.minimum(DROP_RANGE, distance) / np.maximum(distance, 1e-9))[:, None]
         return _recounted(
             replace(
                 frame,
                 points=np.where(wet[:, None], drop, frame.points).astype(np.float32),
                 intensity=np.where(wet, np.float32(DROP_INTENSITY), frame.intensity),
-                instance=np.where(wet, np.int32(STATIC), frame.instance),
+                instance=np.where(wet, np.int32(STATIC_INSTANCE), frame.instance),
             )
         )
 
@@ -183,14 +183,14 @@ class OfOneSensor(Disturbance):
 
 @dataclass(frozen=True)
 class PositionError(OfOneSensor):
-    """A sensor is not where it is believed to be: its points lie beside what they are of, along `DIAGONAL`."""
+    """A sensor is not where it is believed to be: its points lie beside what they are of, along `ERROR_AXIS`."""
 
     name: ClassVar[str] = "sensor misplaced"
     unit: ClassVar[str] = "m"
 
     def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points moved."""
-        return _moved(frame, self.sensor, sensors[self.sensor].xyz, np.eye(3), self.size * DIAGONAL)
+        return _moved(frame, self.sensor, sensors[self.sensor].xyz, np.eye(3), self.size * ERROR_AXIS)
 
 
 @dataclass(frozen=True)
@@ -207,14 +207,14 @@ class YawError(OfOneSensor):
 
 @dataclass(frozen=True)
 class TiltError(OfOneSensor):
-    """A sensor leans where it is believed to be upright, in degrees about `DIAGONAL`."""
+    """A sensor leans where it is believed to be upright, in degrees about `ERROR_AXIS`."""
 
     name: ClassVar[str] = "tilt wrong"
     unit: ClassVar[str] = "°"
 
     def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
-        return _turned(frame, self, sensors, DIAGONAL)
+        return _turned(frame, self, sensors, ERROR_AXIS)
 
 
 @dataclass(frozen=True)
@@ -308,11 +308,11 @@ def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> F
     return replace(frame, points=points)
 
 
-POINTS = ("points", "sensor", "delay", "intensity", "instance")
+POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance")
 
 
 def _some(frame: Frame, kept: Boolean) -> Frame:
-    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINTS})
+    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINT_FIELDS})
 
 
 def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Frame:
@@ -320,7 +320,7 @@ def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Fra
     kept = [_some(one, of_one), _some(other, of_other)]
     sensor = np.concatenate([part.sensor for part in kept])
     order = np.argsort(sensor, kind="stable")
-    points = {name: np.concatenate([getattr(part, name) for part in kept])[order] for name in POINTS}
+    points = {name: np.concatenate([getattr(part, name) for part in kept])[order] for name in POINT_FIELDS}
     return _recounted(replace(one, **points))
 
 
@@ -328,7 +328,7 @@ def _recounted(frame: Frame) -> Frame:
     """Return the frame with the labels' returns counted anew."""
     labels = frame.labels
     most = max(int(labels.user.max(initial=0)), int(frame.instance.max(initial=0))) + 1
-    on_users = frame.instance != STATIC
+    on_users = frame.instance != STATIC_INSTANCE
     sensors = labels.points.shape[1]
     cell = frame.instance[on_users].astype(np.int64) * sensors + frame.sensor[on_users]
     counts = np.bincount(cell, minlength=most * sensors).reshape(most, sensors)

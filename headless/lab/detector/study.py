@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from headless.detection.average_precision import Evaluation
-from headless.detection.breakdown import ALONG_DISTANCE, ALONG_POINTS, Bin, false_by, recall_by
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, false_by, recall_by
 from headless.detection.case_study import ModelConfiguration, model_configurations, padded
 from headless.detection.detector import Detector
 from headless.detection.pillars import Filling, filling
@@ -44,10 +44,10 @@ from .trials import DisturbedTrial, EvaluatedDetector, TrialSite, trials
 Series = tuple[Disturbance, ...]
 """Disturbances of one kind, the mildest first."""
 
-ALONG_BORDER = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
+BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
 """Metres from the border of the region of interest, between which road users are counted."""
 
-LOOKED_AT = 8
+COUNTED_FRAMES = 8
 """Frames in which pillars are counted."""
 
 
@@ -516,13 +516,13 @@ def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
         name,
         score,
         {
-            "points": recall(by_sensor, "points", ALONG_POINTS),
-            "sensor": recall(by_sensor, "distance", ALONG_DISTANCE),
-            "border": recall(by_border, "distance", ALONG_BORDER),
+            "points": recall(by_sensor, "points", POINT_EDGES),
+            "sensor": recall(by_sensor, "distance", DISTANCE_EDGES),
+            "border": recall(by_border, "distance", BORDER_EDGES),
         },
         {
-            "sensor": false_by(by_sensor, "distance", ALONG_DISTANCE, score),
-            "border": false_by(by_border, "distance", ALONG_BORDER, score),
+            "sensor": false_by(by_sensor, "distance", DISTANCE_EDGES, score),
+            "border": false_by(by_border, "distance", BORDER_EDGES, score),
         },
     )
 
@@ -532,7 +532,7 @@ def _pillars(ground: TrialSite, configuration: SensorConfiguration, detector: De
     caps = (detector.settings.most_points, 8, 4, 2, 1)
     frames = [
         ground.simulator.frame(configuration, ground.runs[0], number)
-        for number in range(min(LOOKED_AT, len(ground.runs[0].times)))
+        for number in range(min(COUNTED_FRAMES, len(ground.runs[0].times)))
     ]
     counted = {}
     for cap in dict.fromkeys(caps):

@@ -14,7 +14,7 @@ from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
-from headless.detection.settings import GROUPS
+from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 
 import numpy as np
@@ -208,7 +208,7 @@ def _results(
                     frame,
                     cloud,
                     found,
-                    classes=tuple(GROUPS.values()),
+                    classes=tuple(CLASS_CATEGORIES.values()),
                     region=ground.simulator.static.region,
                     sensors=configuration.places,
                     run=run.name,

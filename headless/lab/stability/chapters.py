@@ -32,7 +32,7 @@ from .page import Chapter, Chart
 from .robustness_rows import pose_rows, robust_rows, traffic_rows
 from .solver_limits import solver_rows, solver_study
 
-FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
+RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
 
 DETECTOR_RUNS = 3
@@ -215,9 +215,7 @@ def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
 def failures(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Let a sensor fail, and ask for more than one look."""
     around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
-    study = yield from robust_study(
-        around, problem, stage.scope.robust, FAILURES, stage.surveyed.layout.settings.limits
-    )
+    study = yield from robust_study(around, problem, stage.scope.robust, RISKS, stage.surveyed.layout.settings.limits)
     robust_charts.save_spread_chart(stage.charts / "failures.png", study, f"{stage.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
     return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 from headless.convergence import (
     CANDIDATE_SPACINGS,
+    EVALUATION_SPACING,
     GRID_SPACINGS,
-    JUDGED_ON,
     Answer,
     Convergence,
     Judge,
@@ -24,7 +24,7 @@ import numpy as np
 import shapely
 
 from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.estimates import NORMAL, IntervalEstimate
+from seip_addon.core.estimates import NORMAL_QUANTILE, IntervalEstimate
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Deployment
@@ -45,13 +45,13 @@ from .shares import Share
 DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Metres."""
 
-RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
+BORDER_RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Distances in multiples of the border, between which targets are counted."""
 
-PLACES = 6
+POSITIONS_COUNTED = 6
 """Positions from which targets are counted for each sensor type and height."""
 
-CLEAR = 0.3
+SIGHT_CLEARANCE = 0.3
 """Metres before a target within which a line of sight may end on the road that the target lies on."""
 
 
@@ -133,7 +133,7 @@ class Draws:
     @property
     def spread_interval(self) -> tuple[float, float]:
         """Its 95 % interval, by the normal approximation of its logarithm."""
-        reach = math.exp(NORMAL / math.sqrt(2 * (len(self.coverage) - 1)))
+        reach = math.exp(NORMAL_QUANTILE / math.sqrt(2 * (len(self.coverage) - 1)))
         return self.spread / reach, self.spread * reach
 
     @property
@@ -268,7 +268,7 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float
     distance = np.linalg.norm(way, axis=1)
     elevation = np.arcsin(np.clip(way @ orientation[:, 2] / distance, -1.0, 1.0))
     end, _ = caster.cast(xyz, way / distance[:, None], float(distance.max()) + 1.0)
-    free: Boolean = end >= distance - CLEAR
+    free: Boolean = end >= distance - SIGHT_CLEARANCE
     free &= (distance >= model.min_range) & (distance <= model.max_range)
     free &= (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
     return free
@@ -300,19 +300,19 @@ def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) 
     """Count targets in view, and those seen, from upright sensors, by distance in multiples of the border."""
     caster, look, targets = make_ray_caster(site.triangles), visibility_model(site, settings), site.targets.xyz
     poses = site.candidates
-    total, seen = np.zeros(len(RATIOS) - 1, dtype=int), np.zeros(len(RATIOS) - 1, dtype=int)
+    total, seen = np.zeros(len(BORDER_RATIOS) - 1, dtype=int), np.zeros(len(BORDER_RATIOS) - 1, dtype=int)
     upright = (poses.sensor == model.key) & (poses.tilt == 0)
     for height in np.unique(poses.height[upright]):
         own = np.flatnonzero(upright & (poses.height == height))
-        for pose in own[np.linspace(0, len(own) - 1, PLACES).astype(int)]:
+        for pose in own[np.linspace(0, len(own) - 1, POSITIONS_COUNTED).astype(int)]:
             xyz, orientation = poses.xyz[pose], poses.orientation(pose)
             view = in_view(caster, model, xyz, orientation, targets)
             sees = look.see(model, xyz, orientation) & view
             ratio = np.hypot(*(targets - xyz)[:, :2].T) / unresolved_from(model, height, settings.delta, math.inf)
-            total += np.histogram(ratio[view], RATIOS)[0]
-            seen += np.histogram(ratio[sees], RATIOS)[0]
+            total += np.histogram(ratio[view], BORDER_RATIOS)[0]
+            seen += np.histogram(ratio[sees], BORDER_RATIOS)[0]
     shares = (Share(int(s), int(t)) if t else None for s, t in zip(seen, total, strict=True))
-    return SeenByRatio(model.key, RATIOS, tuple(shares))
+    return SeenByRatio(model.key, BORDER_RATIOS, tuple(shares))
 
 
 def _by_delta(
@@ -433,7 +433,7 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 method="placement",
                 regime=what,
                 begins=f"loses up to {100 * (finest - worst.judged):.2f} points of coverage ({spacing:g} m)",
-                how=f"best placements under each spacing, judged on targets {JUDGED_ON:g} m apart",
+                how=f"best placements under each spacing, judged on targets {EVALUATION_SPACING:g} m apart",
                 answer=f"--tolerance {study.convergence.tolerance:g} picks {picked:g} m",
             )
         )

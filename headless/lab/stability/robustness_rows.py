@@ -5,7 +5,7 @@ import numpy as np
 from seip_addon.core.estimates import mean_of
 from seip_addon.core.robustness.pose_study import PoseStudy
 from seip_addon.core.robustness.robust_study import RobustStudy
-from seip_addon.core.robustness.traffic_study import MOSTLY, NOTABLE, WHAT, TrafficStudy
+from seip_addon.core.robustness.traffic_study import LAYER_NAMES, MOSTLY_SEEN_SHARE, NOTABLE_LOSS, TrafficStudy
 
 from .rows import Row
 
@@ -82,19 +82,19 @@ def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     )
     losses = tuple(
         Row(
-            f"view of the {WHAT[layer]}",
+            f"view of the {LAYER_NAMES[layer]}",
             regime,
             f"of the targets' weight the empty road promises {seen.empty:.2%} and traffic leaves "
             f"{seen.held.describe()} on average over time; of what the empty road promises vehicles hide "
-            f"{seen.hidden.describe()}, and {seen.rarely:.1%} of its targets are seen less than {MOSTLY:.0%} of the "
-            "time",
+            f"{seen.hidden.describe()}, and {seen.rarely:.1%} of its targets are seen less than "
+            f"{MOSTLY_SEEN_SHARE:.0%} of the time",
             how,
-            f"a warning where {NOTABLE:.0%} of the weight or more is lost, and a map of the share of time",
+            f"a warning where {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
         )
         for layer, seen in study.empty.seen.items()
     )
     gain = Row(
-        f"placement for the empty road, to see the {WHAT[study.layer]}",
+        f"placement for the empty road, to see the {LAYER_NAMES[study.layer]}",
         regime,
         f"placing on traffic holds {study.traffic.seen[study.layer].held.describe()}, "
         f"{study.won(study.layer).as_points()} more",

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 
-TIE = 1e-9
+TIE_TOLERANCE = 1e-9
 """Placements count as equal when they differ by less than this fraction of all weight, or of the price."""
 
 
@@ -113,7 +113,7 @@ class PlacementProblem:
             return most
         cheapest = np.full(len(positions), math.inf)
         np.minimum.at(cheapest, position, self.prices[self.allowed])
-        affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE))
+        affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE_TOLERANCE))
         return min(most, max(1, int(affordable)))
 
     def covered(self, chosen: Integer) -> float:

@@ -30,7 +30,7 @@ _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
 
 
-WIDEST, STEEPEST = 100.0, 1.0
+MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0
 """Metres and radians: larger standard deviations are slips of the keyboard."""
 
 
@@ -49,10 +49,10 @@ class PoseErrors:
     """
 
     position: float = setting(
-        0.3, "standard deviation of x and of y", unit="m", maximum=WIDEST, option="position-error", metavar="M"
+        0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD, option="position-error", metavar="M"
     )
     height: float = setting(
-        0.3, "as of the position if not given", unit="m", maximum=WIDEST, option="height-error", metavar="M"
+        0.3, "as of the position if not given", unit="m", maximum=MAX_OFFSET_STD, option="height-error", metavar="M"
     )
     yaw: float = setting(
         math.radians(2.0),
@@ -66,7 +66,7 @@ class PoseErrors:
         math.radians(2.0),
         "standard deviation of pitch and of roll",
         unit="rad",
-        maximum=STEEPEST,
+        maximum=MAX_ANGLE_STD,
         option="tilt-error",
         metavar="DEG",
     )
@@ -74,9 +74,9 @@ class PoseErrors:
     def __post_init__(self) -> None:
         for name in ("position", "height"):
             value = getattr(self, name)
-            if not 0 <= value <= WIDEST:
-                raise SeipError(f"the error of {name} must be 0 to {WIDEST:g} m, not {value:g} m")
-        for name, most in (("tilt", STEEPEST), ("yaw", math.pi)):
+            if not 0 <= value <= MAX_OFFSET_STD:
+                raise SeipError(f"the error of {name} must be 0 to {MAX_OFFSET_STD:g} m, not {value:g} m")
+        for name, most in (("tilt", MAX_ANGLE_STD), ("yaw", math.pi)):
             value = getattr(self, name)
             if not 0 <= value <= most:
                 limit, shown = math.degrees(most), math.degrees(value)
@@ -84,10 +84,10 @@ class PoseErrors:
 
     def alone(self, kind: str) -> PoseErrors:
         """Return the errors of one kind, with nothing else wrong."""
-        return replace(self, **{name: 0.0 for name in KINDS if name != kind})
+        return replace(self, **{name: 0.0 for name in ERROR_KINDS if name != kind})
 
 
-KINDS = tuple(field.name for field in fields(PoseErrors))
+ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
 """What can be wrong with a pose."""
 
 

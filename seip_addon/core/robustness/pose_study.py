@@ -18,13 +18,13 @@ from ..estimates import IntervalEstimate, mean_of, quantile_of
 from ..placement.deployment import Deployment
 from ..progress import Progress
 from ..site.site import Site
-from .pose_errors import KINDS, PoseErrors
+from .pose_errors import ERROR_KINDS, PoseErrors
 from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
 QUANTILES = (0.05, 0.5, 0.95)
 
-NOTABLE = 0.01
+NOTABLE_LOSS = 0.01
 """Share of the targets whose loss, in one of twenty draws, a user should know of."""
 
 
@@ -143,7 +143,7 @@ def pose_study(
     planned = as_planned.seen(0)
     together, blocked = yield from views(settings.errors, settings.draws)
     by_kind = {}
-    for kind in KINDS:
+    for kind in ERROR_KINDS:
         if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
             of_kind, _ = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
             by_kind[kind] = _coverages(site, [of_kind.seen(draw) for draw in range(len(of_kind))])
@@ -173,7 +173,7 @@ def _one_errs(site: Site, planned: Boolean, together: ScenarioVisibility, number
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
     """Say where a placement does not hold what was planned, in sentences."""
     lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
-    return (pose_message(study),) if lost >= NOTABLE else ()
+    return (pose_message(study),) if lost >= NOTABLE_LOSS else ()
 
 
 def pose_message(study: PoseStudy) -> str:

@@ -18,10 +18,10 @@ from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
-LOW = 0.05
+LOW_QUANTILE = 0.05
 """The quantile that judges."""
 
-RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
+COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 """That are compared where nothing else is asked for."""
 
 
@@ -87,7 +87,7 @@ class Contender:
     @property
     def low(self) -> IntervalEstimate:
         """The 5 % quantile over unseen draws."""
-        return quantile_of(self.unseen, LOW)
+        return quantile_of(self.unseen, LOW_QUANTILE)
 
     @property
     def mean(self) -> IntervalEstimate:
@@ -124,12 +124,12 @@ class RobustStudy:
 
     def saving(self, contender: Contender) -> IntervalEstimate:
         """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
-        return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW)
+        return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW_QUANTILE)
 
     def is_converged(self, contender: Contender) -> bool:
         """Whether half of the unseen draws say the same of it: estimates whose intervals meet."""
         half = len(contender.unseen) // 2
-        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW)
+        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW_QUANTILE)
         return saved.agrees_with(self.saving(contender))
 
 
@@ -137,7 +137,7 @@ def robust_study(
     around: Surroundings,
     problem: PlacementProblem,
     settings: RobustnessSettings,
-    risks: Sequence[Risk] = RISKS,
+    risks: Sequence[Risk] = COMPARED_RISKS,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, RobustStudy]:
     """Place for the poses as planned and for each risk, and judge all by unseen draws.

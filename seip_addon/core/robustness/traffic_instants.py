@@ -18,7 +18,7 @@ from ..traffic.bodies import fitted_body
 WARM_UP = 2.0
 """Seconds from the first sample of a run to the first instant that is looked at."""
 
-STRETCH = 12.0
+BATCH_SECONDS = 12.0
 """Seconds of a run whose instants count as one draw: what stands in the way at one stays there for some of them."""
 
 _MARGIN = 1e-3
@@ -102,7 +102,7 @@ def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Ins
     drawn = (np.arange(number) + np.random.default_rng(seed).random(number)) * before[-1] / number
     run = np.searchsorted(before[1:-1], drawn, side="right")
     into = drawn - before[run]
-    parts = np.maximum(np.rint(lasts / STRETCH), 1).astype(np.int64)
+    parts = np.maximum(np.rint(lasts / BATCH_SECONDS), 1).astype(np.int64)
     part = np.minimum(into / lasts[run] * parts[run], parts[run] - 1).astype(np.int64)
     return Instants(tuple(runs), run, begin[run] + into, np.concatenate([[0], np.cumsum(parts)])[run] + part)
 

@@ -21,19 +21,19 @@ from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
-from .visibility_in_traffic import HEIGHT, TrafficLayer, visibility_in_traffic
+from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_traffic
 from .visibility_under_errors import Surroundings
 
-NOTABLE = 0.01
+NOTABLE_LOSS = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
 
 IN_TRAFFIC = "in traffic"
 """How sentences about traffic begin."""
 
-MOSTLY = 0.9
+MOSTLY_SEEN_SHARE = 0.9
 """Share of time from which on a target counts as mostly seen."""
 
-WHAT: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {HEIGHT:g} m above the road"}
+LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
 """What is seen, in words."""
 
 
@@ -100,8 +100,8 @@ class TrafficCoverage:
 
     @property
     def rarely(self) -> float:
-        """Of the targets seen on the empty road, the share that is seen less than `MOSTLY` of the time."""
-        return float((self.time[self.empty_targets] < MOSTLY).mean()) if self.empty_targets.any() else 0.0
+        """Of the targets seen on the empty road, the share that is seen less than `MOSTLY_SEEN_SHARE` of the time."""
+        return float((self.time[self.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if self.empty_targets.any() else 0.0
 
     def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
         """Estimate how much more of the weight is seen than by another placement at the same instants."""
@@ -117,7 +117,7 @@ class JudgedInTraffic:
     name : str
         What it was chosen for.
     seen : mapping of {"road", "height"} to TrafficCoverage
-        Of the targets, and of the points `HEIGHT` metres above them.
+        Of the targets, and of the points `LAYER_HEIGHT` metres above them.
     """
 
     name: str
@@ -251,10 +251,10 @@ def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
     losses = tuple(
         f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
-        f"{seen.held.value:.1%} of the {WHAT[layer]} on average over time, not {seen.empty:.1%}: "
+        f"{seen.held.value:.1%} of the {LAYER_NAMES[layer]} on average over time, not {seen.empty:.1%}: "
         f"{seen.lost.value:.1%} less"
         for layer, seen in study.empty.seen.items()
-        if seen.lost.value >= NOTABLE
+        if seen.lost.value >= NOTABLE_LOSS
     )
     won = study.won(study.layer)
     if won.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):

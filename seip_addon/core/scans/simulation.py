@@ -216,12 +216,12 @@ def frame_times(
         raise SeipError(f"{slowest.label} turns {fastest:g} times a second: ask for a rate from 0 to {fastest:g} Hz")
     start = begin if start is None else start
     duration = end - start if duration is None else duration
-    if not (begin <= start <= end and 0 <= duration <= end - start + _SLACK):
+    if not (begin <= start <= end and 0 <= duration <= end - start + _TIME_TOLERANCE):
         raise SeipError(f"the traffic is known from {begin:g} s to {end:g} s: choose start and duration within that")
-    return start + np.arange(math.floor(duration * rate + _SLACK) + 1) / rate
+    return start + np.arange(math.floor(duration * rate + _TIME_TOLERANCE) + 1) / rate
 
 
-_SLACK = 1e-6
+_TIME_TOLERANCE = 1e-6
 """Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
 
 

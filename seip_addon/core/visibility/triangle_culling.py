@@ -18,7 +18,7 @@ import shapely
 from ..arrays import Boolean, Float
 from .near_surfaces import caster_tolerance
 
-_ROUNDNESS = 1.01  # how much farther than δ the corners of the polygon lie that stands for a circle
+_POLYGON_FACTOR = 1.01  # how much farther than δ the corners of the polygon lie that stands for a circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +79,12 @@ def needed_triangles(triangles: Float, poses: Float, targets: Float, delta: floa
     NeededTriangles
     """
     tolerance = caster_tolerance(triangles)
-    radius = (delta + tolerance) * _ROUNDNESS
+    radius = (delta + tolerance) * _POLYGON_FACTOR
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     bottom = min(poses[:, 2].min(), targets[:, 2].min() - radius) - tolerance
     top = max(poses[:, 2].max(), targets[:, 2].max() + radius) + tolerance
     around_targets = shapely.MultiPoint(targets[:, :2]).convex_hull.buffer(radius)
-    around_poses = shapely.MultiPoint(poses[:, :2]).convex_hull.buffer(tolerance * _ROUNDNESS)
+    around_poses = shapely.MultiPoint(poses[:, :2]).convex_hull.buffer(tolerance * _POLYGON_FACTOR)
     plan = around_poses.union(around_targets).convex_hull
     shapely.prepare(plan)
     in_plan = shapely.box(*low[:, :2].T, *high[:, :2].T)

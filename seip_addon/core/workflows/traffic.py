@@ -15,7 +15,7 @@ from ..placement.objective import Objective, Solution, placement_problem, with_c
 from ..progress import Progress
 from ..robustness.traffic_instants import check_runs, spread_instants
 from ..robustness.traffic_presence import road_user_seconds
-from ..robustness.traffic_study import WHAT, TrafficStudy, look_at_traffic, traffic_study, traffic_warnings
+from ..robustness.traffic_study import LAYER_NAMES, TrafficStudy, look_at_traffic, traffic_study, traffic_warnings
 from ..robustness.visibility_in_traffic import TrafficLayer
 from ..settings import setting
 from ..site.site import Site
@@ -135,8 +135,8 @@ def place_in_traffic(
     study = yield from traffic_study(around, problem, scenarios, judged, layout.settings.limits)
     placement = study.traffic.placement
     note = (
-        f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "
-        "bound and gap are of that"
+        f"chosen to see the {LAYER_NAMES[study.layer]} in traffic, on average over {study.chosen_at} instants: "
+        "objective, bound and gap are of that"
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
