@@ -35,12 +35,12 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     )
     held = bars(findings.costs, findings.runs, names, findings.scans)
     for bar in held:
-        runtime.say(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
-    with runtime.writing(options.output):
+        runtime.print_line(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
+    with runtime.incomplete_if_interrupted(options.output):
         save_charts(options.output / "benchmark", findings)
         save_json(options.output / "benchmark" / "benchmark.json", findings, held)
         save_page(options.output / "benchmark.md", findings, held, "benchmark")
-    runtime.say(f"results: {options.output / 'benchmark.md'}")
+    runtime.print_line(f"results: {options.output / 'benchmark.md'}")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 python -m headless.compare_detectors scenes/junction.blend -o docs/detector
 
-Every setting trains for the same number of steps on all placements, and is judged on the same frames. Seconds
+Every setting trains for the same number of steps on all placements, and is evaluated on the same frames. Seconds
 are those that one core works, whatever else the machine does.
 """
 
@@ -82,11 +82,11 @@ def main(argv: list[str]) -> None:
     title = (
         f"{study.surveyed.layout.site.name}: mean over {len(study.configurations)} placements, {options.steps} steps"
     )
-    with runtime.writing(options.output):
+    with runtime.incomplete_if_interrupted(options.output):
         save_setting_chart(options.output / "settings.png", settings, title)
         save_json(options.output / "settings.json", [vars(setting) for setting in settings])
     for setting in settings:
-        runtime.say(
+        runtime.print_line(
             f"{setting.family}, {setting.name}: AP {setting.average_precision:.1%}, "
             f"training {setting.training:.0f} s, inference {setting.inference:.0f} ms"
         )

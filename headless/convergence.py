@@ -1,6 +1,6 @@
 """The coarsest spacings of targets and of candidates whose answer stays within a tolerance.
 
-An answer is the best placement under some settings; it is judged on a fine grid of
+An answer is the best placement under some settings; it is evaluated on a fine grid of
 targets, the same for all. First the spacing of the targets is sought, then that of the
 candidates: from coarse to fine until the answer is as good as that of the finest. To stop
 where two spacings in a row agree would be quicker, but they agree too easily: which of a
@@ -35,10 +35,10 @@ COARSE_CANDIDATE_SPACING = 8.0
 """Metres between posts while the spacing of the targets is sought."""
 
 EVALUATION_SPACING = 0.35
-"""Metres between the targets on which answers are judged."""
+"""Metres between the targets on which answers are evaluated."""
 
 MAX_EVALUATION_TARGETS = 400_000
-"""Targets to judge on; a larger place is judged on a coarser grid."""
+"""Targets to evaluate on; a larger place is evaluated on a coarser grid."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Answer:
         How many these lay.
     own : float
         Share of the targets' weight that it sees, on its own grid.
-    judged : float
+    evaluated : float
         The same on the fine grid.
     """
 
@@ -61,7 +61,7 @@ class Answer:
     targets: int
     poses: int
     own: float
-    judged: float
+    evaluated: float
 
 
 @dataclass(frozen=True)
@@ -76,26 +76,26 @@ class Convergence:
         Share of the weight within which answers agree.
     by_grid, by_candidates : tuple of Answer
         What was tried, from coarse to fine; the last is the finest, with which the others are compared.
-    judged_on : float, metres
-        Spacing of the grid that judged.
+    evaluation_spacing : float, metres
+        Spacing of the grid that evaluated.
     """
 
     settings: SurveySettings
     tolerance: float
     by_grid: tuple[Answer, ...]
     by_candidates: tuple[Answer, ...]
-    judged_on: float
+    evaluation_spacing: float
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """What was picked and why."""
         grid, finest = self.by_grid[-2:]
         posts, most = self.by_candidates[-2:]
         return (
             f"picked for a tolerance of {self.tolerance:g}: targets {grid.grid_spacing:g} m apart, whose placement "
-            f"covers {grid.judged:.2%} against {finest.judged:.2%} with {finest.grid_spacing:g} m; "
-            f"posts {posts.candidate_spacing:g} m apart, {posts.judged:.2%} against {most.judged:.2%} "
-            f"with {most.candidate_spacing:g} m; all judged on targets {self.judged_on:g} m apart"
+            f"covers {grid.evaluated:.2%} against {finest.evaluated:.2%} with {finest.grid_spacing:g} m; "
+            f"posts {posts.candidate_spacing:g} m apart, {posts.evaluated:.2%} against {most.evaluated:.2%} "
+            f"with {most.candidate_spacing:g} m; all judged on targets {self.evaluation_spacing:g} m apart"
         )
 
 
@@ -138,19 +138,19 @@ def coarsest_settings(
                 f"{name!r} is no pole: a tolerance lays posts on the pavement anew, under other names; "
                 "draw a forbidden or mandatory area instead, or give --grid and --spacing"
             )
-    judge = Judge(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, goal)
 
     def answer(grid_spacing: float, candidate_spacing: float) -> Generator[Progress, None, Answer]:
         candidates = replace(settings.candidates, spacing=candidate_spacing)
         tried = replace(settings, candidates=candidates, grid_spacing=grid_spacing)
-        return (yield from judge.answer(tried))
+        return (yield from evaluator.answer(tried))
 
     share = tolerance / 2
     finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATE_SPACING)
     by_grid = yield from _until_as_good(
         GRID_SPACINGS,
         lambda spacing: answer(spacing, COARSE_CANDIDATE_SPACING),
-        lambda found: abs(found.own - found.judged) <= share and finest.judged - found.judged <= share,
+        lambda found: abs(found.own - found.evaluated) <= share and finest.evaluated - found.evaluated <= share,
         "spacing of the targets",
     )
     grid_spacing = by_grid[-1].grid_spacing
@@ -159,7 +159,7 @@ def coarsest_settings(
     by_candidates = yield from _until_as_good(
         CANDIDATE_SPACINGS,
         lambda spacing: answer(grid_spacing, spacing),
-        lambda found: most.judged - found.judged <= share,
+        lambda found: most.evaluated - found.evaluated <= share,
         "spacing of the candidates",
     )
     candidates = replace(settings.candidates, spacing=by_candidates[-1].candidate_spacing)
@@ -168,19 +168,19 @@ def coarsest_settings(
         tolerance=tolerance,
         by_grid=(*by_grid, finest),
         by_candidates=(*by_candidates, most),
-        judged_on=judge.site.targets.spacing,
+        evaluation_spacing=evaluator.site.targets.spacing,
     )
-    reasoned = replace(convergence.settings, spacings_because=convergence.sentence)
+    reasoned = replace(convergence.settings, spacings_because=convergence.message)
     return replace(convergence, settings=reasoned)
 
 
-class Judge:
-    """Answers a goal under any settings of the grids, and judges the answers on one fine grid.
+class Evaluator:
+    """Answers a goal under any settings of the grids, and evaluates the answers on one fine grid.
 
     Parameters
     ----------
     settings : SurveySettings
-        δ and the sensor types that judge.
+        δ and the sensor types of the evaluation.
     """
 
     def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Objective) -> None:
@@ -193,20 +193,20 @@ class Judge:
         self._visibility: VisibilityModel = visibility_model(self.site, settings.visibility, settings.engine)
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
-        """Find the best placement under some settings, and judge it."""
+        """Find the best placement under some settings, and evaluate it."""
         site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach())
-        plan = yield from self.plan(site, settings)
-        seen = plan.deployment.seen_by > 0
+        solution = yield from self.solve(site, settings)
+        seen = solution.deployment.seen_by > 0
         return Answer(
             grid_spacing=settings.grid_spacing,
             candidate_spacing=settings.candidates.spacing,
             targets=len(site.targets),
             poses=len(site.candidates),
             own=weighted_share(seen, target_weights(site, self._goal)),
-            judged=self.judge(plan),
+            evaluated=self.evaluate(solution),
         )
 
-    def plan(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
+    def solve(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
         """Return the best placement on a site."""
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
         return (
@@ -219,10 +219,10 @@ class Judge:
             )
         )
 
-    def judge(self, plan: Solution) -> float:
+    def evaluate(self, solution: Solution) -> float:
         """Return the share of the fine grid's weight that a placement sees."""
         seen = np.zeros(len(self.site.targets), dtype=bool)
-        for sensor in plan.deployment.sensors:
+        for sensor in solution.deployment.sensors:
             seen |= self._visibility.see(sensor.model, sensor.xyz, sensor.orientation)
         return weighted_share(seen, self.weights)
 

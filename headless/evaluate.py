@@ -36,7 +36,7 @@ from seip_addon.core.scans import ScanSettings, static_scene
 
 
 def main(argv: list[str]) -> None:
-    """Place, simulate, train, judge, and write charts and tables to a folder."""
+    """Place, simulate, train, evaluate, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
     if options.seeds < 1:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
@@ -63,7 +63,7 @@ def main(argv: list[str]) -> None:
     claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
     site = study.surveyed.layout.site
-    with runtime.writing(folder):
+    with runtime.incomplete_if_interrupted(folder):
         results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
@@ -76,11 +76,11 @@ def main(argv: list[str]) -> None:
         )
         save_claims(folder / "claims_5_to_9.md", claims, site.name)
     for line in study_results.in_words(results):
-        runtime.say(line)
+        runtime.print_line(line)
     for claim in claims:
-        runtime.say(claim.describe())
-    runtime.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
-    runtime.say(f"written to {folder}/")
+        runtime.print_line(claim.describe())
+    runtime.print_line(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    runtime.print_line(f"written to {folder}/")
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ def read_settings(kind: type[Options], options: argparse.Namespace, **values: An
     return kind(**values)
 
 
-def add_goal(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+def add_objective(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     """Add what a goal is made of to a command, but for a coverage to reach, and return the group."""
     goal = parser.add_argument_group("goal")
     add_settings(goal, Objective, "count", "budget")
@@ -54,8 +54,8 @@ def add_goal(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     return goal
 
 
-def read_goal(options: argparse.Namespace) -> Objective:
-    """Return the goal that options of `add_goal` name."""
+def read_objective(options: argparse.Namespace) -> Objective:
+    """Return the goal that options of `add_objective` name."""
     weight = "scene" if options.weighted and options.central_weight is None else options.central_weight
     return read_settings(Objective, options, central_weight=weight)
 

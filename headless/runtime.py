@@ -56,7 +56,7 @@ ELAPSED_FORMAT = "{desc} [{elapsed}]"
 """How progress of unknown length is shown."""
 
 LOG = logging.getLogger("headless")
-"""What commands and their modules report on the way; `say` is for results."""
+"""What commands and their modules report on the way; `print_line` is for results."""
 
 _LOCKS: dict[Path, int] = {}
 """Folders that this process has locked, and what holds each lock."""
@@ -104,7 +104,7 @@ def check_folder(folder: Path) -> None:
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[None]:
+def incomplete_if_interrupted(folder: Path) -> Iterator[None]:
     """Say of an interruption from here on that the folder is incomplete: each file in it is whole, but some lack."""
     try:
         yield
@@ -112,7 +112,7 @@ def writing(folder: Path) -> Iterator[None]:
         raise KeyboardInterrupt(f"stopped while writing: the results in {folder} are incomplete") from stop
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Print a line for the person who runs the command, at once."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()

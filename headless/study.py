@@ -34,7 +34,7 @@ def main(argv: list[str]) -> None:
     study = surveyed.stopwatch.run("study", steps)
     claims = coverage_claims(study)
 
-    with runtime.writing(folder):
+    with runtime.incomplete_if_interrupted(folder):
         save_study_table(folder / "coverage.csv", study)
         save_height_chart(folder / "heights.png", study, site.name)
         weighted = site.targets.central.any()
@@ -48,8 +48,8 @@ def main(argv: list[str]) -> None:
                     save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
-        runtime.say(claim.describe())
-    runtime.say(f"written to {folder}/")
+        runtime.print_line(claim.describe())
+    runtime.print_line(f"written to {folder}/")
 
 
 def _parser() -> argparse.ArgumentParser:

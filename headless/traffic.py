@@ -66,7 +66,7 @@ def main(argv: list[str]) -> None:
     if options.animate is not None:
         animate(bpy.context.scene, trajectories)
         save_blend(options.animate)
-    runtime.say(f"{options.output}: {_in_words(trajectories)}")
+    runtime.print_line(f"{options.output}: {_in_words(trajectories)}")
 
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:

@@ -36,7 +36,7 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
     """Draw the distribution of coverage over unseen draws for each placement, as PNG.
 
     Steps are empirical distribution functions; a mark on the 5 % line is the quantile with its interval, a tick
-    on the axis what the placement covers as planned. Coverage is what a placement is judged by: after a loss, or by
+    on the axis what the placement covers as planned. Coverage is what a placement is evaluated by: after a loss, or by
     several sensors, where it was chosen for that.
     """
     figure, (axes,) = new_figure(*FIGURE_SIZE)
@@ -89,12 +89,12 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
 
 
 def _outcome(study: RobustStudy) -> str:
-    """Name what placements are judged by, if it is one thing."""
+    """Name what placements are evaluated by, if it is one thing."""
     return study.nominal[0].judged_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
-    """Name a placement, and the nominal optimum, of which there are several then, with what it is judged by."""
+    """Name a placement, and the nominal optimum, of which there are several then, with what it is evaluated by."""
     several = len(study.nominal) > 1 and contender in study.nominal
     name = f"{contender.name}: {contender.judged_by.describe_outcome()}" if several else contender.name
     return fill(name, LEGEND_LETTERS)

@@ -22,7 +22,7 @@ from seip_addon.core.pictures.drawing import draw_sensors
 from seip_addon.core.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
 from seip_addon.core.pictures.plan_view import MAX_GAP, draw_area
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.robustness.traffic_study import LAYER_NAMES, JudgedInTraffic, TrafficStudy
+from seip_addon.core.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.target_squares import target_squares
@@ -41,7 +41,7 @@ def save_time_map(  # what is drawn, and where
     geometry: SceneGeometry,
     site: Site,
     deployment: Deployment,
-    placed: JudgedInTraffic,
+    placed: TrafficEvaluation,
     title: str,
 ) -> None:
     """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
@@ -52,7 +52,7 @@ def save_time_map(  # what is drawn, and where
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
         panel.set_title(
-            f"{LAYER_NAMES[layer]}: {seen.held.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10
+            f"{LAYER_NAMES[layer]}: {seen.mean.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10
         )
         panel.set(xticks=(), yticks=())
         _draw_shares(panel, site, seen.time)
@@ -67,7 +67,7 @@ def save_time_map(  # what is drawn, and where
     save_chart(path, figure, title)
 
 
-def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
+def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
     """Draw what placements for the empty road promise and hold in traffic beside those chosen on traffic, as PNG.
 
     Parameters
@@ -83,10 +83,10 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
         [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
         "promised, empty road",
     )
-    _bars(shares, 0, [empty.held for empty, _ in rows], "held in traffic")
-    _bars(shares, 1, [traffic.held for _, traffic in rows], "held, placed on traffic")
+    _bars(shares, 0, [empty.mean for empty, _ in rows], "held in traffic")
+    _bars(shares, 1, [traffic.mean for _, traffic in rows], "held, placed on traffic")
     shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)
-    _dots(changes, -0.5, [negative(empty.lost) for empty, _ in rows], 1, "lost to traffic")
+    _dots(changes, -0.5, [negative(empty.loss) for empty, _ in rows], 1, "lost to traffic")
     _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "won by placing on traffic")
     changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
     changes.set_ylabel("change, 95 % interval", color=INK)

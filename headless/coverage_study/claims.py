@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
-from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, judge, judge_all
+from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, verdict, worst_verdict
 
 from .cells import CENTRAL_WEIGHTS, COUNTS, Case, CoverageStudy, Span
 
@@ -38,13 +38,13 @@ def _more_is_better(study: CoverageStudy) -> Claim:
     ]
     verdicts += [_rises(shares[b, n], shares[a, n]) for a, b in pairwise(study.sensors) for n in COUNTS]
     gain = _gain(shares[best, most], shares[best, few])
-    verdicts.append(UNDECIDED if gain is None else judge(holds=gain[1] < MIN_CHANGE, fails=gain[0] >= MIN_CHANGE))
+    verdicts.append(UNDECIDED if gain is None else verdict(holds=gain[1] < MIN_CHANGE, fails=gain[0] >= MIN_CHANGE))
     rows = [f"{sensor} " + ", ".join(_found(shares[sensor, n]) for n in COUNTS) for sensor in study.sensors]
     gained = "" if gain is None else f"; {best} gains {_range(gain)} from N = {few} to {most}"
     return Claim(
         1,
         f"coverage rises with N and with a better type; for {best} the gain is negligible",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"N = {', '.join(map(str, COUNTS))}: {'; '.join(rows)}{gained}",
     )
 
@@ -62,7 +62,7 @@ def _four_of_the_best(study: CoverageStudy) -> Claim:
     return Claim(
         2,
         text,
-        judge_all([judge(holds=_is_full(share), fails=share[1] < 1), judge(holds=spare, fails=settled)]),
+        worst_verdict([verdict(holds=_is_full(share), fails=share[1] < 1), verdict(holds=spare, fails=settled)]),
         f"{_found(share)} with {used} of {most} sensors used",
     )
 
@@ -83,7 +83,7 @@ def _heights(study: CoverageStudy) -> Claim:
     return Claim(
         3,
         f"{study.sensors[0]} does best at {lowest:g} m; the other types prefer higher, at every N",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"best height at N = {', '.join(map(str, COUNTS))}: {'; '.join(rows)}",
     )
 
@@ -107,7 +107,7 @@ def _weighting(study: CoverageStudy) -> Claim:
     return Claim(
         4,
         "weighting raises central coverage of all but the best type without hurting the whole; the best gains nothing",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"N = {COUNTS[-1]}, best weight that costs the whole under {MIN_CHANGE:.0%}: {'; '.join(rows)}; where several "
         "placements are best, the figures are those of the one returned",
     )
@@ -139,13 +139,13 @@ def _is_proven(case: Case) -> bool:
 def _greedy(study: CoverageStudy) -> Claim:
     promise = 1 - 1 / math.e
     reached = [(case.greedy.objective, *case.span) for case in study.cases]
-    verdicts = [judge(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
+    verdicts = [verdict(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
     worst = min(value / high for value, _, high in reached)
     short = sum(value < low * (1 - 1e-9) for value, low, _ in reached)
     return Claim(
         10,
         "greedy reaches 1 − 1/e of the optimum",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"at worst {worst:.1%} of the bound; below the integer program in {short} of {len(reached)} cells",
     )
 
@@ -155,7 +155,7 @@ def _rises(more: Span | None, less: Span | None) -> str:
     if more is None or less is None:
         return UNDECIDED
     full = 1 - MIN_CHANGE
-    return judge(
+    return verdict(
         holds=more[0] - less[1] > MIN_CHANGE or less[0] >= full,
         fails=more[1] - less[0] <= MIN_CHANGE and less[1] < full,
     )
@@ -164,7 +164,7 @@ def _rises(more: Span | None, less: Span | None) -> str:
 def _exceeds(more: Span | None, less: Span | None) -> str:
     if more is None or less is None:
         return UNDECIDED
-    return judge(holds=more[0] > less[1], fails=more[1] <= less[0])
+    return verdict(holds=more[0] > less[1], fails=more[1] <= less[0])
 
 
 def _is_full(span: Span | None) -> bool:

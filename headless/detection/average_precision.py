@@ -31,7 +31,7 @@ MISSED_SCORE = -np.inf
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedDetections:
-    """The judged detections of all frames, best first; d of them.
+    """The evaluated detections of all frames, best first; d of them.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
             f"{rule.fewest_points} returns or more: there is no average precision without one, so evaluate on frames "
             "with traffic"
         )
-    return Evaluation(rule, _judged(frames, matches), _wanted(frames, matches), _blocks(frames))
+    return Evaluation(rule, _evaluated(frames, matches), _wanted(frames, matches), _blocks(frames))
 
 
 def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
@@ -207,7 +207,7 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
     Parameters
     ----------
     detections : (d,) bool
-        Of the judged detections. Who found whom stays as it was.
+        Of the evaluated detections. Who found whom stays as it was.
     wanted : (t,) bool
         Of the road users that count.
     """
@@ -233,7 +233,7 @@ def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> CountedT
     return _rows(everyone, np.concatenate([found.counted for found in matches]))
 
 
-def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> EvaluatedDetections:
+def _evaluated(frames: Sequence[FrameResult], matches: Sequence[Match]) -> EvaluatedDetections:
     found, pairs = [frame.detected for frame in frames], list(zip(frames, matches, strict=True))
     everything = EvaluatedDetections(
         score=np.concatenate([boxes.score for boxes in found]),
@@ -243,8 +243,8 @@ def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Evaluate
         points=np.concatenate([one.of_found(f.truth.points, f.detected.points) for f, one in pairs]),
         distance=np.concatenate([one.of_found(f.truth.distance, f.detected.distance) for f, one in pairs]),
     )
-    judged = np.nonzero(np.concatenate([one.judged for one in matches]))[0]
-    return _rows(everything, judged[np.argsort(-everything.score[judged], kind="stable")])
+    evaluated = np.nonzero(np.concatenate([one.evaluated for one in matches]))[0]
+    return _rows(everything, evaluated[np.argsort(-everything.score[evaluated], kind="stable")])
 
 
 def _rows(table: Table, rows: Boolean | Integer) -> Table:

@@ -2,7 +2,7 @@
 
 Placements come from the integer program, clouds from simulated traffic. One
 detector learns from all placements at once (or one from each), several times
-with other seeds, and is judged with each placement on traffic that none has
+with other seeds, and is evaluated with each placement on traffic that none has
 seen.
 """
 
@@ -74,7 +74,7 @@ class Traffic:
     Parameters
     ----------
     training, validation, test : tuple of SampledRun
-        To learn from, to see by when that is enough, and to judge with.
+        To learn from, to see by when that is enough, and to evaluate with.
 
     Raises
     ------
@@ -141,7 +141,7 @@ class ModelConfiguration:
     name : str
         Also of its file.
     configurations : tuple of SensorConfiguration
-        Whose clouds it learns from, and is judged with.
+        Whose clouds it learns from, and is evaluated with.
     """
 
     name: str
@@ -316,15 +316,15 @@ def evaluate_all(
     configurations = {one.name: one for model in models for one in model.configurations}.values()
     total = len(configurations) * sum(len(run.times) for run in (*traffic.validation, *traffic.test))
     done = 0
-    tried: dict[tuple[str, str], list[FrameResult]] = {}
-    judged: dict[tuple[str, str], list[FrameResult]] = {}
+    validated: dict[tuple[str, str], list[FrameResult]] = {}
+    tested: dict[tuple[str, str], list[FrameResult]] = {}
     for configuration in configurations:
         asked = [
             (model, detector)
             for model, detector in zip(models, detectors, strict=True)
             if configuration in model.configurations
         ]
-        for results, runs in ((tried, traffic.validation), (judged, traffic.test)):
+        for results, runs in ((validated, traffic.validation), (tested, traffic.test)):
             for run in runs:
                 for number in range(len(run.times)):
                     yield Progress(done, total, f"detect with {configuration.name}")
@@ -337,7 +337,7 @@ def evaluate_all(
                         result = _result(simulator, configuration, run, frame, cloud, found)
                         results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "judged")
-    return [outcome for model in models for outcome in _outcomes(model, tried, judged)]
+    return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
 
 
 def suitability_by_configuration(
@@ -355,13 +355,13 @@ def suitability_by_configuration(
 
 def _outcomes(
     model: ModelConfiguration,
-    tried: Mapping[tuple[str, str], list[FrameResult]],
-    judged: Mapping[tuple[str, str], list[FrameResult]],
+    validated: Mapping[tuple[str, str], list[FrameResult]],
+    tested: Mapping[tuple[str, str], list[FrameResult]],
 ) -> Iterator[DetectorOutcome]:
     names = [configuration.name for configuration in model.configurations]
-    score = balanced_score(evaluate([frame for name in names for frame in tried[model.name, name]], MAIN_RULE))
+    score = balanced_score(evaluate([frame for name in names for frame in validated[model.name, name]], MAIN_RULE))
     for configuration in model.configurations:
-        frames = tuple(judged[model.name, configuration.name])
+        frames = tuple(tested[model.name, configuration.name])
         yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN_RULE), score)
 
 

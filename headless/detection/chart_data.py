@@ -64,7 +64,7 @@ def parts(what: str, figure: str, lines: Mapping[str, Sequence[Bin]]) -> BinnedF
     )
 
 
-def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
+def error_view(  # noqa: PLR0913 - a frame, how it is evaluated, and where it is
     name: str,
     frame: FrameResult,
     rule: Rule,
@@ -95,5 +95,5 @@ def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
         wanted=found.counted,
         missed=found.counted & (found.found_by == NO_MATCH),
         detected=shown.detected.boxes[:, PLAN_COLUMNS],
-        false=found.judged & ~found.hit,
+        false=found.evaluated & ~found.hit,
     )

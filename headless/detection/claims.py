@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from headless.claims import UNDECIDED, Claim, judge_above, judge_all, judge_within
+from headless.claims import UNDECIDED, Claim, verdict_above, verdict_within, worst_verdict
 from headless.coverage_study.cells import COUNTS
 
 import numpy as np
@@ -102,7 +102,7 @@ def _gains(number: int, results: Sequence[SeedResult], sensor: str, published: t
         number,
         f"{sensor}: AP rises by about {100 * published[0]:g} points from N = {FEW} to {SOME} and by about "
         f"{100 * published[1]:g} from {SOME} to {MANY}",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"{'; '.join(figures)}; {_seeds(gains)}",
     )
 
@@ -116,7 +116,7 @@ def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[s
     return Claim(
         7,
         f"adding {simple} sensors gains more AP than adding {' or '.join(better)}",
-        judge_all([_above(lead) for lead in leads]),
+        worst_verdict([_above(lead) for lead in leads]),
         f"N = {FEW} to {MANY}: {'; '.join(rows)}; {simple} gains {', '.join(ahead)}",
     )
 
@@ -130,7 +130,7 @@ def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
     return Claim(
         8,
         f"{sensor}: N = {FEW} and {SOME} give more false positives than N = {MANY}, mostly where the cloud is sparse",
-        judge_all([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
+        worst_verdict([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
         f"per frame: {'; '.join(rows)}; of them in the sparser half: {'; '.join(shares)}",
     )
 
@@ -149,7 +149,7 @@ def _padding(results: Sequence[SeedResult]) -> Claim:
     return Claim(
         9,
         "zero-padded pillars cause false positives where the cloud is sparse",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"false positives per frame in the sparser half: {'; '.join(rows)}",
     )
 
@@ -223,8 +223,8 @@ def _seeds(gains: Sequence[_Mean]) -> str:
 
 
 def _about(mean: _Mean, expected: float) -> str:
-    return UNDECIDED if mean.interval is None else judge_within(mean.interval, expected / FACTOR, expected * FACTOR)
+    return UNDECIDED if mean.interval is None else verdict_within(mean.interval, expected / FACTOR, expected * FACTOR)
 
 
 def _above(mean: _Mean, least: float = 0.0) -> str:
-    return UNDECIDED if mean.interval is None else judge_above(mean.interval, least)
+    return UNDECIDED if mean.interval is None else verdict_above(mean.interval, least)

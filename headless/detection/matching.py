@@ -4,7 +4,7 @@ The rule: detections take turns, the best score first (of equal scores the one
 that overlaps its road user most). Each takes, of the road users that count and
 that none has taken, the one it overlaps most, if the overlap exceeds the
 threshold. One that finds none of these, but overlaps a road user that does not
-count, or has its middle outside the region, is not judged. All others are false.
+count, or has its middle outside the region, is not evaluated. All others are false.
 
 This is the rule of PASCAL VOC (Everingham et al. 2010) and COCO (Lin et al.
 2014); the two differ where road users overlap each other alone. Road users
@@ -45,7 +45,7 @@ class Rule:
     in_space : bool
         Whether boxes have to agree in height as well; in plan otherwise.
     categories : tuple of str
-        Of the road users that count and of the detections that are judged.
+        Of the road users that count and of the detections that are evaluated.
     fewest_points : int
         Returns from a road user below which it does not count; 0 counts those that no sensor sees as well.
     """
@@ -68,14 +68,14 @@ class Match:
         The detection that found it, `NO_MATCH` where none did.
     found : (k,) int64
         The road user that each detection found, `NO_MATCH` where it found none that counts.
-    judged : (k,) bool
+    evaluated : (k,) bool
         Whether it is a hit or false; the rest neither helps nor harms.
     """
 
     counted: Boolean
     found_by: Integer
     found: Integer
-    judged: Boolean
+    evaluated: Boolean
 
     @property
     def hit(self) -> Boolean:

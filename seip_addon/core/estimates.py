@@ -72,8 +72,8 @@ def mean_of(values: Float) -> IntervalEstimate:
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
-def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
-    """Estimate a mean of values that depend on each other when they are near in time, by means of stretches.
+def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
+    """Estimate a mean of values that depend on each other when they are near in time, by means of batches.
 
     Stretches are taken as independent and as equally long (batch means; Law 2015,
     section 9.5.3), and Student's interval is that of their means.
@@ -81,10 +81,10 @@ def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
     Parameters
     ----------
     values : (n,) float64
-    stretch : (n,) int64
-        In which stretch of time each was taken.
+    batch : (n,) int64
+        In which batch of time each was taken.
     """
-    _, which = np.unique(stretch, return_inverse=True)
+    _, which = np.unique(batch, return_inverse=True)
     many = np.bincount(which)
     means = np.bincount(which, values) / many
     mean, number = math.fsum(values) / len(values), len(many)

@@ -67,7 +67,7 @@ def _placed(
     if robustness is None:
         plan = yield from place(known.layout, grid, goal, pose_errors=pose_errors)
     else:
-        plan = (yield from place_robustly(known.layout, grid, goal, robustness)).plan
+        plan = (yield from place_robustly(known.layout, grid, goal, robustness)).solution
     return replace(known, plan=plan, durations=known.timed("placement", began))
 
 

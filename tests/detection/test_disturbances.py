@@ -38,11 +38,11 @@ TIME = 1.0
 
 def frame_under(disturbance, *, time=TIME):
     static, trajectories = road()
-    hung, driving = disturbance.hung(sensors()), disturbance.on_the_road(trajectories)
+    hung, driving = disturbance.disturbed_sensors(sensors()), disturbance.disturbed_traffic(trajectories)
     bodies = [fitted_body(user) for user in driving.users]
     simulation = finish(prepare(static, hung, driving, bodies, ScanSettings(seed=3)))
-    taken = disturbance.taken(simulation, 7, time)
-    return disturbance.shown(taken, hung, np.random.default_rng([3, 7]))
+    taken = disturbance.disturbed_scan(simulation, 7, time)
+    return disturbance.disturbed_frame(taken, hung, np.random.default_rng([3, 7]))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_size_0_changes_nothing_bit_for_bit(kind, plain):
 
 def test_no_cap_leaves_the_detector_alone():
     detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4))
-    assert CappedPillars(0.0).looked_at(detector) is detector
+    assert CappedPillars(0.0).disturbed_detector(detector) is detector
 
 
 def test_noise_has_the_spread_that_is_asked_for():
@@ -92,7 +92,7 @@ def test_a_larger_loss_takes_what_a_smaller_one_takes():
 
 
 def test_rain_takes_light_range_and_returns():
-    clear, wet = sensors()[0].model, Rain(20.0).hung(sensors())[0].model
+    clear, wet = sensors()[0].model, Rain(20.0).disturbed_sensors(sensors())[0].model
     assert wet.attenuation == pytest.approx(clear.attenuation + 0.04)
     # As strong as from 100 m in clear air: exp(-0.04 r) / r^2 = 1 / 100^2.
     assert math.exp(-0.04 * wet.max_range) / wet.max_range**2 == pytest.approx(1e-4, rel=1e-9)
@@ -173,16 +173,16 @@ def test_thinner_traffic_leaves_whole_road_users_out():
         **{name: np.tile(getattr(trajectories, name)[:2].T, 400).T for name in ("time", "yaw", "pitch", "speed")},
         position=np.tile(trajectories.position[:2], (400, 1)),
     )
-    left = Thinned(0.3).on_the_road(many)
+    left = Thinned(0.3).disturbed_traffic(many)
     assert abs(len(left) - 280) < 4 * math.sqrt(400 * 0.3 * 0.7)
     assert len(left.time) == left.first[-1] == 2 * len(left)
-    assert {user.name for user in Thinned(0.6).on_the_road(many).users} < {user.name for user in left.users}
+    assert {user.name for user in Thinned(0.6).disturbed_traffic(many).users} < {user.name for user in left.users}
     np.testing.assert_array_equal(left.at(1.0).position, many.at(1.0).position[: len(left)])
 
 
 def test_a_capped_detector_has_the_same_weights():
     detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4), seed=5)
-    capped = CappedPillars(2.0).looked_at(detector)
+    capped = CappedPillars(2.0).disturbed_detector(detector)
     assert capped.settings == replace(detector.settings, most_points=2)
     for name, value in keeping_at_most(detector, 2).state_dict().items():
         assert (value == detector.state_dict()[name]).all()

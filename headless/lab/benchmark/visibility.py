@@ -31,7 +31,7 @@ PROVEN_GAP = 1e-6
 """Gap below which nothing is better."""
 
 SENSOR_COUNT = 4
-"""Sensors of the placement by which the harm of an error is judged."""
+"""Sensors of the placement by which the harm of an error is evaluated."""
 
 
 @dataclass

@@ -48,23 +48,23 @@ class Disturbance:
     name: ClassVar[str] = "undisturbed"
     unit: ClassVar[str] = ""
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors as they are instead."""
         return tuple(sensors)
 
-    def on_the_road(self, trajectories: Trajectories) -> Trajectories:
+    def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
         """Return the traffic as it is instead."""
         return trajectories
 
-    def taken(self, simulation: Simulation, number: int, time: float) -> Frame:
+    def disturbed_scan(self, simulation: Simulation, number: int, time: float) -> Frame:
         """Return a frame as it is taken instead."""
         return simulation.frame(number, time)
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
         """Return what the frame shows instead."""
         return frame
 
-    def looked_at(self, detector: Detector) -> Detector:
+    def disturbed_detector(self, detector: Detector) -> Detector:
         """Return the detector as it looks at frames instead."""
         return detector
 
@@ -76,7 +76,7 @@ class RangeNoise(Disturbance):
     name: ClassVar[str] = "more range noise"
     unit: ClassVar[str] = "m"
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors with both errors: independent, so their variances add."""
 
         def noisier(model: LidarModel) -> LidarModel:
@@ -92,7 +92,7 @@ class DropOff(Disturbance):
     name: ClassVar[str] = "returns lost"
     unit: ClassVar[str] = "of the returns"
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors with a larger general drop-off."""
 
         def lossy(model: LidarModel) -> LidarModel:
@@ -124,7 +124,7 @@ class Rain(Disturbance):
     name: ClassVar[str] = "rain or fog"
     unit: ClassVar[str] = "extinction per km"
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors with what the air between takes from them."""
 
         def dimmed(model: LidarModel) -> LidarModel:
@@ -133,7 +133,7 @@ class Rain(Disturbance):
 
         return _with_models(sensors, dimmed)
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
         """Return the frame with drops where rays ended on them."""
         wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * DROP_RANGE)
         near = random.random(len(frame))
@@ -188,7 +188,7 @@ class PositionError(OfOneSensor):
     name: ClassVar[str] = "sensor misplaced"
     unit: ClassVar[str] = "m"
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points moved."""
         return _moved(frame, self.sensor, sensors[self.sensor].xyz, np.eye(3), self.size * ERROR_AXIS)
 
@@ -200,7 +200,7 @@ class YawError(OfOneSensor):
     name: ClassVar[str] = "yaw wrong"
     unit: ClassVar[str] = "°"
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
         return _turned(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
 
@@ -212,7 +212,7 @@ class TiltError(OfOneSensor):
     name: ClassVar[str] = "tilt wrong"
     unit: ClassVar[str] = "°"
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
         return _turned(frame, self, sensors, ERROR_AXIS)
 
@@ -224,7 +224,7 @@ class ClockOffset(OfOneSensor):
     name: ClassVar[str] = "clock late"
     unit: ClassVar[str] = "s"
 
-    def taken(self, simulation: Simulation, number: int, time: float) -> Frame:
+    def disturbed_scan(self, simulation: Simulation, number: int, time: float) -> Frame:
         """Return the frame with this sensor's points from an earlier one."""
         now, before = simulation.frame(number, time), simulation.frame(number, time - self.size)
         return _merged(now, now.sensor != self.sensor, before, before.sensor == self.sensor)
@@ -242,7 +242,7 @@ class SensorFailure(OfOneSensor):
         """Return the loss of a sensor by its number from 0."""
         return cls(sensor + 1.0, sensor)
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame without this sensor's points."""
         return _recounted(_some(frame, frame.sensor != self.sensor))
 
@@ -255,7 +255,7 @@ class Thinned(Disturbance):
     name: ClassVar[str] = "thinner traffic"
     unit: ClassVar[str] = "of the road users missing"
 
-    def on_the_road(self, trajectories: Trajectories) -> Trajectories:
+    def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
         """Return the motion of the others."""
         stays = np.random.default_rng(self.seed).random(len(trajectories)) >= self.size
         counts = np.diff(trajectories.first)
@@ -275,7 +275,7 @@ class CappedPillars(Disturbance):
     name: ClassVar[str] = "fuller pillars cut"
     unit: ClassVar[str] = "points that a pillar keeps"
 
-    def looked_at(self, detector: Detector) -> Detector:
+    def disturbed_detector(self, detector: Detector) -> Detector:
         """Return the detector with smaller pillars."""
         return keeping_at_most(detector, round(self.size)) if self.size else detector
 

@@ -151,7 +151,7 @@ def trials(
     paths = [store / f"{digest(setting, one_tested.key)[:32]}.npz" for one_tested in tested]
     missing = [(one_tested, path) for one_tested, path in zip(tested, paths, strict=True) if not path.exists()]
     if missing:
-        detectors = [disturbance.looked_at(one_tested.detector) for one_tested, _ in missing]
+        detectors = [disturbance.disturbed_detector(one_tested.detector) for one_tested, _ in missing]
         results = yield from _results(ground, configuration, disturbance, detectors)
         for (one_tested, path), frames in zip(missing, results, strict=True):
             header = {"ground": ground.name, "configuration": configuration.name, "detector": one_tested.name}
@@ -182,14 +182,17 @@ def disturbed_frames(
 ) -> Generator[tuple[SampledRun, Frame], None, None]:
     """Simulate the test frames as they are under a disturbance."""
     simulator = ground.simulator
-    sensors = disturbance.hung(configuration.sensors)
+    sensors = disturbance.disturbed_sensors(configuration.sensors)
     for run in ground.runs:
-        trajectories = disturbance.on_the_road(run.trajectories)
+        trajectories = disturbance.disturbed_traffic(run.trajectories)
         bodies = [fitted_body(user) for user in trajectories.users]
         simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
         for number, time in enumerate(run.times.tolist()):
             random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
-            yield run, disturbance.shown(disturbance.taken(simulation, number, time), sensors, random)
+            yield (
+                run,
+                disturbance.disturbed_frame(disturbance.disturbed_scan(simulation, number, time), sensors, random),
+            )
 
 
 def _results(

@@ -82,7 +82,7 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
         panels[0].plot(deltas, coverage, label=f"{sensor}, {own[0].height:g} m high", **style)
         panels[0].plot(deltas, view, color=COLOURS[number], linewidth=1.0, linestyle=":")
         panels[0].fill_between(deltas, coverage, view, color=COLOURS[number], alpha=0.06)
-        panels[1].plot(deltas, [answer.judged for answer in own], label=sensor, **style)
+        panels[1].plot(deltas, [answer.evaluated for answer in own], label=sensor, **style)
     for panel, what in zip(
         panels,
         ("coverage (dotted: what is in view; between them, beams)", f"coverage under δ = {delta:g} m"),
@@ -107,8 +107,8 @@ def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, 
     ):
         spacing = [a.grid_spacing if panel is panels[0] else a.candidate_spacing for a in answers]
         panel.plot(spacing, [a.own for a in answers], color=COLOURS[1], marker="s", label="on its own grid")
-        panel.plot(spacing, [a.judged for a in answers], color=COLOURS[0], marker="o", label="on the fine grid")
-        best = max(a.judged for a in answers)
+        panel.plot(spacing, [a.evaluated for a in answers], color=COLOURS[0], marker="o", label="on the fine grid")
+        best = max(a.evaluated for a in answers)
         panel.axhspan(best - study.convergence.tolerance, best, color=COLOURS[2], alpha=0.12, label="tolerance")
         panel.axvline(at, **LIMIT_LINE)
         panel.set_xscale("log", base=2)

@@ -1,6 +1,6 @@
 """Sensitivity of coverage and placement to δ, grid spacings and beam azimuth.
 
-Each setting is varied alone. An answer is judged twice: as its own settings see it, and on
+Each setting is varied alone. An answer is evaluated twice: as its own settings see it, and on
 one fine grid of targets with the δ asked for, the same for all.
 """
 
@@ -16,7 +16,7 @@ from headless.convergence import (
     GRID_SPACINGS,
     Answer,
     Convergence,
-    Judge,
+    Evaluator,
     coarsest_settings,
 )
 
@@ -98,7 +98,7 @@ class DeltaAnswer:
         Under this δ.
     view : float
         Share of the targets that its sensors have in view: what coverage would be if beams lay close.
-    judged : float
+    evaluated : float
         Its coverage on the fine grid, under the δ asked for.
     moved : float, metres
         Mean distance of its sensors to the nearest of the placement for the δ asked for.
@@ -109,7 +109,7 @@ class DeltaAnswer:
     delta: float
     coverage: float
     view: float
-    judged: float
+    evaluated: float
     moved: float
 
 
@@ -205,19 +205,19 @@ def criterion_study(
         candidates = replace(settings.candidates, sensors=(key,), heights=(heights[len(heights) // 2],))
         by_delta += yield from _by_delta(geometry, replace(settings, candidates=candidates), goal)
 
-    judge = Judge(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, goal)
     by_grid = []
     for spacing in GRID_SPACINGS:
         tried = replace(settings, grid_spacing=spacing)
-        by_grid.append((yield from within(Progress(0, 0, f"targets {spacing:g} m apart"), judge.answer(tried))))
+        by_grid.append((yield from within(Progress(0, 0, f"targets {spacing:g} m apart"), evaluator.answer(tried))))
     by_candidates = []
     for spacing in CANDIDATE_SPACINGS:
         tried = replace(settings, candidates=replace(settings.candidates, spacing=spacing))
-        by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), judge.answer(tried))))
+        by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), evaluator.answer(tried))))
     convergence = yield from coarsest_settings(geometry, settings, goal, tolerance)
 
-    best = yield from judge.plan(site, settings)
-    phase, rechosen = yield from _by_grid_laid(judge, site, settings, best, draws, random)
+    best = yield from evaluator.solve(site, settings)
+    phase, rechosen = yield from _by_grid_laid(evaluator, site, settings, best, draws, random)
     azimuth = yield from _by_azimuth(site, settings, best.deployment, draws, random)
     return CriterionStudy(
         borders=borders,
@@ -319,22 +319,24 @@ def _by_delta(
     geometry: SceneGeometry, settings: SurveySettings, goal: Objective
 ) -> Generator[Progress, None, list[DeltaAnswer]]:
     """Vary δ for one sensor type at one height."""
-    judge = Judge(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, goal)
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     caster = make_ray_caster(site.triangles, settings.engine)
     (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights
-    asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), judge.plan(site, settings))
+    asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), evaluator.solve(site, settings))
     answers = []
     for delta in DELTAS:
         tried = replace(settings, visibility=replace(settings.visibility, delta=delta))
-        plan = yield from within(Progress(0, 0, f"{sensor}: δ = {delta:g} m"), judge.plan(site, tried))
-        sensors = plan.deployment.sensors
+        solution = yield from within(Progress(0, 0, f"{sensor}: δ = {delta:g} m"), evaluator.solve(site, tried))
+        sensors = solution.deployment.sensors
         view = np.any([in_view(caster, s.model, s.xyz, s.orientation, site.targets.xyz) for s in sensors], axis=0)
-        seen = plan.deployment.seen_by > 0
-        moved = _moved(plan.deployment, asked.deployment)
-        coverage = plan.deployment.coverage
+        seen = solution.deployment.seen_by > 0
+        moved = _moved(solution.deployment, asked.deployment)
+        coverage = solution.deployment.coverage
         answers.append(
-            DeltaAnswer(sensor, height, delta, coverage, float((view | seen).mean()), judge.judge(plan), moved)
+            DeltaAnswer(
+                sensor, height, delta, coverage, float((view | seen).mean()), evaluator.evaluate(solution), moved
+            )
         )
     return answers
 
@@ -347,7 +349,7 @@ def _moved(deployment: Deployment, other: Deployment) -> float:
 
 
 def _by_grid_laid(
-    judge: Judge,
+    evaluator: Evaluator,
     site: Site,
     settings: SurveySettings,
     best: Solution,
@@ -358,15 +360,15 @@ def _by_grid_laid(
     covered, rechosen = [], []
     for draw in range(draws):
         targets = turned_targets(
-            judge.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
+            evaluator.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
         )
         laid = replace(site, targets=targets)
         covered.append(_coverage(laid, settings, best.deployment))
         step = Progress(draw, draws, "grids of targets laid otherwise")
         yield step
         if draw % 4 == 0:
-            plan = yield from within(step, judge.plan(laid, settings))
-            rechosen.append(judge.judge(plan))
+            solution = yield from within(step, evaluator.solve(laid, settings))
+            rechosen.append(evaluator.evaluate(solution))
     return Draws("grid phase and angle", np.array(covered)), Draws("placements on such grids", np.array(rechosen))
 
 
@@ -415,8 +417,9 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 method=f"coverage, {by_delta} at {least.height:g} m",
                 regime=f"δ from {least.delta:g} to {most.delta:g} m",
                 begins=f"coverage goes from {least.coverage:.1%} to {most.coverage:.1%} of the targets while "
-                f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at most "
-                f"{100 * (max(a.judged for a in answers) - min(a.judged for a in answers)):.1f} points of coverage",
+                f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at "
+                f"most {100 * (max(a.evaluated for a in answers) - min(a.evaluated for a in answers)):.1f} points of "
+                "coverage",
                 how="best placements under each δ, judged under the one asked for",
                 answer="the record holds δ; warns where it cannot resolve the rings",
             )
@@ -425,14 +428,14 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
         ("grid spacing", study.by_grid, study.convergence.settings.grid_spacing),
         ("candidate spacing", study.by_candidates, study.convergence.settings.candidates.spacing),
     ):
-        finest = max(answer.judged for answer in tried)
-        worst = min(tried, key=lambda answer: answer.judged)
+        finest = max(answer.evaluated for answer in tried)
+        worst = min(tried, key=lambda answer: answer.evaluated)
         spacing = worst.grid_spacing if what == "grid spacing" else worst.candidate_spacing
         rows.append(
             Row(
                 method="placement",
                 regime=what,
-                begins=f"loses up to {100 * (finest - worst.judged):.2f} points of coverage ({spacing:g} m)",
+                begins=f"loses up to {100 * (finest - worst.evaluated):.2f} points of coverage ({spacing:g} m)",
                 how=f"best placements under each spacing, judged on targets {EVALUATION_SPACING:g} m apart",
                 answer=f"--tolerance {study.convergence.tolerance:g} picks {picked:g} m",
             )

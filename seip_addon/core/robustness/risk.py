@@ -87,7 +87,7 @@ class Risk:
 
     @property
     def alone(self) -> Risk:
-        """The same for one scenario: what any draw is judged by, whichever of them count."""
+        """The same for one scenario: what any draw is evaluated by, whichever of them count."""
         return replace(self, tail=1.0)
 
     def counted(self, scenarios: int) -> int:

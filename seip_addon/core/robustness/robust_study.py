@@ -1,4 +1,4 @@
-"""Price and benefit of robust placements, judged on unseen draws."""
+"""Price and benefit of robust placements, evaluated on unseen draws."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
 LOW_QUANTILE = 0.05
-"""The quantile that judges."""
+"""Quantile of coverage by which placements are compared."""
 
 COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 """That are compared where nothing else is asked for."""
@@ -38,14 +38,14 @@ class RobustnessSettings:
     scenarios : int
         Draws to choose on.
     draws : int
-        Unseen draws to judge by.
+        Unseen draws to evaluate on.
     seed : int
         Of the scenarios; the unseen draws have the next one.
 
     Raises
     ------
     SeipError
-        There is nothing to choose on, or nothing to judge by.
+        There is nothing to choose on, or nothing to evaluate on.
     """
 
     risk: Risk = field(default_factory=Risk)
@@ -102,7 +102,7 @@ class RobustStudy:
     Parameters
     ----------
     nominal : tuple of Contender
-        The placement chosen for the poses as planned, once for each way in which the others are judged.
+        The placement chosen for the poses as planned, once for each way in which the others are evaluated.
     robust : tuple of Contender
         One for each risk.
     total : float
@@ -115,7 +115,7 @@ class RobustStudy:
     total: float
 
     def beside(self, contender: Contender) -> Contender:
-        """Return the nominal optimum, judged as a contender is."""
+        """Return the nominal optimum, evaluated as a contender is."""
         return next(nominal for nominal in self.nominal if nominal.judged_by == contender.judged_by)
 
     def price(self, contender: Contender) -> float:
@@ -140,7 +140,7 @@ def robust_study(
     risks: Sequence[Risk] = COMPARED_RISKS,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, RobustStudy]:
-    """Place for the poses as planned and for each risk, and judge all by unseen draws.
+    """Place for the poses as planned and for each risk, and evaluate all by unseen draws.
 
     Parameters
     ----------

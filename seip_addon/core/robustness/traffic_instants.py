@@ -58,14 +58,14 @@ class Instants:
     run : (n,) int64
         Which of the runs.
     time : (n,) float64, seconds
-    stretch : (n,) int64
-        Which stretch of a run each instant is in; instants of different ones hardly depend on each other.
+    batch : (n,) int64
+        Which batch of a run each instant is in; instants of different ones hardly depend on each other.
     """
 
     runs: tuple[Trajectories, ...]
     run: Integer
     time: Float
-    stretch: Integer
+    batch: Integer
 
     def __len__(self) -> int:
         """Return n."""
@@ -80,7 +80,7 @@ class Instants:
 
     def of(self, which: Integer) -> Instants:
         """Return some of the instants."""
-        return Instants(self.runs, self.run[which], self.time[which], self.stretch[which])
+        return Instants(self.runs, self.run[which], self.time[which], self.batch[which])
 
 
 def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Instants:

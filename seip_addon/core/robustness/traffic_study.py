@@ -1,8 +1,8 @@
 """Coverage that traffic leaves of a placement, and what optimising for traffic regains.
 
-Placements are chosen at some instants of traffic and judged at others, of other runs. What is judged is a share of
-time: of each target, and of the targets' weight. Instants near in time see the same queues, so that intervals come of
-stretches of time (`mean_over_time`).
+Placements are optimised on some instants of traffic and evaluated at others, of other runs, by the share of time that
+each target is seen and by the mean share of the targets' weight. Instants near in time see the same queues: intervals
+come of the means of batches of time (`mean_over_time`).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class TrafficCoverage:
         Which targets on the empty road.
     time : (t,) float64
         Share of the instants at which each target is seen.
-    stretch : (n,) int64
+    batch : (n,) int64
         Of the instants.
     """
 
@@ -81,35 +81,35 @@ class TrafficCoverage:
     hidden_at: Float
     empty_targets: Boolean
     time: Float
-    stretch: Integer
+    batch: Integer
 
     @property
-    def held(self) -> IntervalEstimate:
+    def mean(self) -> IntervalEstimate:
         """The share of the targets' weight that is seen, on average over time."""
-        return mean_over_time(self.at, self.stretch)
+        return mean_over_time(self.at, self.batch)
 
     @property
-    def lost(self) -> IntervalEstimate:
+    def loss(self) -> IntervalEstimate:
         """How much less that is than on the empty road: what is hidden, less what returns from vehicles show."""
-        return mean_over_time(self.empty - self.at, self.stretch)
+        return mean_over_time(self.empty - self.at, self.batch)
 
     @property
     def hidden(self) -> IntervalEstimate:
         """Of the weight that is seen on the empty road, the share that vehicles hide, on average over time."""
-        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.stretch)
+        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.batch)
 
     @property
-    def rarely(self) -> float:
+    def rarely_seen(self) -> float:
         """Of the targets seen on the empty road, the share that is seen less than `MOSTLY_SEEN_SHARE` of the time."""
         return float((self.time[self.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if self.empty_targets.any() else 0.0
 
     def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
         """Estimate how much more of the weight is seen than by another placement at the same instants."""
-        return mean_over_time(self.at - other.at, self.stretch)
+        return mean_over_time(self.at - other.at, self.batch)
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedInTraffic:
+class TrafficEvaluation:
     """A placement and what becomes of it in traffic that it was not chosen on.
 
     Parameters
@@ -136,20 +136,20 @@ class TrafficStudy:
     chosen_at : int
         Instants of traffic that one of the two was chosen on.
     road_users : float
-        On the road at an instant that is judged, on average.
-    empty : JudgedInTraffic
+        On the road at an instant that is evaluated, on average.
+    empty : TrafficEvaluation
         Chosen for the empty road.
-    traffic : JudgedInTraffic
+    traffic : TrafficEvaluation
         Chosen on traffic.
     """
 
     layer: TrafficLayer
     chosen_at: int
     road_users: float
-    empty: JudgedInTraffic
-    traffic: JudgedInTraffic
+    empty: TrafficEvaluation
+    traffic: TrafficEvaluation
 
-    def won(self, layer: TrafficLayer) -> IntervalEstimate:
+    def gain(self, layer: TrafficLayer) -> IntervalEstimate:
         """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
@@ -157,11 +157,11 @@ class TrafficStudy:
         """Whether every other instant says the same as all: means whose intervals meet."""
         rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
         rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
-        stretch = self.empty.seen[self.layer].stretch
-        return all(mean_over_time(row[::2], stretch[::2]).agrees_with(mean_over_time(row, stretch)) for row in rows)
+        batch = self.empty.seen[self.layer].batch
+        return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
 
 
-def look_at_traffic(
+def traffic_scenarios(
     around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, TrafficScenarios]:
     """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
@@ -175,16 +175,16 @@ def traffic_study(
     around: Surroundings,
     problem: PlacementProblem,
     scenarios: TrafficScenarios,
-    judged: Instants,
+    evaluation: Instants,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, TrafficStudy]:
-    """Place for the empty road and on traffic, and judge both at other instants.
+    """Place for the empty road and on traffic, and evaluate both at other instants.
 
     Parameters
     ----------
     problem : PlacementProblem
         Of all candidates of the site; what they see is taken from the scenarios.
-    judged : Instants
+    evaluation : Instants
         Of runs that are not those of the scenarios.
     limits : SolverLimits
         For each placement.
@@ -195,34 +195,34 @@ def traffic_study(
     reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
-    obstacles = judged.obstacles()
+    obstacles = evaluation.obstacles()
     layers: tuple[TrafficLayer, ...] = ("road", "height")
     views: dict[TrafficLayer, ScenarioVisibility] = {}
     for layer in layers:
         views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
 
-    def judge(name: str, placement: Placement) -> JudgedInTraffic:
+    def evaluate(name: str, placement: Placement) -> TrafficEvaluation:
         rows = np.searchsorted(used, placement.chosen)
-        seen = {layer: _seen(views[layer], rows, problem.weights, judged.stretch) for layer in layers}
-        return JudgedInTraffic(name, placement, seen)
+        seen = {layer: _seen(views[layer], rows, problem.weights, evaluation.batch) for layer in layers}
+        return TrafficEvaluation(name, placement, seen)
 
     return TrafficStudy(
         layer=scenarios.layer,
         chosen_at=len(scenarios.views),
         road_users=_users(obstacles),
-        empty=judge("the empty road", empty),
-        traffic=judge("traffic", placed),
+        empty=evaluate("the empty road", empty),
+        traffic=evaluate("traffic", placed),
     )
 
 
-def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, stretch: Integer) -> TrafficCoverage:
+def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Integer) -> TrafficCoverage:
     """Return what some poses see together; the first of the views is of the empty road."""
     seen = views.seen_by_any(rows)
     share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
-    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
+    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), batch)
 
 
-def tried_in_traffic(
+def traffic_message(
     around: Surroundings, poses: Integer, weight: Float, instants: Instants
 ) -> Generator[Progress, None, str]:
     """Say, in a sentence, what poses see of the road in traffic on average over time, and when it is empty.
@@ -236,9 +236,9 @@ def tried_in_traffic(
     """
     obstacles = instants.obstacles()
     views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")
-    seen = _seen(views, np.arange(len(poses)), weight, instants.stretch)
+    seen = _seen(views, np.arange(len(poses)), weight, instants.batch)
     return (
-        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.held.describe()} of "
+        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.mean.describe()} of "
         f"the road on average over time, {seen.empty:.2%} when it is empty"
     )
 
@@ -251,16 +251,16 @@ def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
     losses = tuple(
         f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
-        f"{seen.held.value:.1%} of the {LAYER_NAMES[layer]} on average over time, not {seen.empty:.1%}: "
-        f"{seen.lost.value:.1%} less"
+        f"{seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average over time, not {seen.empty:.1%}: "
+        f"{seen.loss.value:.1%} less"
         for layer, seen in study.empty.seen.items()
-        if seen.lost.value >= NOTABLE_LOSS
+        if seen.loss.value >= NOTABLE_LOSS
     )
-    won = study.won(study.layer)
-    if won.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
+    gain = study.gain(study.layer)
+    if gain.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
         return losses
     doubt = (
         "in traffic that it was not chosen on this placement is not known to see more than the best one for the empty "
-        f"road: {won.describe()} more; choose on more --instants, or keep that one"
+        f"road: {gain.describe()} more; choose on more --instants, or keep that one"
     )
     return (*losses, doubt)

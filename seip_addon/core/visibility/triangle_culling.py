@@ -48,7 +48,7 @@ class NeededTriangles:
         return {"all": len(self.keep), "kept": int(self.keep.sum())} | reasons
 
 
-def triangles_sentence(counts: Mapping[str, int]) -> str:
+def culling_message(counts: Mapping[str, int]) -> str:
     """Say how many triangles rays are cast against and why the others could go, from `NeededTriangles.counts`."""
     reasons = {
         "without_area": "without area",

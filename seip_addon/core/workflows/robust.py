@@ -19,22 +19,22 @@ DRAWS_OF_KIND = 100
 
 
 @dataclass(frozen=True, eq=False)
-class RobustPlan:
-    """A plan with the evidence for it.
+class RobustSolution:
+    """A solution with the evidence for it.
 
     Parameters
     ----------
-    plan : Solution
+    solution : Solution
         Objective, bound and gap are of what the robustness settings ask for; its notes say so.
     study : RobustStudy
-        It beside the plan that trusts the map.
-    judged : PoseStudy
+        It beside the solution that trusts the map.
+    pose_study : PoseStudy
         What pose errors do to it.
     """
 
-    plan: Solution
+    solution: Solution
     study: RobustStudy
-    judged: PoseStudy
+    pose_study: PoseStudy
 
 
 def check_robust_objective(goal: Objective) -> None:
@@ -48,7 +48,7 @@ def check_robust_objective(goal: Objective) -> None:
 
 def place_robustly(
     layout: Layout, grid: VisibilityGrid, goal: Objective, settings: RobustnessSettings
-) -> Generator[Progress, None, RobustPlan]:
+) -> Generator[Progress, None, RobustSolution]:
     """Answer a goal on a survey for what may go wrong.
 
     Parameters
@@ -70,14 +70,14 @@ def place_robustly(
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
     tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
-    judged = yield from pose_study(around, deployment, tried)
+    under_errors = yield from pose_study(around, deployment, tried)
     note = f"chosen for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
-    notes = (note, *chosen.placement.notes, robust_sentence(study), *pose_warnings(judged))
-    plan = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
-    return RobustPlan(plan, study, judged)
+    notes = (note, *chosen.placement.notes, robustness_message(study), *pose_warnings(under_errors))
+    solution = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
+    return RobustSolution(solution, study, under_errors)
 
 
-def robust_sentence(study: RobustStudy) -> str:
+def robustness_message(study: RobustStudy) -> str:
     """Say what a placement for what may go wrong gives away, and what it saves."""
     (chosen,) = study.robust
     return (

@@ -15,7 +15,7 @@ from ..placement.objective import Objective, Solution, placement_problem, with_c
 from ..progress import Progress
 from ..robustness.traffic_instants import check_runs, spread_instants
 from ..robustness.traffic_presence import road_user_seconds
-from ..robustness.traffic_study import LAYER_NAMES, TrafficStudy, look_at_traffic, traffic_study, traffic_warnings
+from ..robustness.traffic_study import LAYER_NAMES, TrafficStudy, traffic_scenarios, traffic_study, traffic_warnings
 from ..robustness.visibility_in_traffic import TrafficLayer
 from ..settings import setting
 from ..site.site import Site
@@ -50,11 +50,11 @@ class TrafficSettings:
     layer: TrafficLayer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
     weights_from_traffic: bool = setting(default=False, help="weigh targets by the time that road users are there")
     instants: int = setting(24, "of traffic to choose on", minimum=1)
-    judged_at: int = setting(120, "of traffic to judge by", minimum=1, metavar="INSTANTS")
+    evaluation_instants: int = setting(120, "of traffic to judge by", minimum=1, option="judged-at", metavar="INSTANTS")
     seed: int = setting(0, "of the instants; those to judge by have the next")
 
     def __post_init__(self) -> None:
-        for number in (self.instants, self.judged_at):
+        for number in (self.instants, self.evaluation_instants):
             if number < 1:
                 raise SeipError(f"ask for one instant of traffic or more, not {number}")
 
@@ -77,10 +77,10 @@ class TrafficRuns:
 
 
 @dataclass(frozen=True, eq=False)
-class TrafficPlan:
-    """A plan for traffic with the study that it comes from: objective, bound and gap are of coverage in traffic."""
+class TrafficSolution:
+    """A solution for traffic with the study that it comes from: objective, bound and gap are of coverage in traffic."""
 
-    plan: Solution
+    solution: Solution
     study: TrafficStudy
 
 
@@ -116,7 +116,7 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
 
 def place_in_traffic(
     layout: Layout, grid: VisibilityGrid, goal: Objective, runs: TrafficRuns, settings: TrafficSettings
-) -> Generator[Progress, None, TrafficPlan]:
+) -> Generator[Progress, None, TrafficSolution]:
     """Answer a goal on a survey for the road in traffic, whose vehicles block the view.
 
     Parameters
@@ -130,9 +130,9 @@ def place_in_traffic(
         problem = replace(problem, weights=problem.weights * seconds)
     around = surroundings(layout)
     chosen_at = spread_instants(runs.optimisation, settings.instants, settings.seed)
-    scenarios = yield from look_at_traffic(around, problem, chosen_at, settings.layer)
-    judged = spread_instants(runs.evaluation, settings.judged_at, settings.seed + 1)
-    study = yield from traffic_study(around, problem, scenarios, judged, layout.settings.limits)
+    scenarios = yield from traffic_scenarios(around, problem, chosen_at, settings.layer)
+    evaluation = spread_instants(runs.evaluation, settings.evaluation_instants, settings.seed + 1)
+    study = yield from traffic_study(around, problem, scenarios, evaluation, layout.settings.limits)
     placement = study.traffic.placement
     note = (
         f"chosen to see the {LAYER_NAMES[study.layer]} in traffic, on average over {study.chosen_at} instants: "
@@ -141,4 +141,4 @@ def place_in_traffic(
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
     deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
-    return TrafficPlan(Solution(with_count(goal, layout.site), noted, None, deployment), study)
+    return TrafficSolution(Solution(with_count(goal, layout.site), noted, None, deployment), study)

@@ -195,7 +195,7 @@ def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
     for run in (0, 1):
         part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
         assert part.tolist() == list(range(16))
-    assert len(np.unique(one.stretch)) == 2 * max(1, round((10.0 - WARM_UP) / BATCH_SECONDS))
+    assert len(np.unique(one.batch)) == 2 * max(1, round((10.0 - WARM_UP) / BATCH_SECONDS))
     assert [len(crowd.hulls) for crowd in one.obstacles()] == [1] * 16 + [2] * 16
 
 

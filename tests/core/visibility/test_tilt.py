@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.convergence import Judge
+from headless.convergence import Evaluator
 from headless.lab.stability.criterion import in_view
 
 import numpy as np
@@ -283,12 +283,12 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
 
 def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
     settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
-    judge = Judge(street(), settings, Objective(count=1))
-    plan = finish(judge.plan(street_site(lay_candidates(street(), settings.candidates)), settings))
-    (sensor,) = plan.deployment.sensors
-    looks = VisibilityModel(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))
+    evaluator = Evaluator(street(), settings, Objective(count=1))
+    solution = finish(evaluator.solve(street_site(lay_candidates(street(), settings.candidates)), settings))
+    (sensor,) = solution.deployment.sensors
+    looks = VisibilityModel(evaluator.site, SIGHT, make_ray_caster(evaluator.site.triangles, ANY))
     as_it_hangs = looks.see(sensor.model, sensor.xyz, sensor.orientation).mean()
-    assert judge.judge(plan) == pytest.approx(as_it_hangs, abs=1e-12)
+    assert evaluator.evaluate(solution) == pytest.approx(as_it_hangs, abs=1e-12)
     assert as_it_hangs != looks.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw)).mean()
 
 
