@@ -100,9 +100,9 @@ class Convergence:
 
 
 def coarsest_settings(
-    geometry: SceneGeometry, settings: SurveySettings, goal: Objective, tolerance: float
+    geometry: SceneGeometry, settings: SurveySettings, objective: Objective, tolerance: float
 ) -> Generator[Progress, None, Convergence]:
-    """Find the coarsest spacings whose answer to a goal stays within a tolerance.
+    """Find the coarsest spacings whose answer to an objective stays within a tolerance.
 
     Each of the two may cost half of the tolerance. A spacing of targets has to agree
     with the fine grid about the coverage of its own placement as well.
@@ -125,20 +125,20 @@ def coarsest_settings(
     Raises
     ------
     SeipError
-        The tolerance or the goal does not suit this, or no spacing allows an answer.
+        The tolerance or the objective does not suit this, or no spacing allows an answer.
     """
     if not 0 < tolerance < 1:
         raise SeipError(f"the tolerance must be a share above 0 and below 1, not {tolerance:g}")
-    if goal.cheapest:
+    if objective.cheapest:
         raise SeipError("a tolerance needs a number of sensors or a budget: the coverage is not what you ask for")
     poles = {pole.name for pole in geometry.poles}
-    for name in (*goal.forbidden, *goal.mandatory):
+    for name in (*objective.forbidden, *objective.mandatory):
         if name not in poles:
             raise SeipError(
                 f"{name!r} is no pole: a tolerance lays posts on the pavement anew, under other names; "
                 "draw a forbidden or mandatory area instead, or give --grid and --spacing"
             )
-    evaluator = Evaluator(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, objective)
 
     def answer(grid_spacing: float, candidate_spacing: float) -> Generator[Progress, None, Answer]:
         candidates = replace(settings.candidates, spacing=candidate_spacing)
@@ -175,7 +175,7 @@ def coarsest_settings(
 
 
 class Evaluator:
-    """Answers a goal under any settings of the grids, and evaluates the answers on one fine grid.
+    """Answers an objective under any settings of the grids, and evaluates the answers on one fine grid.
 
     Parameters
     ----------
@@ -183,12 +183,12 @@ class Evaluator:
         δ and the sensor types of the evaluation.
     """
 
-    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Objective) -> None:
+    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, objective: Objective) -> None:
         spacing = max(EVALUATION_SPACING, math.sqrt(geometry.region.area / MAX_EVALUATION_TARGETS))
         wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
         self.site = make_site(geometry, wide, spacing, settings.reach())
-        self.weights = target_weights(self.site, goal)
-        self.geometry, self._goal = geometry, goal
+        self.weights = target_weights(self.site, objective)
+        self.geometry, self._objective = geometry, objective
         self._models = settings.models()
         self._visibility: VisibilityModel = visibility_model(self.site, settings.visibility, settings.engine)
 
@@ -202,7 +202,7 @@ class Evaluator:
             candidate_spacing=settings.candidates.spacing,
             targets=len(site.targets),
             poses=len(site.candidates),
-            own=weighted_share(seen, target_weights(site, self._goal)),
+            own=weighted_share(seen, target_weights(site, self._objective)),
             evaluated=self.evaluate(solution),
         )
 
@@ -214,7 +214,7 @@ class Evaluator:
                 site,
                 grid.visible,
                 self._models,
-                self._goal,
+                self._objective,
                 settings.limits,
             )
         )

@@ -34,12 +34,12 @@ CHARTS = ("time_seen.png", "traffic.png")
 def main(argv: list[str]) -> None:
     """Place sensors for the road in traffic and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, settings = read_objective(options), read_settings(TrafficSettings, options)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
+    objective, settings = read_objective(options), read_settings(TrafficSettings, options)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
     layout = surveyed.layout
     runs = _read_runs(options, layout)
     runtime.LOG.info(runs.overlap)
-    steps = place_in_traffic(layout, surveyed.grid, goal, runs, settings)
+    steps = place_in_traffic(layout, surveyed.grid, objective, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)
     solution, study = placed.solution, placed.study
     runtime.print_line(_in_words(study, solution))

@@ -30,10 +30,11 @@ from seip_addon.core.workflows.survey import place
 def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal = read_objective(options)
-    refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal), refine)
-    steps = place(surveyed.layout, surveyed.grid, goal, pose_errors=options.pose_errors)
+    objective = read_objective(options)
+    tolerance = options.tolerance
+    refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective), refine)
+    steps = place(surveyed.layout, surveyed.grid, objective, pose_errors=options.pose_errors)
     solution = surveyed.stopwatch.run("placement", steps)
     runtime.print_line(_in_words(solution))
     with runtime.incomplete_if_interrupted(options.output):

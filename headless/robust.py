@@ -30,9 +30,9 @@ CHARTS = ("spread.png", "blame.png", "frontier.png")
 def main(argv: list[str]) -> None:
     """Place sensors for what may go wrong and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, robustness = read_objective(options), _robustness(options)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
-    steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
+    objective, robustness = read_objective(options), _robustness(options)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
+    steps = place_robustly(surveyed.layout, surveyed.grid, objective, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
     solution, study = robust.solution, robust.study
     runtime.print_line(_in_words(robust))

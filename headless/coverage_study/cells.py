@@ -195,8 +195,8 @@ def solve_cell(
     allowed = site.candidates.sensor == cell.sensor
     if cell.height is not None:
         allowed &= site.candidates.height == cell.height
-    goal = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
-    problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
+    objective = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
+    problem = replace(placement_problem(site, visible, models, objective), forbidden=~allowed)
     placement = yield from solve(problem, limits)
     deployment = deploy(site, models, visible, placement.chosen)
     return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

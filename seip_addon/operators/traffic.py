@@ -176,7 +176,7 @@ def _tried(
     layout, chosen = known.layout, known.plan.placement.chosen
     check_runs([traffic], layout.site.region)
     instants = spread_instants([traffic], INSTANTS, seed=0)
-    weight = target_weights(layout.site, known.plan.goal)
+    weight = target_weights(layout.site, known.plan.objective)
     sentence = yield from traffic_message(surroundings(layout), chosen, weight, instants)
     return known, sentence
 

@@ -191,7 +191,7 @@ def criterion_study(
     draws : int
         Grids, and azimuths, that are drawn at random.
     """
-    goal, random = Objective(count=count), np.random.default_rng(seed)
+    objective, random = Objective(count=count), np.random.default_rng(seed)
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     reach = float(np.hypot(*np.ptp(site.targets.xyz[:, :2], axis=0)))
@@ -203,9 +203,9 @@ def criterion_study(
     by_delta: list[DeltaAnswer] = []
     for key in models:
         candidates = replace(settings.candidates, sensors=(key,), heights=(heights[len(heights) // 2],))
-        by_delta += yield from _by_delta(geometry, replace(settings, candidates=candidates), goal)
+        by_delta += yield from _by_delta(geometry, replace(settings, candidates=candidates), objective)
 
-    evaluator = Evaluator(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, objective)
     by_grid = []
     for spacing in GRID_SPACINGS:
         tried = replace(settings, grid_spacing=spacing)
@@ -214,7 +214,7 @@ def criterion_study(
     for spacing in CANDIDATE_SPACINGS:
         tried = replace(settings, candidates=replace(settings.candidates, spacing=spacing))
         by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), evaluator.answer(tried))))
-    convergence = yield from coarsest_settings(geometry, settings, goal, tolerance)
+    convergence = yield from coarsest_settings(geometry, settings, objective, tolerance)
 
     best = yield from evaluator.solve(site, settings)
     phase, rechosen = yield from _by_grid_laid(evaluator, site, settings, best, draws, random)
@@ -316,10 +316,10 @@ def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) 
 
 
 def _by_delta(
-    geometry: SceneGeometry, settings: SurveySettings, goal: Objective
+    geometry: SceneGeometry, settings: SurveySettings, objective: Objective
 ) -> Generator[Progress, None, list[DeltaAnswer]]:
     """Vary δ for one sensor type at one height."""
-    evaluator = Evaluator(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, objective)
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     caster = make_ray_caster(site.triangles, settings.engine)
     (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights

@@ -37,9 +37,9 @@ class RobustSolution:
     pose_study: PoseStudy
 
 
-def check_robust_objective(goal: Objective) -> None:
-    """Raise SeipError where a goal allows no settings."""
-    if goal.cheapest:
+def check_robust_objective(objective: Objective) -> None:
+    """Raise SeipError where an objective allows no settings."""
+    if objective.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
             "is of poses as planned"
@@ -47,15 +47,15 @@ def check_robust_objective(goal: Objective) -> None:
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, settings: RobustnessSettings
+    layout: Layout, grid: VisibilityGrid, objective: Objective, settings: RobustnessSettings
 ) -> Generator[Progress, None, RobustSolution]:
-    """Answer a goal on a survey for what may go wrong.
+    """Answer an objective on a survey for what may go wrong.
 
     Parameters
     ----------
     grid : VisibilityGrid
         Of the poses as planned.
-    goal : Objective
+    objective : Objective
         Of most coverage.
 
     Raises
@@ -63,9 +63,9 @@ def place_robustly(
     SeipError
         As for `check_robust_objective`, `placement_problem` and `solve_robust`.
     """
-    check_robust_objective(goal)
+    check_robust_objective(objective)
     site, models, around = layout.site, layout.models, surroundings(layout)
-    problem = placement_problem(site, grid.visible, models, goal)
+    problem = placement_problem(site, grid.visible, models, objective)
     study = yield from robust_study(around, problem, settings, [settings.risk], layout.settings.limits)
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
@@ -73,7 +73,7 @@ def place_robustly(
     under_errors = yield from pose_study(around, deployment, tried)
     note = f"chosen for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
     notes = (note, *chosen.placement.notes, robustness_message(study), *pose_warnings(under_errors))
-    solution = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
+    solution = Solution(with_count(objective, site), replace(chosen.placement, notes=notes), None, deployment)
     return RobustSolution(solution, study, under_errors)
 
 

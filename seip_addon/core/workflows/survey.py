@@ -282,7 +282,7 @@ def record_of(  # what was asked for stands in the record
     pose_errors : bool
         Whether the plan was tried with pose errors; see `place`.
     """
-    asked = {"goal": asdict(plan.goal), "pose_errors": pose_errors, "render": render}
+    asked = {"goal": asdict(plan.objective), "pose_errors": pose_errors, "render": render}
     run = Run(
         settings=layout.settings.as_record() | asked,
         created=circumstances.created,

@@ -115,16 +115,16 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
 
 
 def place_in_traffic(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, runs: TrafficRuns, settings: TrafficSettings
+    layout: Layout, grid: VisibilityGrid, objective: Objective, runs: TrafficRuns, settings: TrafficSettings
 ) -> Generator[Progress, None, TrafficSolution]:
-    """Answer a goal on a survey for the road in traffic, whose vehicles block the view.
+    """Answer an objective on a survey for the road in traffic, whose vehicles block the view.
 
     Parameters
     ----------
     grid : VisibilityGrid
         Of the empty road.
     """
-    problem = placement_problem(layout.site, grid.visible, layout.models, goal)
+    problem = placement_problem(layout.site, grid.visible, layout.models, objective)
     if settings.weights_from_traffic:
         seconds = yield from road_user_seconds(layout.site.targets, runs.optimisation)
         problem = replace(problem, weights=problem.weights * seconds)
@@ -141,4 +141,4 @@ def place_in_traffic(
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
     deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
-    return TrafficSolution(Solution(with_count(goal, layout.site), noted, None, deployment), study)
+    return TrafficSolution(Solution(with_count(objective, layout.site), noted, None, deployment), study)
