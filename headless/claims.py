@@ -1,4 +1,4 @@
-"""Claims of the paper, and how they are evaluated on one site.
+"""Claims of the paper, and their verdicts on one site.
 
 The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
 Evaluation of Infrastructure-based Collective Perception", section V.

@@ -43,7 +43,7 @@ MAX_EVALUATION_TARGETS = 400_000
 
 @dataclass(frozen=True)
 class Answer:
-    """The best placement under some spacings, and how good it is.
+    """The best placement under some spacings, with its coverage on its own grid and on the fine one.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Convergence:
-    """Which spacings were tried, and which were picked.
+    """Result of the search for the coarsest spacings: all that were tried, and those picked.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Convergence:
 
     @property
     def message(self) -> str:
-        """What was picked and why."""
+        """The picked spacings and their coverage, as a message."""
         grid, finest = self.by_grid[-2:]
         posts, most = self.by_candidates[-2:]
         return (
@@ -175,7 +175,7 @@ def coarsest_settings(
 
 
 class Evaluator:
-    """Answers an objective under any settings of the grids, and evaluates the answers on one fine grid.
+    """Optimises under any grid settings, and evaluates the placements on one fine grid.
 
     Parameters
     ----------

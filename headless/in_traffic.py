@@ -32,7 +32,7 @@ CHARTS = ("time_seen.png", "traffic.png")
 
 
 def main(argv: list[str]) -> None:
-    """Place sensors for the road in traffic and write the result to a folder."""
+    """Optimise a placement for traffic and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective, settings = read_objective(options), read_settings(TrafficSettings, options)
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))

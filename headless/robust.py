@@ -28,7 +28,7 @@ CHARTS = ("spread.png", "blame.png", "frontier.png")
 
 
 def main(argv: list[str]) -> None:
-    """Place sensors for what may go wrong and write the result to a folder."""
+    """Optimise a robust placement and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective, robustness = read_objective(options), _robustness(options)
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
@@ -53,7 +53,7 @@ def _in_words(robust: RobustSolution) -> str:
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, the nominal optimum's {nominal.planned:.2%}",
-            f"over {study.settings.draws} unseen draws, {chosen.judged_by.describe_outcome()}:",
+            f"over {study.settings.draws} unseen draws, {chosen.evaluated_by.describe_outcome()}:",
             f"mean {chosen.mean.describe()}, the nominal optimum's {nominal.mean.describe()}",
             f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
             f"which is {study.saving(chosen).describe()} more, draw for draw",

@@ -56,7 +56,7 @@ ELAPSED_FORMAT = "{desc} [{elapsed}]"
 """How progress of unknown length is shown."""
 
 LOG = logging.getLogger("headless")
-"""What commands and their modules report on the way; `print_line` is for results."""
+"""Progress and warnings of commands and their modules; results go through `print_line`."""
 
 _LOCKS: dict[Path, int] = {}
 """Folders that this process has locked, and what holds each lock."""
@@ -105,7 +105,7 @@ def check_folder(folder: Path) -> None:
 
 @contextmanager
 def incomplete_if_interrupted(folder: Path) -> Iterator[None]:
-    """Say of an interruption from here on that the folder is incomplete: each file in it is whole, but some lack."""
+    """Add to a Ctrl-C within the block that the folder is incomplete: its files are whole, but some are missing."""
     try:
         yield
     except KeyboardInterrupt as stop:
@@ -113,7 +113,7 @@ def incomplete_if_interrupted(folder: Path) -> Iterator[None]:
 
 
 def print_line(text: str) -> None:
-    """Print a line for the person who runs the command, at once."""
+    """Print a line of the command's results on standard output, unbuffered."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 

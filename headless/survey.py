@@ -61,7 +61,7 @@ class Stopwatch:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A scene laid out and seen."""
+    """A scene with its site layout and visibility grid."""
 
     layout: Layout
     grid: VisibilityGrid
@@ -165,7 +165,7 @@ def save_solution(
 
 
 def describe_sensor(sensor: Sensor) -> str:
-    """Say which sensor hangs where."""
+    """Describe a sensor: type, position, height and tilt."""
     tilt = describe_tilt(sensor.tilt)
     return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
 

@@ -49,7 +49,7 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class PrecisionCell:
-    """What was reached with one type and number of sensors.
+    """Average precision of one type and number of sensors, by seed.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class PrecisionCell:
 
     @property
     def name(self) -> str:
-        """What it is called in a chart."""
+        """Name in charts."""
         return _named(self.count, self.sensor)
 
 
@@ -383,7 +383,7 @@ def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
 
 
 def _precision_axis(panel: Axes, reached: Sequence[float], x: str) -> None:
-    """Show what was reached: differences near 1 would not be seen on an axis from 0."""
+    """Scale the axis to the values: differences near 1 would not be visible on an axis from 0."""
     lowest = min(value for value in reached if math.isfinite(value))
     panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
     style_axes(panel, x, PRECISION_LABEL, "y")

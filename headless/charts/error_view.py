@@ -39,7 +39,7 @@ CLOUD, REGION, IGNORED, TRUTH, DETECTION, ERROR, SENSOR = range(7)
 
 @dataclass(frozen=True, eq=False)
 class ErrorView:
-    """One frame and what was made of it.
+    """One frame with its road users, detections and errors.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
 
 
 def save_blame_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) -> None:
-    """Draw what each sensor's own error, and each kind of error, costs of the coverage on average, as PNG."""
+    """Draw the mean loss of coverage by each sensor's own error, and by each kind of error, as PNG."""
     figure, (axes,) = new_figure(*FIGURE_SIZE)
     sensors = list(zip(study.labels, study.loss_by_sensor(), strict=True))
     kinds = list(study.loss_by_kind().items())
@@ -90,13 +90,13 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
 
 def _outcome(study: RobustStudy) -> str:
     """Name what placements are evaluated by, if it is one thing."""
-    return study.nominal[0].judged_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
+    return study.nominal[0].evaluated_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
     """Name a placement, and the nominal optimum, of which there are several then, with what it is evaluated by."""
     several = len(study.nominal) > 1 and contender in study.nominal
-    name = f"{contender.name}: {contender.judged_by.describe_outcome()}" if several else contender.name
+    name = f"{contender.name}: {contender.evaluated_by.describe_outcome()}" if several else contender.name
     return fill(name, LEGEND_LETTERS)
 
 

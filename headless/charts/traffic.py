@@ -68,7 +68,7 @@ def save_time_map(  # what is drawn, and where
 
 
 def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
-    """Draw what placements for the empty road promise and hold in traffic beside those chosen on traffic, as PNG.
+    """Draw coverage on the empty road and in traffic, for placements optimised without and with traffic, as PNG.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
 
 
 def negative(estimate: IntervalEstimate) -> IntervalEstimate:
-    """Return the estimate of what has the opposite sign."""
+    """Return an estimate with the opposite sign."""
     return IntervalEstimate(-estimate.value, -estimate.high, -estimate.low)
 
 

@@ -29,7 +29,7 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class Cell:
-    """What one cell of the study allows.
+    """A cell of the study: type, height, number of sensors and central weight.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ MIN_CHANGE = 0.01
 
 
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
-    """Hold claims 1 to 4 and 10 of the study against the solved cells.
+    """Evaluate claims 1 to 4 and 10 of the paper on the solved cells.
 
     Claims that compare types, heights or weights are left out where there is
     nothing to compare.
@@ -114,7 +114,7 @@ def _weighting(study: CoverageStudy) -> Claim:
 
 
 def _weighting_verdict(changes: Sequence[tuple[float, float]], proven: Sequence[bool], *, is_best: bool) -> str:
-    """Judge one type by its gains and losses, which mean something once all its placements are proven."""
+    """Return the verdict on one type by its gains and losses; undecided unless all its placements are proven."""
     if not all(proven):
         return UNDECIDED
     if is_best:
@@ -137,9 +137,9 @@ def _is_proven(case: Case) -> bool:
 
 
 def _greedy(study: CoverageStudy) -> Claim:
-    promise = 1 - 1 / math.e
+    guarantee = 1 - 1 / math.e
     reached = [(case.greedy.objective, *case.span) for case in study.cases]
-    verdicts = [verdict(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
+    verdicts = [verdict(holds=value >= guarantee * high, fails=value < guarantee * low) for value, low, high in reached]
     worst = min(value / high for value, _, high in reached)
     short = sum(value < low * (1 - 1e-9) for value, low, _ in reached)
     return Claim(

@@ -20,7 +20,7 @@ DENSITY_EDGES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, np.inf)
 
 @dataclass(frozen=True)
 class Bin:
-    """What became of some of the road users and detections.
+    """Figures of the road users and detections in one bin.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def false_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], scor
 
 @dataclass(frozen=True)
 class FalsePositives:
-    """False detections with at least some score.
+    """Counts of the false detections with at least some score.
 
     Parameters
     ----------

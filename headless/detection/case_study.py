@@ -69,7 +69,7 @@ PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1
 
 @dataclass(frozen=True, eq=False)
 class Traffic:
-    """Runs of traffic by what they are for.
+    """Runs of traffic for training, validation and tests.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[Sampl
 
 @dataclass(frozen=True, eq=False)
 class ModelConfiguration:
-    """A detector that is to be trained.
+    """A detector to be trained: its settings, seed and sensor configurations.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class ModelConfiguration:
 
 @dataclass(frozen=True, eq=False)
 class DetectorOutcome:
-    """What one detector made of one configuration's test frames.
+    """Results of one detector on one configuration's test frames.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def place_all(
 
 @dataclass(frozen=True, eq=False)
 class TrainingSet:
-    """What detectors learn from, and by what is seen when that is enough: recordings by their configuration's name."""
+    """Training and validation recordings, by the name of their sensor configuration."""
 
     training: dict[str, list[SampledRecording]]
     validation: dict[str, list[SampledRecording]]
@@ -312,7 +312,7 @@ def train_all(
 def evaluate_all(
     simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
-    """Judge every detector with each of its configurations; a frame is simulated once for all of them."""
+    """Evaluate every detector with each of its configurations; a frame is simulated once for all of them."""
     configurations = {one.name: one for model in models for one in model.configurations}.values()
     total = len(configurations) * sum(len(run.times) for run in (*traffic.validation, *traffic.test))
     done = 0

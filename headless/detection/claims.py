@@ -69,7 +69,7 @@ class SeedResult:
 
 
 def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
-    """Hold claims 5 to 9 of the study against what was measured.
+    """Evaluate claims 5 to 9 of the paper on the measurements.
 
     Claims for which a type or the ablation is missing are left out.
 

@@ -37,7 +37,7 @@ _SEED_LOCK = threading.Lock()  # torch draws first weights from one source of ra
 
 @dataclass(frozen=True)
 class TrainingRecord:
-    """What a detector has learnt from, as far as it is known.
+    """Sensor types and sites that a detector has been trained on, as far as known.
 
     Parameters
     ----------
@@ -87,11 +87,11 @@ class Detector(nn.Module):
 
     @property
     def found_by(self) -> DetectionHead:
-        """The head as what it can do, rather than as a module."""
+        """The head, typed by its interface rather than as a module."""
         return cast("DetectionHead", self.head)
 
     def forward(self, pillars: Pillars, shape: tuple[int, int, int]) -> Tensor:
-        """Return what the head says of some clouds; ``shape`` is their number and the rows and columns of a cloud."""
+        """Return the head's output for some clouds; ``shape`` is their number and the rows and columns of a cloud."""
         features = torch.from_numpy(pillars.features).to(self.device)
         pillar = torch.from_numpy(pillars.pillar).to(self.device)
         output: Tensor = self.head(self.feature_map(features, pillar, shape))
@@ -158,7 +158,7 @@ def _with_the_same_weights(detector: Detector, settings: NetworkSettings, grid: 
 
 
 def check_device(device: str) -> None:
-    """See that torch can use a device, before the work rather than after.
+    """Raise SeipError where torch cannot use a device.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 @contextmanager
 def fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Lay what goes wrong in the block at the door of the file."""
+    """Raise errors within the block as errors of the file."""
     try:
         yield
     except SeipError as error:

@@ -36,7 +36,7 @@ class Kitti(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A frame as this benchmark sees it: k detections in the order given, who overlaps whom enough.
+    """A frame as this benchmark treats it: k detections in the order given, and which overlap which road user.
 
     ``near`` holds for each road user the detections that overlap it enough,
     and by how much; ``blamed`` (k,) whether a detection that finds nobody is

@@ -36,7 +36,7 @@ NO_MATCH = -1
 
 @dataclass(frozen=True)
 class Rule:
-    """What is to be found, and what finding is.
+    """Which road users count, and when a detection matches one.
 
     Parameters
     ----------

@@ -194,7 +194,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
 
 @dataclass(frozen=True)
 class Filling:
-    """How full the pillars of a cloud are.
+    """Numbers of points, of pillars, and of pillars with more points than they keep.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class Filling:
 
 
 def filling(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Filling:
-    """Tell how full the pillars of a cloud (n, 3 or more columns) are, where each keeps so many points."""
+    """Return how full the pillars of a cloud (n, 3 or more columns) are, where each keeps so many points."""
     _, pillar = _choose(points, grid, len(points) + 1)
     counts = np.unique(pillar, return_counts=True)[1]
     if not len(counts):

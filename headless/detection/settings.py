@@ -50,7 +50,7 @@ def _whole(value: object, least: int, most: int) -> bool:
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """The network, apart from its weights.
+    """Settings of the network: pillars, widths, blocks and head.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ PUBLISHED_NETWORK = NetworkSettings(pillar=0.24, most_points=32, width=64, block
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """How a detector is trained.
+    """Settings of the training of a detector.
 
     Parameters
     ----------

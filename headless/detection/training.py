@@ -136,7 +136,7 @@ def train(
 
 
 class _Run:
-    """A training that is under way."""
+    """State of a running training."""
 
     def __init__(
         self,
@@ -163,7 +163,7 @@ class _Run:
 
     @property
     def done(self) -> bool:
-        """Whether there is nothing left to do."""
+        """Whether the training has ended."""
         waited = sum(step > self.curve.best for step in self.curve.validation)
         return self.step >= self.settings.steps or waited >= self.settings.patience
 
@@ -190,7 +190,7 @@ class _Run:
             self.best = _copied(self.detector.state_dict())
 
     def progress(self) -> Progress:
-        """Return how far it is, with the loss."""
+        """Return the progress, with the loss."""
         what = "train"
         if self.curve.loss:
             what += f", loss {np.mean(self.curve.loss[-20:]):.2f}"
@@ -223,7 +223,7 @@ class _Run:
         )
 
     def restore(self, path: str | os.PathLike[str]) -> None:
-        """Go on where an earlier training was when it was stored."""
+        """Continue from a stored training."""
         state = load_state(path)
         earlier = state.get("training", {})
         same = (

@@ -1,4 +1,4 @@
-"""Who drives and walks where and when, as a route file for SUMO."""
+"""Traffic demand, departures and routes of vehicles and pedestrians, as a route file for SUMO."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcy
 
 @dataclass(frozen=True)
 class Demand:
-    """How much traffic there is.
+    """Traffic volumes by kind of road user.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Demand:
     pedestrians: float = 200.0
 
     def __post_init__(self) -> None:
-        """Refuse what no traffic can be."""
+        """Raise SeipError where a volume cannot be meant."""
         if not 0.0 < self.flow <= 3000.0:
             raise SeipError(f"--flow must be above 0 and at most 3000 vehicles per hour and arm, not {self.flow:g}")
         if not 0.0 <= self.pedestrians <= 3000.0:
@@ -112,7 +112,7 @@ class Demand:
 def write_routes(
     path: str | os.PathLike[str], network: StreetNetwork, demand: Demand, seed: int, duration: float
 ) -> None:
-    """Write who is on the road from 0 to ``duration`` seconds; the same for the same seed.
+    """Write the routes of all road users from 0 to ``duration`` seconds; the same for the same seed.
 
     Raises
     ------

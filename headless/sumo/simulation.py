@@ -64,14 +64,14 @@ class SignalPlan:
     all_red: int = 2
 
     def __post_init__(self) -> None:
-        """Refuse a plan that never turns."""
+        """Raise SeipError where a duration cannot be meant."""
         if min(self.green, self.amber) < 1 or self.all_red < 0:
             raise SeipError("a signal plan needs green and amber of at least 1 s, and no negative times")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """What to simulate.
+    """Seed, duration, demand and signals of a simulation.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Scenario:
     duration: float
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Raise SeipError where the scenario cannot be simulated."""
         if not 0 <= self.seed < 2**31:
             raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
         if not 0.0 < self.duration <= 86400.0:

@@ -73,7 +73,7 @@ def mean_of(values: Float) -> IntervalEstimate:
 
 
 def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
-    """Estimate a mean of values that depend on each other when they are near in time, by means of batches.
+    """Estimate the mean of a time series from the means of its batches, since neighbouring values are dependent.
 
     Stretches are taken as independent and as equally long (batch means; Law 2015,
     section 9.5.3), and Student's interval is that of their means.

@@ -143,7 +143,7 @@ def side_by_side(
 
 
 class _Stopped(BaseException):
-    """Nobody waits for this work any more."""
+    """Raised in a worker thread whose result is no longer wanted."""
 
 
 def _sum_of(parts: Sequence[Progress], works: int) -> Progress:

@@ -23,7 +23,7 @@ from seip_addon.core.progress import finish
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a way found within its time.
+    """What a method found within its time limit.
 
     Parameters
     ----------

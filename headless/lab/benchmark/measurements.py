@@ -36,7 +36,7 @@ LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class BenchmarkScope:
-    """What is measured: how the scene is laid out, how large synthetic instances and the steps of growth are.
+    """Sizes of the benchmark: the scene's layout, synthetic instances and steps of growth.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def placements(
 def growth(
     geometry: SceneGeometry, settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
 ) -> list[Growth]:
-    """Let one thing grow at a time, then all together: the scene set side by side to a corridor."""
+    """Measure growth with one size at a time, then with all: copies of the scene side by side."""
     LOG.info("growth, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout)

@@ -15,7 +15,7 @@ from seip_addon.core.placement import PlacementProblem
 
 @dataclass(frozen=True, eq=False)
 class SolverRun:
-    """What one way did with one instance.
+    """Run of one method on one instance.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ _SPEED, _SECONDS, _GAP = 8.0, 10.0, 6.0  # metres per second, seconds, metres
 
 @dataclass
 class ScanCost:
-    """What frames of scans took.
+    """Cost of simulated frames.
 
     Parameters
     ----------

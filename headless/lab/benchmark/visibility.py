@@ -36,7 +36,7 @@ SENSOR_COUNT = 4
 
 @dataclass
 class Cost:
-    """What a way to compute visibility took, summed over places.
+    """Cost of a method to compute visibility, summed over positions.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Cost:
 
 @dataclass(frozen=True, eq=False)
 class Degradation:
-    """What a simplification does to the answer.
+    """Degradation of coverage and placement by a simplification.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def harms(
     simpler: Sequence[Approximation],
     time_limit: float,
 ) -> dict[str, Degradation]:
-    """Tell what each simplification does to the whole grid, and to the placement of four sensors of the first type.
+    """Compute the degradation of grid and placement by each simplification, for four sensors of the first type.
 
     The grids are computed lazily: they are the full scans', as `visibility_costs` checks on a sample.
 

@@ -41,7 +41,7 @@ def detector_limits(
     seeds: int = 3,
     steps: int = TrainingSettings().steps,
 ) -> Generator[Progress, None, LimitsStudy]:
-    """Train detectors on a scene and try them until they fail.
+    """Train detectors on a scene, and evaluate them under growing disturbances.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ DROP_INTENSITY = 0.05
 
 @dataclass(frozen=True)
 class Disturbance:
-    """Nothing is wrong; what is, overrides one of these methods.
+    """Base class of disturbances, without any: each overrides one of these methods.
 
     Parameters
     ----------
@@ -49,23 +49,23 @@ class Disturbance:
     unit: ClassVar[str] = ""
 
     def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
-        """Return the sensors as they are instead."""
+        """Return the disturbed sensors."""
         return tuple(sensors)
 
     def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
-        """Return the traffic as it is instead."""
+        """Return the disturbed traffic."""
         return trajectories
 
     def disturbed_scan(self, simulation: Simulation, number: int, time: float) -> Frame:
-        """Return a frame as it is taken instead."""
+        """Return a frame of a disturbed scan."""
         return simulation.frame(number, time)
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
-        """Return what the frame shows instead."""
+        """Return the disturbed frame."""
         return frame
 
     def disturbed_detector(self, detector: Detector) -> Detector:
-        """Return the detector as it looks at frames instead."""
+        """Return the disturbed detector."""
         return detector
 
 
@@ -170,7 +170,7 @@ def range_in(clear: float, lost: float) -> float:
 
 @dataclass(frozen=True)
 class OfOneSensor(Disturbance):
-    """Something is wrong with one sensor.
+    """A disturbance of one sensor.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class TiltError(OfOneSensor):
 
 @dataclass(frozen=True)
 class ClockOffset(OfOneSensor):
-    """A sensor's clock is late: its points are of the street so many seconds ago."""
+    """A sensor's clock is late: its points were measured so many seconds ago."""
 
     name: ClassVar[str] = "clock late"
     unit: ClassVar[str] = "s"
@@ -232,7 +232,7 @@ class ClockOffset(OfOneSensor):
 
 @dataclass(frozen=True)
 class SensorFailure(OfOneSensor):
-    """A sensor is silent. Its number is the size, so that each in turn makes a series; they count from 1."""
+    """A sensor returns nothing. Its number is the size, so that each in turn makes a series; they count from 1."""
 
     name: ClassVar[str] = "sensor lost"
     unit: ClassVar[str] = "number of the sensor"
@@ -249,7 +249,7 @@ class SensorFailure(OfOneSensor):
 
 @dataclass(frozen=True)
 class Thinned(Disturbance):
-    """A share of the road users stays at home."""
+    """A share of the road users is left out."""
 
     seed: int = 0
     name: ClassVar[str] = "thinner traffic"

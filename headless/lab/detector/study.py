@@ -79,7 +79,7 @@ def brief_series(sensor: int) -> tuple[Series, ...]:
 
 @dataclass(frozen=True, eq=False)
 class DisturbanceEffect:
-    """What a disturbance of one size does.
+    """Average precision under a disturbance of one size.
 
     Parameters
     ----------
@@ -121,18 +121,18 @@ class DisturbanceCurve:
 
     @property
     def begins(self) -> DisturbanceEffect | None:
-        """The mildest that lowers average precision by more than chance, or None."""
+        """The smallest size that lowers average precision by more than chance, or None."""
         return next((point for point in self.points if point.change.high < 0), None)
 
     @property
     def steady(self) -> bool:
-        """Whether half the resamples say the same of every size."""
+        """Whether half the resamples give the same result for every size."""
         return all((point.change.high < 0) == (point.change_by_half.high < 0) for point in self.points)
 
 
 @dataclass(frozen=True, eq=False)
 class SeedSpread:
-    """What trainings with other seeds make of the same placement.
+    """Spread of average precision over seeds of the training, with one placement.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class SeedSpread:
 
 @dataclass(frozen=True, eq=False)
 class TransferResult:
-    """What detectors are worth where they have not learnt.
+    """Average precision of detectors on types, traffic or sites that they were not trained on.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class TransferResult:
 
 @dataclass(frozen=True, eq=False)
 class BorderResults:
-    """Where in the region the undisturbed detectors fail, of one placement and the first detector.
+    """Recall by distance from the region's border, of the first detector with one placement.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ class BorderResults:
 
 @dataclass(frozen=True, eq=False)
 class PillarFilling:
-    """How full pillars are with a placement.
+    """Filling of pillars with one placement.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class PillarFilling:
 
 @dataclass(frozen=True, eq=False)
 class OtherSite:
-    """Another ground, on which detectors from home are tried.
+    """Another site, on which detectors are evaluated that were not trained there.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class OtherSite:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedDetectors:
-    """Detectors to be tried at home.
+    """Detectors to be evaluated on the site that they were trained on.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ class EvaluatedDetectors:
 
 @dataclass(frozen=True, eq=False)
 class TrainingPlan:
-    """Who has to be trained before the study.
+    """Detectors that have to be trained before the study.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def training_plan(
     seeds: int,
     padding: bool,
 ) -> TrainingPlan:
-    """Return who has to be trained; from one type's clouds for as large a part of the steps as they are of all clouds.
+    """Return the detectors to train; from one type's clouds for as large a part of the steps as they are of all clouds.
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ def limits_study(
     store: Path,
     score: float,
 ) -> Generator[Progress, None, LimitsStudy]:
-    """Try detectors until they fail.
+    """Evaluate detectors under growing disturbances.
 
     Parameters
     ----------
@@ -393,7 +393,7 @@ def limits_study(
 
 
 class _Desk:
-    """Hands out trials and counts them."""
+    """Runs trials, and counts them for progress."""
 
     def __init__(self, home: TrialSite, store: Path, total: int) -> None:
         self._home, self._store, self._total, self._done = home, store, total, 0
@@ -435,7 +435,7 @@ class _Desk:
         candidates: EvaluatedDetectors,
         elsewhere: Sequence[OtherSite],
     ) -> Generator[Progress, None, list[TransferResult]]:
-        """Try detectors of one type with the others, and all detectors on other grounds."""
+        """Evaluate detectors of one type on the others, and all detectors on other sites."""
         found = []
         for configuration in configurations:
             tried = {}

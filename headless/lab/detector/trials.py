@@ -65,7 +65,7 @@ TABLES = {"detections": EvaluatedDetections, "wanted": CountedTruth}
 
 @dataclass(frozen=True, eq=False)
 class TrialSite:
-    """Where detectors are tried.
+    """A site with the test frames on which detectors are evaluated.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class TrialSite:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedDetector:
-    """A detector that is tried."""
+    """A trained detector to be evaluated."""
 
     name: str
     detector: Detector
@@ -112,7 +112,7 @@ class EvaluatedDetector:
 
 @dataclass(frozen=True, eq=False)
 class DisturbedTrial:
-    """What one detector made of the test frames.
+    """Results of one detector on disturbed test frames.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def trials(
     tested: Sequence[EvaluatedDetector],
     store: Path,
 ) -> Generator[Progress, None, list[DisturbedTrial]]:
-    """Try detectors with a placement under a disturbance; a frame is simulated once for all of them.
+    """Evaluate detectors with a placement under a disturbance; a frame is simulated once for all of them.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def trials(
 
 
 def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTrial:
-    """Judge what a detector made of some frames."""
+    """Evaluate a detector's results on some frames."""
 
     def from_border(boxes: Float) -> Float:
         distance: Float = shapely.distance(region.boundary, shapely.points(boxes[:, :2]))

@@ -142,7 +142,7 @@ def engines_here() -> tuple[Engine, ...]:
 def arithmetic_study(
     rays: int = 20_000, seed: int = 0, engines: Sequence[Engine] | None = None
 ) -> Generator[Progress, None, ArithmeticStudy]:
-    """Hold ray casters to float64 on scenes that are hard on them.
+    """Compare ray casters with float64 on numerically hard scenes.
 
     Parameters
     ----------

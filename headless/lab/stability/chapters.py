@@ -41,7 +41,7 @@ DETECTOR_RUNS = 3
 
 @dataclass(frozen=True)
 class StabilityScope:
-    """How much is tried.
+    """Sizes of the studies.
 
     Parameters
     ----------
@@ -97,13 +97,13 @@ class StudiedScene:
 
     @property
     def sensor(self) -> str:
-        """The type in the middle of those that were named: it has something to lose, and something to win."""
+        """The middle one of the sensor types: neither its best nor its worst coverage is trivial."""
         sensors = list(self.surveyed.layout.models)
         return sensors[len(sensors) // 2]
 
     @property
     def placed(self) -> str:
-        """What is placed, for titles."""
+        """The placement, for titles."""
         return f"{DEFAULT_COUNT} × {self.sensor}"
 
     def problem(self, sensor: str) -> PlacementProblem:
@@ -132,7 +132,7 @@ def chapters(studied: StudiedScene) -> Iterator[tuple[str, Work]]:
 
 
 def criterion(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Vary what defines visibility."""
+    """Vary δ, grid spacings and beam azimuth."""
     layout = studied.surveyed.layout
     delta = layout.settings.visibility.delta
     study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=studied.scope.grids)
@@ -157,7 +157,7 @@ def criterion(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def arithmetic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Hold the ray casters to float64."""
+    """Compare the ray casters with float64."""
     study = yield from arithmetic_study(studied.scope.rays)
     limits_charts.save_rounding_chart(studied.charts / "rounding.png", study, "Hits against float64")
     return Chapter(
@@ -168,7 +168,7 @@ def arithmetic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def solvers(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Drive the solvers to where they fail, and see how flat the top is."""
+    """Find the limits of the solvers, and the size of the near-optimal set."""
     study = yield from solver_study(studied.scope.instances)
     tops: list[tuple[str, NearOptimalSet]] = []
     for sensor in studied.surveyed.layout.models:
@@ -190,7 +190,7 @@ def solvers(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def poses(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Let the poses of a placement err."""
+    """Study a placement under pose errors."""
     layout, around = studied.surveyed.layout, surroundings(studied.surveyed.layout)
     study = yield from robust_study(
         around, studied.problem(studied.sensor), studied.scope.robust, limits=layout.settings.limits
@@ -217,7 +217,7 @@ def poses(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def failures(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Let a sensor fail, and ask for more than one look."""
+    """Study placements under sensor failures and multi-cover."""
     around, problem = surroundings(studied.surveyed.layout), studied.problem(studied.sensor)
     study = yield from robust_study(
         around, problem, studied.scope.robust, RISKS, studied.surveyed.layout.settings.limits
@@ -228,7 +228,7 @@ def failures(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def traffic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Let vehicles stand in the way of a placement."""
+    """Study placements in traffic."""
     layout = studied.surveyed.layout
     around, problem, settings = surroundings(layout), studied.problem(studied.sensor), layout.settings
     runs_to_choose, runs_to_evaluate = split_runs(studied.runs)
@@ -261,7 +261,7 @@ def traffic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def detector(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Train detectors, and try them until they fail."""
+    """Train detectors, and evaluate them under growing disturbances."""
     from headless.lab.detector import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
     from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
     from headless.lab.detector.chapter import detector_limits  # noqa: PLC0415 -- as above
@@ -278,7 +278,7 @@ def detector(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 
 def introduction(studied: StudiedScene) -> str:
-    """Return what the page begins with."""
+    """Return the introduction of the page."""
     site = studied.surveyed.layout.site
     return (
         "Where each method begins to fail, how that was found, and what the tool does about it. Written by "

@@ -146,7 +146,7 @@ class Draws:
 
 @dataclass(frozen=True, eq=False)
 class CriterionStudy:
-    """How coverage and placement hang on the criterion.
+    """Sensitivity of coverage and placement to the criterion of visibility.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def criterion_study(
     draws: int = 40,
     seed: int = 0,
 ) -> Generator[Progress, None, CriterionStudy]:
-    """Vary what defines visibility, one thing at a time.
+    """Vary δ, grid spacings and beam azimuth, one at a time.
 
     Parameters
     ----------
@@ -298,7 +298,7 @@ def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle:
 
 def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) -> SeenByRatio:
     """Count targets in view, and those seen, from upright sensors, by distance in multiples of the border."""
-    caster, look, targets = make_ray_caster(site.triangles), visibility_model(site, settings), site.targets.xyz
+    caster, visibility, targets = make_ray_caster(site.triangles), visibility_model(site, settings), site.targets.xyz
     poses = site.candidates
     total, seen = np.zeros(len(BORDER_RATIOS) - 1, dtype=int), np.zeros(len(BORDER_RATIOS) - 1, dtype=int)
     upright = (poses.sensor == model.key) & (poses.tilt == 0)
@@ -307,7 +307,7 @@ def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) 
         for pose in own[np.linspace(0, len(own) - 1, POSITIONS_COUNTED).astype(int)]:
             xyz, orientation = poses.xyz[pose], poses.orientation(pose)
             view = in_view(caster, model, xyz, orientation, targets)
-            sees = look.see(model, xyz, orientation) & view
+            sees = visibility.see(model, xyz, orientation) & view
             ratio = np.hypot(*(targets - xyz)[:, :2].T) / unresolved_from(model, height, settings.delta, math.inf)
             total += np.histogram(ratio[view], BORDER_RATIOS)[0]
             seen += np.histogram(ratio[sees], BORDER_RATIOS)[0]
@@ -356,7 +356,7 @@ def _by_grid_laid(
     draws: int,
     random: np.random.Generator,
 ) -> Generator[Progress, None, tuple[Draws, Draws]]:
-    """Judge the best placement on grids that lie otherwise; choose anew on a quarter of them."""
+    """Evaluate the best placement on shifted and rotated grids; optimise anew on a quarter of them."""
     covered, rechosen = [], []
     for draw in range(draws):
         targets = turned_targets(
@@ -373,10 +373,10 @@ def _by_grid_laid(
 
 
 def _coverage(site: Site, settings: SurveySettings, deployment: Deployment, turn: Sequence[float] = ()) -> float:
-    look = visibility_model(site, settings.visibility, settings.engine)
+    visibility = visibility_model(site, settings.visibility, settings.engine)
     turns = turn or [0.0] * len(deployment.sensors)
     seen = [
-        look.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))
+        visibility.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))
         for sensor, by in zip(deployment.sensors, turns, strict=True)
     ]
     return float(np.any(seen, axis=0).mean())

@@ -86,7 +86,7 @@ def with_stray(scene: HardScene, distance: float) -> HardScene:
 
 
 def ordinary_scene(rays: int, random: np.random.Generator) -> HardScene:
-    """Return the street that nothing is wrong with."""
+    """Return a plain street without numerical difficulties."""
     return HardScene("an ordinary street", _street(), ORIGIN, _everywhere(rays, random))
 
 

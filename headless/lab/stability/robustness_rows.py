@@ -61,7 +61,7 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"placement for {contender.name}",
             regime,
             f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
-            f"{contender.judged_by.describe_outcome()} {contender.low.describe()} against "
+            f"{contender.evaluated_by.describe_outcome()} {contender.low.describe()} against "
             f"{study.beside(contender).low.describe()} of the nominal optimum: "
             f"{study.saving(contender).as_points()} more",
             f"{settings.draws} draws that nothing was chosen on; half of them "

@@ -10,7 +10,7 @@ from seip_addon.core.estimates import NORMAL_QUANTILE
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many independent trials."""
+    """A number of successes among independent trials."""
 
     count: int
     trials: int

@@ -38,7 +38,7 @@ GREEDY_COUNTS = (2, 3, 4, 5, 6, 8, 10)
 
 @dataclass(frozen=True)
 class SpanCheck:
-    """Answers on random instances against exhaustive search.
+    """Solutions of random instances compared with exhaustive search.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class SpanCheck:
 
 @dataclass(frozen=True)
 class TieCheck:
-    """What a disturbance of equal weights does to the choice.
+    """Change of the choice under perturbations of equal weights.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class TieCheck:
 
 @dataclass(frozen=True)
 class GreedyCheck:
-    """Greedy on the instance that is worst for it.
+    """Greedy selection on its worst-case instance.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class TimeCheck:
 
 @dataclass(frozen=True)
 class SolverStudy:
-    """Where solvers fail."""
+    """Results of the checks of the solvers."""
 
     spans: tuple[SpanCheck, ...]
     ties: tuple[TieCheck, ...]
@@ -133,7 +133,7 @@ class SolverStudy:
 
 
 def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Generator[Progress, None, SolverStudy]:
-    """Drive the solvers to where they fail.
+    """Find the limits of the solvers.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
 
 @dataclass(frozen=True, eq=False)
 class SensorPose:
-    """A sensor as a dataset describes it.
+    """A sensor of a dataset: type and pose.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-r"""How a sensor is turned: from its own axes (x along azimuth zero, z up along its axis) to the site's.
+r"""Orientation of sensors: rotation from a sensor's axes (x along azimuth zero, z up) to the site's.
 
 A sensor of yaw ψ, tilt θ and roll φ is turned as
 

@@ -16,7 +16,7 @@ RING_AZIMUTHS = 120
 
 @dataclass(frozen=True, eq=False)
 class BeamRings:
-    """Lines to be drawn.
+    """Rings and edges of the field of view, as lines.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class BeamRings:
 
 
 def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap: float) -> BeamRings:
-    """Return what a sensor's beams draw on a flat road.
+    """Return the rings of a sensor on a flat road, and the edges of its field of view.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A bird's-eye plan of a placement, as a picture for people who did not make it."""
+"""Plan view of a placement with scale, north, candidates and coverage."""
 
 from __future__ import annotations
 

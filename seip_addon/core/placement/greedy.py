@@ -134,8 +134,8 @@ def tabu_search(
         else:
             seen = instance.gains(rests.T).T
         gain = _allowed_gains(instance, chosen, seen)
-        held = (locked > step) | (locked[chosen, None] > step)
-        gain[held & (covered + gain <= most + instance.slack)] = -np.inf
+        tabu = (locked > step) | (locked[chosen, None] > step)
+        gain[tabu & (covered + gain <= most + instance.slack)] = -np.inf
         if not np.isfinite(gain).any():
             continue
         gone, came = np.unravel_index(int(np.argmax(gain)), gain.shape)

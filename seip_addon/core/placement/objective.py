@@ -31,7 +31,7 @@ MOVED_MESSAGE = "Moved by hand: judged where the sensors hang; nothing is proven
 
 @dataclass(frozen=True)
 class Objective:
-    """What is asked for: the most coverage for N sensors or a budget, or a coverage for the least money.
+    """Objective and constraints: the most coverage for N sensors or a budget, or the least price for a coverage.
 
     Parameters
     ----------
@@ -85,13 +85,13 @@ class Objective:
 
     @property
     def cheapest(self) -> bool:
-        """Whether this is the reverse problem, whose objective is a price."""
+        """Whether the least price for a coverage is asked for."""
         return self.coverage is not None
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """An answer to an objective.
+    """A solution: an objective with its placement, certificate and deployment.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def placement_problem(
 
 
 def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
-    """Raise SeipError where a site can be seen not to allow an objective before any ray is cast."""
+    """Raise SeipError where a site cannot meet an objective, before any ray is cast."""
     everything = np.ones((len(site.candidates), len(site.targets)), dtype=bool)
     placement_problem(site, everything, models, objective)
 
@@ -200,7 +200,7 @@ def optimise(
     objective: Objective,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, Solution]:
-    """Answer an objective on a site: the most coverage, or the least price for a coverage.
+    """Optimise a placement on a site: the most coverage, or the least price for a coverage.
 
     Parameters
     ----------

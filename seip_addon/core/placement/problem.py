@@ -77,7 +77,7 @@ class PlacementProblem:
     min_distance: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse contradictions that can be told without solving."""
+        """Raise SeipError on contradictions that can be told without solving."""
         self._check_values()
         self._check_limits()
         for group, name in zip(self.mandatory_groups & self.allowed, self.group_names, strict=True):

@@ -46,7 +46,7 @@ DEFAULT_LIMITS = SolverLimits()
 
 
 class Clock:
-    """A limit of time that starts now, and a limit of work that is the same on every machine.
+    """Limits of a search: of time from now on, and of counted work, which is the same on every machine.
 
     Where work is limited, shares of what is left are shares of work: as long as
     the time suffices, nothing depends on how fast the machine is.

@@ -290,7 +290,7 @@ def _decide(  # what is known, and how far to go
 
 
 def _outlook(instance: Instance, proof: Proof) -> list[str]:
-    """Say what more time would do."""
+    """Return notes on what more time would gain."""
     value = instance.value(proof.chosen)
     if proof.halfway is None or value <= 0:
         return []
@@ -319,7 +319,7 @@ def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
 
 
 def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
-    """Say which targets and prices cannot decide because others are too large.
+    """Return notes on targets and prices too small, beside others, to affect the choice.
 
     Returns
     -------

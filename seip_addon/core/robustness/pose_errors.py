@@ -36,7 +36,7 @@ MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Standard deviations of what may be wrong with a sensor's pose.
+    """Standard deviations of the errors of a sensor's pose.
 
     Parameters
     ----------
@@ -83,17 +83,17 @@ class PoseErrors:
                 raise SeipError(f"the error of {name} must be 0 to {limit:.0f}°, not {shown:g}°")
 
     def alone(self, kind: str) -> PoseErrors:
-        """Return the errors of one kind, with nothing else wrong."""
+        """Return the errors of one kind, all others zero."""
         return replace(self, **{name: 0.0 for name in ERROR_KINDS if name != kind})
 
 
 ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
-"""What can be wrong with a pose."""
+"""Kinds of pose errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseDraws:
-    """How n draws of errors leave s sensors.
+    """Poses of s sensors in n draws of errors.
 
     Parameters
     ----------
@@ -122,13 +122,13 @@ class PoseDraws:
 
 
 def require_draws(draws: int) -> None:
-    """Raise SeipError where there would be no draw."""
+    """Raise SeipError where the number of draws is below one."""
     if draws < 1:
         raise SeipError(f"asked for {draws} draws of pose errors; ask for at least 1")
 
 
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
-    """Draw what is wrong with the poses of sensors.
+    """Draw random pose errors of sensors.
 
     What is drawn for a sensor follows from the seed, the number of the draw and
     the sensor's position alone: whichever type hangs there at whichever height,
@@ -160,7 +160,7 @@ def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
 
 
 def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
-    """Hang no sensor inside an object: where a draw would, its shift is turned about, or else there is none.
+    """Move sensors that a draw puts inside an object: to the opposite side, or else to the planned position.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def solve_robust(
     limits: SolverLimits = DEFAULT_LIMITS,
     foreseen: Sequence[Placement] | None = None,
 ) -> Generator[Progress, None, Placement]:
-    """Choose the placement that has the least to fear.
+    """Choose the placement that maximises a risk measure over scenarios.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def solve_robust(
 def foresee(
     problem: PlacementProblem, scenarios: ScenarioVisibility, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
-    """Solve each scenario as if it were known that it comes: no placement does better there.
+    """Solve each scenario by itself: no placement does better there.
 
     Returns
     -------
@@ -184,7 +184,7 @@ def at_least(found: Placement, other: Placement, reached: float) -> Placement:
 
 
 def outcomes_of(problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, chosen: Integer) -> Float:
-    """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
+    """Return the outcome of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
     return risk.outcomes(scenarios.seen_by_each(chosen), problem.weights, problem.most_sensors)
 
 
@@ -228,7 +228,7 @@ def _searched(
 
 
 class FictitiousPlay:
-    """Weights of scenarios with a small bound: placements answer the scenarios that were worst before.
+    """Fictitious play for scenario weights with a small bound: placements answer the worst scenarios so far.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(
 
 @dataclass(frozen=True, eq=False)
 class TrafficObstacles:
-    """What stands on the road at one instant, beside what always does; k road users of n triangles together.
+    """Bodies of the k road users present at one instant; n triangles together.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Instants:
         return len(self.time)
 
     def obstacles(self) -> list[TrafficObstacles]:
-        """Return who stands where at each instant."""
+        """Return the bodies present at each instant."""
         return [
             obstacles_of(self.runs[run], self.runs[run].at(time))
             for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True)
@@ -108,7 +108,7 @@ def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Ins
 
 
 def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
-    """Raise SeipError where a run has nobody in the region of interest: it is of another place."""
+    """Raise SeipError where a run has no road user in the region of interest: it is of another place."""
     for run in runs:
         if not shapely.contains_xy(region, run.position[:, 0], run.position[:, 1]).any():
             raise SeipError(
@@ -118,7 +118,7 @@ def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
 
 
 def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
-    """Return the bodies of an instant's road users where they are."""
+    """Return the bodies of the road users of an instant, in place."""
     if len(snapshot) == 0:
         return NO_TRAFFIC
     attitudes = rotations(snapshot.yaw, snapshot.pitch)

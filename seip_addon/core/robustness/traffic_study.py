@@ -28,18 +28,18 @@ NOTABLE_LOSS = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
 
 IN_TRAFFIC = "in traffic"
-"""How sentences about traffic begin."""
+"""First words of messages about traffic."""
 
 MOSTLY_SEEN_SHARE = 0.9
 """Share of time from which on a target counts as mostly seen."""
 
 LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
-"""What is seen, in words."""
+"""For messages and charts."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrafficScenarios:
-    """What all candidates see at the instants that a placement is chosen on.
+    """Visibility grids of all candidates: of the empty road, and at the instants that a placement is optimised on.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class TrafficScenarios:
 
 @dataclass(frozen=True, eq=False)
 class TrafficCoverage:
-    """What a placement sees on the empty road and at n instants of traffic.
+    """Coverage of a placement on the empty road and at n instants of traffic.
 
     Parameters
     ----------
@@ -85,32 +85,32 @@ class TrafficCoverage:
 
     @property
     def mean(self) -> IntervalEstimate:
-        """The share of the targets' weight that is seen, on average over time."""
+        """Mean over time of the share of the targets' weight that is seen."""
         return mean_over_time(self.at, self.batch)
 
     @property
     def loss(self) -> IntervalEstimate:
-        """How much less that is than on the empty road: what is hidden, less what returns from vehicles show."""
+        """Coverage of the empty road minus that in traffic: hidden weight, less what returns from vehicles add."""
         return mean_over_time(self.empty - self.at, self.batch)
 
     @property
     def hidden(self) -> IntervalEstimate:
-        """Of the weight that is seen on the empty road, the share that vehicles hide, on average over time."""
+        """Share of the weight seen on the empty road that vehicles hide, on average over time."""
         return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.batch)
 
     @property
     def rarely_seen(self) -> float:
-        """Of the targets seen on the empty road, the share that is seen less than `MOSTLY_SEEN_SHARE` of the time."""
+        """Share of the targets seen on the empty road that are seen less than `MOSTLY_SEEN_SHARE` of the time."""
         return float((self.time[self.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if self.empty_targets.any() else 0.0
 
     def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
-        """Estimate how much more of the weight is seen than by another placement at the same instants."""
+        """Estimate the gain in coverage over another placement at the same instants."""
         return mean_over_time(self.at - other.at, self.batch)
 
 
 @dataclass(frozen=True, eq=False)
 class TrafficEvaluation:
-    """A placement and what becomes of it in traffic that it was not chosen on.
+    """A placement with its coverage in traffic that it was not optimised on.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class TrafficEvaluation:
 
 @dataclass(frozen=True, eq=False)
 class TrafficStudy:
-    """The optimum of the empty road beside the placement chosen on traffic.
+    """Comparison of the optimum for the empty road with the placement optimised on traffic.
 
     Parameters
     ----------
@@ -150,11 +150,11 @@ class TrafficStudy:
     traffic: TrafficEvaluation
 
     def gain(self, layer: TrafficLayer) -> IntervalEstimate:
-        """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
+        """Estimate the gain in coverage in traffic from optimising on traffic rather than for the empty road."""
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
     def is_converged(self) -> bool:
-        """Whether every other instant says the same as all: means whose intervals meet."""
+        """Whether every other instant gives the same means as all, within their intervals."""
         rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
         rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
         batch = self.empty.seen[self.layer].batch
@@ -164,7 +164,7 @@ class TrafficStudy:
 def traffic_scenarios(
     around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, TrafficScenarios]:
-    """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
+    """Compute visibility at instants of traffic, for the candidates that may be chosen; the others see nothing."""
     every = np.flatnonzero(problem.allowed)
     views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
     spread = views.spread_to(every, len(problem.visible))
@@ -178,7 +178,7 @@ def traffic_study(
     evaluation: Instants,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, TrafficStudy]:
-    """Place for the empty road and on traffic, and evaluate both at other instants.
+    """Optimise for the empty road and for traffic, and evaluate both placements at other instants.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def traffic_study(
 
 
 def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Integer) -> TrafficCoverage:
-    """Return what some poses see together; the first of the views is of the empty road."""
+    """Return the joint coverage of some poses; the first view is of the empty road."""
     seen = views.seen_by_any(rows)
     share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
     return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), batch)
@@ -225,7 +225,7 @@ def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Intege
 def traffic_message(
     around: Surroundings, poses: Integer, weight: Float, instants: Instants
 ) -> Generator[Progress, None, str]:
-    """Say, in a sentence, what poses see of the road in traffic on average over time, and when it is empty.
+    """Describe how much of the road poses see in traffic, on average over time, and when it is empty.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def _users(obstacles: Sequence[TrafficObstacles]) -> float:
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
-    """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
+    """Return warnings where traffic costs much coverage, and where optimising for it is not known to gain any."""
     losses = tuple(
         f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
         f"{seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average over time, not {seen.empty:.1%}: "

@@ -48,7 +48,7 @@ _CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).resha
 def visibility_in_traffic(
     around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, ScenarioVisibility]:
-    """Look from poses at instants of traffic.
+    """Compute visibility from poses at instants of traffic.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def visibility_in_traffic(
     index = TargetIndex(wanted, around.sight.delta)
     packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
 
-    def look(number: int) -> None:
+    def compute(number: int) -> None:
         pose = int(poses[number])
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
         place = ScanPosition(caster, xyz, float(yaw), [model], around.sight)
@@ -88,7 +88,7 @@ def visibility_in_traffic(
         for instant, present in enumerate(vehicles):
             packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(present)))
 
-    yield from each_in_threads(look, range(len(poses)), caster.threads, "looking between vehicles")
+    yield from each_in_threads(compute, range(len(poses)), caster.threads, "looking between vehicles")
     return ScenarioVisibility(packed, len(wanted))
 
 

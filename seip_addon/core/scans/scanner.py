@@ -101,7 +101,7 @@ class BodySurface(ReflectiveSurface):
 
 @dataclass(frozen=True, eq=False)
 class MovingTraffic:
-    """What moves during a revolution; k road users.
+    """The k road users that move during a revolution.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class MovingTraffic:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """What the rays of one revolution end on; r rays in the order of `BeamPattern`.
+    """Hits of the rays of one revolution; r rays in the order of `BeamPattern`.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class _Hits:
-    """What some rays meet; n hits."""
+    """Hits of rays; n of them."""
 
     ray: Integer
     distance: Float

@@ -16,7 +16,7 @@ _ORTHONORMAL_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MountedSensor:
-    """A LiDAR with its place and the way it is turned.
+    """A LiDAR model at a position and orientation.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ from .static_scene import StaticScene
 
 @dataclass(frozen=True)
 class ScanSettings:
-    """How scans are made.
+    """Settings of simulated scans.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Simulation:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting the scans, in sentences."""
+        """Warnings about the scans."""
         blind = tuple(
             f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
             "look whether it hangs where it should"
@@ -149,7 +149,7 @@ def prepare(
     bodies: Sequence[Body],
     settings: ScanSettings,
 ) -> Generator[Progress, None, Simulation]:
-    """Cast against what stands still, once for all frames.
+    """Cast all rays against the static scene, once for all frames.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ MAX_SENSOR_HEIGHT = 100.0
 """Metres: a sensor higher than this is taken for a typing error."""
 
 ASSUMED_POLES = "assumed poles"
-"""Why poles that stand in no map are dropped."""
+"""Reason for which assumed poles are dropped."""
 
 MAX_TILT = 90.0
 """Degrees: tilts are less than this, up or down."""
@@ -34,7 +34,7 @@ MAX_TILT = 90.0
 
 @dataclass(frozen=True)
 class CandidateSettings:
-    """How candidates are laid out.
+    """Settings of candidate poses: sensor types, heights, tilts, spacing and clearances.
 
     Parameters
     ----------
@@ -240,8 +240,8 @@ class Candidates:
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 
-def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
-    """Sample the candidate areas, take the poles, and drop what cannot carry a sensor.
+def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
+    """Make candidate poses at positions on the candidate areas and poles, without those that carry no sensor.
 
     Returns
     -------
@@ -398,7 +398,7 @@ def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[
 
 
 def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tuple[str, ...]:
-    """Say how many poles of a scene are assumed, and whether they may carry sensors."""
+    """Return a warning on how many poles of a scene are assumed, and whether they may carry sensors."""
     assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
     if not assumed:
         return ()

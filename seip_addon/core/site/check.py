@@ -18,7 +18,7 @@ from ..progress import Progress
 from ..storage.files import digest
 from .scene_geometry import ASSUMED, Pole, SceneGeometry
 from .site import Site
-from .targets import lay_targets
+from .targets import generate_targets
 
 MAX_ORIGIN_DISTANCE = 10_000.0
 """Metres from the origin beyond which Blender's single precision rounds coordinates to a millimetre and more."""
@@ -51,7 +51,7 @@ Severity = Literal["ERROR", "WARNING"]
 
 @dataclass(frozen=True)
 class Problem:
-    """Something that stops a survey, or harms its answer.
+    """A problem of a scene: it makes a survey impossible, or its result unreliable.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ ROLES = {
 
 @dataclass(frozen=True, eq=False)
 class SceneContents:
-    """What was found in a scene, whole or not.
+    """Contents of a scene, whether complete or not.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class SceneContents:
 
 @dataclass(frozen=True)
 class SiteCheck:
-    """What a scene holds, by what it is called, and its problems: errors first."""
+    """Result of a check: counts of a scene's contents, and its problems, errors first."""
 
     counts: dict[str, str]
     problems: tuple[Problem, ...]
@@ -134,7 +134,7 @@ class SiteCheck:
 def check_site(
     contents: SceneContents, lay_out: Callable[[SceneGeometry], tuple[Site, Sequence[str]]]
 ) -> Generator[Progress, None, SiteCheck]:
-    """Count what a scene holds and look for what would harm an answer.
+    """Check a scene: count what it holds and find problems that would affect a result.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def _far(contents: SceneContents) -> Iterator[Problem]:
 
 
 def _upright(contents: SceneContents) -> Iterator[Problem]:
-    """Find what should lie and stands: z-up mistakes, and what is no road among the roads."""
+    """Find upright surfaces among those that should be level, as from a model with another axis up."""
     for surface in contents.surfaces:
         if surface.role in {"region", "roads", "candidate_areas", "weighted_regions"}:
             side = np.linalg.norm(_normals(surface.triangles), axis=1).sum() / 2
@@ -407,7 +407,7 @@ def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> I
     triangles = np.concatenate(_triangles(contents, "roads"))
     spacing = max(SAMPLE_SPACING, math.sqrt(region.area / MAX_SAMPLES))
     try:
-        places = lay_targets(region, triangles, spacing).xyz
+        places = generate_targets(region, triangles, spacing).xyz
     except SeipError:  # too narrow for the grid: nothing to be seen of steps
         return
     yield from _steps(contents, places, spacing)

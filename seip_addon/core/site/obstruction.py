@@ -24,7 +24,7 @@ NO_OBSTACLES_MESSAGE = (
 
 
 def bareness_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
-    """Say that nothing stands in the way, where no occluder but poles is large enough to hide anything."""
+    """Return a warning where no occluder but poles is large enough to hide anything."""
     poles = {pole.name for pole in geometry.poles}
     others = (mesh.triangles.reshape(-1, 3) for mesh in geometry.occluders if mesh.name not in poles)
     return () if any(map(can_hide, others)) else (NO_OBSTACLES_MESSAGE,)

@@ -48,7 +48,7 @@ class Targets:
         return len(self.xyz)
 
 
-def lay_targets(
+def generate_targets(
     region: BaseGeometry, road: Float, spacing: float, weighted_regions: Sequence[NamedArea] = ()
 ) -> Targets:
     """Lay a uniform grid over the region and keep the points that lie on the road.

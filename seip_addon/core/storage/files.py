@@ -61,7 +61,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder for results and see that it can be written, before the work rather than after.
+    """Make a folder for results, and raise SeipError where it cannot be written.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def check_folder(folder: Path) -> None:
 
 
 def lock_folder(folder: Path) -> int:
-    """Keep other processes from writing into a folder until this one ends, however it ends.
+    """Lock a folder against other processes until this one ends, however it ends.
 
     Parameters
     ----------
@@ -96,17 +96,17 @@ def lock_folder(folder: Path) -> int:
         Another process holds the lock.
     """
     windows = sys.platform == "win32"  # which opens no folders as files
-    held = os.open(folder / ".seip-lock", os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
+    handle = os.open(folder / ".seip-lock", os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
     try:
-        _lock(held)
+        _lock(handle)
     except OSError as error:
         if error.errno not in _LOCK_ERRORS:  # a file system without locks
-            return held
-        os.close(held)
+            return handle
+        os.close(handle)
         raise SeipError(
             f"another run is writing to {folder}: wait until it has ended, or choose another folder"
         ) from error
-    return held
+    return handle
 
 
 def save_json(path: str | os.PathLike[str], value: object) -> None:

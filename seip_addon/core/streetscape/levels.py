@@ -1,4 +1,4 @@
-"""Grade separation: the roads on the studied level of a place, from how roads connect and from their heights."""
+"""Grade separation: the roads on the studied level of a place, from their connections and heights."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ class SiteModel:
 
 @dataclass(frozen=True, eq=False)
 class _Surroundings:
-    """What everything else of a site stands on and leans against, in local axes."""
+    """Ground, roadside and region that the parts of a site are placed by, in local axes."""
 
     origin: Float
     lanes: tuple[LaneSurface, ...]
@@ -160,12 +160,12 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     around = shifted(street.extent, origin)
     placed = local_objects(placed_objects(road_map, area=around), origin)
     away = levels.other_roads()
-    hung = [
+    local_signals = [
         replace(one, position=one.position - origin)
         for one in placed_signals(road_map, area=around)
         if one.road_id not in away
     ]
-    others, lights = split_posts(placed, hung, street.roadside)
+    others, lights = split_posts(placed, local_signals, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
     things = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
     other_levels, below = _other_level_parts(levels.others, street)
@@ -205,7 +205,7 @@ def _hides(part: Part) -> bool:
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
-    """Say what was made up of furniture that the map does not describe."""
+    """Return notes on posts and tree crowns that are assumed, since the map does not give them."""
     assumed = sum(part.source == ASSUMED for part in signals)
     if assumed:
         posts = f"{assumed} posts of traffic lights are" if assumed > 1 else "1 post of traffic lights is"
@@ -425,7 +425,7 @@ def _on_ground(plan: Float, street: _Surroundings) -> Float:
 def _area_part(
     name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None
 ) -> Part:
-    """Return an area in plan as a veil over the ground."""
+    """Return an area in plan as an overlay on the ground."""
     above, material = AREA_OVERLAYS[role]
     triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above)
     return Part(name, _solid(triangles, material), (role,), weight=weight)

@@ -1,4 +1,4 @@
-"""What an object of a map is: by its type where it has one, else by its name and its shape."""
+"""Classification of a map's objects: by type where there is one, else by name and shape."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..opendrive import PlacedObject
 
 
 class Kind(Enum):
-    """What is built of an object."""
+    """Kinds of objects that are modelled."""
 
     FLAT = "flat"
     """Paint and surfaces: nothing stands there."""

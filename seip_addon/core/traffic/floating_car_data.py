@@ -36,7 +36,7 @@ _LINES_PER_REPORT = 20_000  # of csv between two reports of progress
 
 @dataclass(frozen=True, eq=False)
 class FloatingCarData:
-    """What a file of floating car data says, one road user after the other; u road users, n samples.
+    """Content of a file of floating car data, one road user after the other; u road users, n samples.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class FloatingCarData:
 
 
 class Extent(NamedTuple):
-    """What of a file to keep: a span of the simulation in seconds, and a rectangle of the map in metres."""
+    """Part of a file to read: a span of the simulation in seconds, and a rectangle of the map in metres."""
 
     begin: float = -math.inf
     end: float = math.inf
@@ -111,7 +111,7 @@ def read_floating_car_data(
 def read_trajectories(
     data: FloatingCarData, types: Mapping[str, VehicleType], origin: Float, source: str
 ) -> tuple[Trajectories, tuple[str, ...]]:
-    """Give road users their sizes and put their middles where they are, in local axes.
+    """Return trajectories of road users with their sizes, in local axes.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generato
 
 
 def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tuple[Trajectories, tuple[str, ...]]]:
-    """Leave road users out until no two are in one place: first who is in the most others' way, then who stays least.
+    """Remove road users until no two overlap: first the one that overlaps most others, then the shortest present.
 
     Returns
     -------

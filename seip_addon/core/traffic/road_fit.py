@@ -1,4 +1,4 @@
-"""Road users on the road surface of a scene: heights, slopes, and who is where there is no road."""
+"""Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
 
 
 def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTraffic:
-    """Put road users on the road of a scene, and leave out where they are off it.
+    """Fit road users to the road of a scene, leaving out samples off the road.
 
     Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
     is nearest to the height in the trajectories counts, and the highest where they say none. A road user who leaves
@@ -123,7 +123,7 @@ def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: 
 
 
 def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Boolean) -> tuple[str, ...]:
-    """Count and name who is off the road near the region; refuse traffic that mostly is."""
+    """Return warnings on road users off the road near the region; raise SeipError where most are."""
     count = len(local)
     seen = np.bincount(user[near], minlength=count)
     off = np.bincount(user[near & ~on_road], minlength=count)

@@ -1,4 +1,4 @@
-"""Walks without leaps: SUMO's pedestrians leap by a metre or two where a crossing begins, and turn on the spot."""
+"""Smoothing of SUMO's pedestrians, who leap by a metre or two where a crossing begins, and turn on the spot."""
 
 from __future__ import annotations
 

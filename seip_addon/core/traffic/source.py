@@ -33,7 +33,7 @@ OVERLAP_INTERVAL = 1.0
 
 @dataclass(frozen=True)
 class TrafficFiles:
-    """Where traffic is read from.
+    """Files of traffic.
 
     Parameters
     ----------

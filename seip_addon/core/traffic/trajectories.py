@@ -64,7 +64,7 @@ class RoadUser:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Who is where at one instant; k road users.
+    """Positions and headings of the k road users present at one instant.
 
     Parameters
     ----------

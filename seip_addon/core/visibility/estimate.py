@@ -37,7 +37,7 @@ _BYTES_PER_RAY_AND_POSITION = 160
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a visibility grid will take.
+    """Estimated run time and memory of a visibility grid.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def estimate_visibility(
     with threads_of(task, threads) as submit:
         setting_up = time.perf_counter() - began
         yield Progress(1, 2, "sample for the estimate")
-        sample = yield from _look_from(drawn, submit)
+        sample = yield from _compute_from(drawn, submit)
     per_place = sample.seconds / sample.places
     rays = sample.rays / sample.places
     return Estimate(
@@ -135,7 +135,7 @@ class _Sample:
     rays: int
 
 
-def _look_from(
+def _compute_from(
     drawn: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]
 ) -> Generator[Progress, None, _Sample]:
     """Look from the first of some places, then from as many more as there is time for.

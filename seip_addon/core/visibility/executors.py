@@ -29,7 +29,7 @@ _MAX_LOST_WORKERS = 3  # so many die over one chunk before the chunk is held to 
 
 @dataclass(frozen=True, eq=False)
 class VisibilityTask:
-    """What rows of a visibility grid follow from, to be sent to where they are computed.
+    """Inputs of rows of a visibility grid, to be sent to workers.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def threads_of(task: VisibilityTask, threads: int | None = None) -> Iterator[Sub
 
 
 class StoppableCaster:
-    """Casts rays until it is told to stop, some at a time: then nobody waits for the rest of them.
+    """A ray caster that can be stopped: it casts some rays at a time.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ FLOAT32_STEP = float(np.finfo(np.float32).eps)
 
 
 def rounding_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
-    """Say where a scene is too far from its origin or too wide for float32.
+    """Return warnings where a scene is too far from its origin or too wide for float32.
 
     Parameters
     ----------

@@ -157,7 +157,7 @@ def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurface
 
 
 def turned_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -> NearSurfaces:
-    """Return the same surfaces in the axes of a sensor that hangs anywhere and is turned anyhow.
+    """Return the same surfaces in the axes of a sensor at any position and orientation.
 
     Parameters
     ----------

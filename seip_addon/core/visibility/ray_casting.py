@@ -34,7 +34,7 @@ MAX_THREADS = min(4, os.cpu_count() or 1)
 
 
 class RayCaster(Protocol):
-    """What casts rays. Both sides of a triangle stop a ray.
+    """Interface of ray casters. Both sides of a triangle stop a ray.
 
     Attributes
     ----------

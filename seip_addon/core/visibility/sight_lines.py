@@ -24,7 +24,7 @@ SAME_TURN = 5e-5
 
 @dataclass(frozen=True, eq=False)
 class SightLines:
-    """What one pose sees.
+    """Sight lines of one pose, and its unseen targets in range.
 
     Parameters
     ----------

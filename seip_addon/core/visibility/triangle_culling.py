@@ -43,13 +43,13 @@ class NeededTriangles:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many there are, are kept, and are dropped for each reason."""
+        """Numbers of all, of kept, and of dropped triangles by reason."""
         reasons = {field.name: int(getattr(self, field.name)) for field in fields(self)[1:]}
         return {"all": len(self.keep), "kept": int(self.keep.sum())} | reasons
 
 
 def culling_message(counts: Mapping[str, int]) -> str:
-    """Say how many triangles rays are cast against and why the others could go, from `NeededTriangles.counts`."""
+    """Describe how many triangles were kept and dropped, and why, from `NeededTriangles.counts`."""
     reasons = {
         "without_area": "without area",
         "above": "above all lines of sight",

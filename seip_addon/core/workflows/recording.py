@@ -27,7 +27,7 @@ SAME_TIME_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class RecordingSettings:
-    """All that a user may choose about a recording.
+    """Settings of a recording.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def make_run(
     settings: RecordingSettings,
     versions: Mapping[str, str],
 ) -> Run:
-    """Gather all that the frames of a recording follow from.
+    """Gather the inputs of a recording's frames.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ DRAWS_OF_KIND = 100
 
 @dataclass(frozen=True, eq=False)
 class RobustSolution:
-    """A solution with the evidence for it.
+    """A robust solution with the studies that support it.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def check_robust_objective(objective: Objective) -> None:
 def place_robustly(
     layout: Layout, grid: VisibilityGrid, objective: Objective, settings: RobustnessSettings
 ) -> Generator[Progress, None, RobustSolution]:
-    """Answer an objective on a survey for what may go wrong.
+    """Optimise a placement for pose errors, failures or multiple looks, and study the result.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ def place_robustly(
 
 
 def robustness_message(study: RobustStudy) -> str:
-    """Say what a placement for what may go wrong gives away, and what it saves."""
+    """Describe what a robust placement loses of the planned coverage, and what it saves under errors."""
     (chosen,) = study.robust
     return (
         f"against the placement for poses as planned it gives away {study.price(chosen):.2%} of planned coverage; "
-        f"{chosen.judged_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
+        f"{chosen.evaluated_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
         f"{study.settings.draws} unseen draws, not {study.beside(chosen).low.describe()}"
     )

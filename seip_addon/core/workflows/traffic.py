@@ -27,12 +27,12 @@ from .survey import Layout, surroundings
 _Run = TypeVar("_Run")
 
 EVALUATION_SHARE = 1 / 3
-"""Share of the runs, the last ones, that placements are evaluated in and not chosen on."""
+"""Share of the runs, the last ones, that placements are evaluated on and not optimised on."""
 
 
 @dataclass(frozen=True)
 class TrafficSettings:
-    """What a placement for traffic is chosen on, and evaluated by.
+    """Settings of placement for traffic: what must be seen, and how many instants are sampled.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class TrafficSettings:
 
 @dataclass(frozen=True, eq=False)
 class TrafficRuns:
-    """Runs of traffic by what they are for.
+    """Runs of traffic, split into those to optimise on and those to evaluate on.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class TrafficSolution:
 
 
 def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
-    """Return the runs to choose on, and those to evaluate in."""
+    """Return the runs to optimise on, and those to evaluate on."""
     last = max(1, round(EVALUATION_SHARE * len(runs)))
     return list(runs[:-last]), list(runs[-last:])
 
@@ -117,7 +117,7 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
 def place_in_traffic(
     layout: Layout, grid: VisibilityGrid, objective: Objective, runs: TrafficRuns, settings: TrafficSettings
 ) -> Generator[Progress, None, TrafficSolution]:
-    """Answer an objective on a survey for the road in traffic, whose vehicles block the view.
+    """Optimise a placement for traffic, whose vehicles block the view, and evaluate it on other runs.
 
     Parameters
     ----------
