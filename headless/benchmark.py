@@ -33,14 +33,14 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     findings, names = measure(
         read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope or BenchmarkScope()
     )
-    held = bars(findings.costs, findings.runs, names, findings.scans)
-    for bar in held:
-        runtime.say(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
-    with runtime.writing(options.output):
+    requirements = bars(findings.costs, findings.runs, names, findings.scans)
+    for bar in requirements:
+        runtime.print_line(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
+    with runtime.incomplete_if_interrupted(options.output):
         save_charts(options.output / "benchmark", findings)
-        save_json(options.output / "benchmark" / "benchmark.json", findings, held)
-        save_page(options.output / "benchmark.md", findings, held, "benchmark")
-    runtime.say(f"results: {options.output / 'benchmark.md'}")
+        save_json(options.output / "benchmark" / "benchmark.json", findings, requirements)
+        save_page(options.output / "benchmark.md", findings, requirements, "benchmark")
+    runtime.print_line(f"results: {options.output / 'benchmark.md'}")
 
 
 if __name__ == "__main__":

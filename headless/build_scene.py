@@ -45,10 +45,10 @@ def main(argv: list[str]) -> None:
         finish(build_scene(new_file(), model, map_path.name), report)
     save_blend(asked.output)
     for note in model.notes:
-        runtime.say(f"note: {note}")
+        runtime.print_line(f"note: {note}")
     runtime.warn(model.warnings)
     x, y, z = model.origin + 0.0  # no negative zero
-    runtime.say(
+    runtime.print_line(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
         f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )

@@ -1,4 +1,4 @@
-"""Claims of the paper, and how they are judged on one site.
+"""Claims of the paper, and their verdicts on one site.
 
 The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
 Evaluation of Infrastructure-based Collective Perception", section V.
@@ -40,26 +40,26 @@ class Claim:
         return f"claim {self.number} ({self.text}): {self.verdict.upper()}; {self.evidence}"
 
 
-def judge(*, holds: bool, fails: bool) -> str:
+def verdict(*, holds: bool, fails: bool) -> str:
     """Return the verdict on what is known to hold, known to fail, or neither."""
     if holds:
         return HOLDS
     return FAILS if fails else UNDECIDED
 
 
-def judge_above(interval: Interval, least: float = 0.0) -> str:
+def verdict_above(interval: Interval, least: float = 0.0) -> str:
     """Return the verdict on a figure that is claimed to be above ``least``, by its 95 % interval."""
     low, high = interval
-    return judge(holds=low > least, fails=high <= least)
+    return verdict(holds=low > least, fails=high <= least)
 
 
-def judge_within(interval: Interval, least: float, most: float) -> str:
+def verdict_within(interval: Interval, least: float, most: float) -> str:
     """Return the verdict on a figure that is claimed to be between two values, by its 95 % interval."""
     low, high = interval
-    return judge(holds=least <= low and high <= most, fails=high < least or low > most)
+    return verdict(holds=least <= low and high <= most, fails=high < least or low > most)
 
 
-def judge_all(verdicts: Sequence[str]) -> str:
+def worst_verdict(verdicts: Sequence[str]) -> str:
     """Return the verdict on several claims at once: the worst."""
     return next((verdict for verdict in (FAILS, UNDECIDED) if verdict in verdicts), HOLDS)
 

@@ -2,7 +2,7 @@
 
 python -m headless.compare_detectors scenes/junction.blend -o docs/detector
 
-Every setting trains for the same number of steps on all placements, and is judged on the same frames. Seconds
+Every setting trains for the same number of steps on all placements, and is evaluated on the same frames. Seconds
 are those that one core works, whatever else the machine does.
 """
 
@@ -20,7 +20,7 @@ from headless.detection.detector import Detector
 from headless.detection.inference import detect
 from headless.detection.pillars import grid_of
 from headless.detection.recordings import Simulator
-from headless.detection.settings import PUBLISHED, NetworkSettings, TrainingSettings
+from headless.detection.settings import PUBLISHED_NETWORK, NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
 from headless.options import new_parser
 
@@ -29,21 +29,21 @@ import numpy as np
 from seip_addon.core.progress import Progress, side_by_side
 from seip_addon.core.storage.files import save_json
 
-DEFAULT = NetworkSettings()
-SETTINGS = {
-    ("as published", "as published"): PUBLISHED,  # takes the longest, so it begins first
-    ("default", "default"): DEFAULT,
-    ("pillars", "0.32 m"): replace(DEFAULT, pillar=0.32),
-    ("pillars", "0.5 m"): replace(DEFAULT, pillar=0.5),
-    ("points in a pillar", "8"): replace(DEFAULT, most_points=8),
-    ("points in a pillar", "32"): replace(DEFAULT, most_points=32),
-    ("width", "16"): replace(DEFAULT, width=16),
-    ("width", "64"): replace(DEFAULT, width=64),
-    ("head", "anchors"): replace(DEFAULT, head="anchor"),
+DEFAULT_NETWORK = NetworkSettings()
+NETWORKS = {
+    ("as published", "as published"): PUBLISHED_NETWORK,  # takes the longest, so it begins first
+    ("default", "default"): DEFAULT_NETWORK,
+    ("pillars", "0.32 m"): replace(DEFAULT_NETWORK, pillar=0.32),
+    ("pillars", "0.5 m"): replace(DEFAULT_NETWORK, pillar=0.5),
+    ("points in a pillar", "8"): replace(DEFAULT_NETWORK, most_points=8),
+    ("points in a pillar", "32"): replace(DEFAULT_NETWORK, most_points=32),
+    ("width", "16"): replace(DEFAULT_NETWORK, width=16),
+    ("width", "64"): replace(DEFAULT_NETWORK, width=64),
+    ("head", "anchors"): replace(DEFAULT_NETWORK, head="anchor"),
 }
 """What is compared: family and name, and the network."""
 
-LOOKS = 5
+TIMED_RUNS = 5
 """Times that a frame is looked at, of which the median counts."""
 
 
@@ -58,11 +58,11 @@ def main(argv: list[str]) -> None:
             network,
             TrainingSettings(steps=options.steps, validate_every=options.steps),
         )
-        for (family, name), network in SETTINGS.items()
+        for (family, name), network in NETWORKS.items()
     ]
     works = [_trained(study, model, options.device) for model in models]
     with deterministic(1):
-        trained = study.surveyed.stopwatch.run("training", side_by_side(works, case_study.SIDE_BY_SIDE))
+        trained = study.surveyed.stopwatch.run("training", side_by_side(works, case_study.PARALLEL_TRAININGS))
     detectors = [detector for detector, _ in trained]
     judging = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
     outcomes = study.surveyed.stopwatch.run("evaluation", judging)
@@ -75,18 +75,18 @@ def main(argv: list[str]) -> None:
             average_precision=float(
                 np.mean([one.evaluation.average_precision for one in outcomes if one.model is model])
             ),
-            default=model.network == DEFAULT,
+            default=model.network == DEFAULT_NETWORK,
         )
-        for (family, name), model, (detector, seconds) in zip(SETTINGS, models, trained, strict=True)
+        for (family, name), model, (detector, seconds) in zip(NETWORKS, models, trained, strict=True)
     ]
     title = (
         f"{study.surveyed.layout.site.name}: mean over {len(study.configurations)} placements, {options.steps} steps"
     )
-    with runtime.writing(options.output):
+    with runtime.incomplete_if_interrupted(options.output):
         save_setting_chart(options.output / "settings.png", settings, title)
         save_json(options.output / "settings.json", [vars(setting) for setting in settings])
     for setting in settings:
-        runtime.say(
+        runtime.print_line(
             f"{setting.family}, {setting.name}: AP {setting.average_precision:.1%}, "
             f"training {setting.training:.0f} s, inference {setting.inference:.0f} ms"
         )
@@ -112,7 +112,7 @@ def _inference(study: evaluate.DetectionStudy, detector: Detector) -> float:
     for configuration in study.configurations:
         frame = study.simulator.frame(configuration, study.traffic.test[0], 0)
         looks = []
-        for _ in range(LOOKS):
+        for _ in range(TIMED_RUNS):
             begin = time.thread_time()
             with deterministic(1):
                 detect(detector, frame.points, frame.intensity)

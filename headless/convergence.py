@@ -1,6 +1,6 @@
 """The coarsest spacings of targets and of candidates whose answer stays within a tolerance.
 
-An answer is the best placement under some settings; it is judged on a fine grid of
+An answer is the best placement under some settings; it is evaluated on a fine grid of
 targets, the same for all. First the spacing of the targets is sought, then that of the
 candidates: from coarse to fine until the answer is as good as that of the finest. To stop
 where two spacings in a row agree would be quicker, but they agree too easily: which of a
@@ -31,19 +31,19 @@ GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)
 """Metres between posts on the pavement, from coarse to fine."""
 
-COARSE_CANDIDATES = 8.0
+COARSE_CANDIDATE_SPACING = 8.0
 """Metres between posts while the spacing of the targets is sought."""
 
-JUDGED_ON = 0.35
-"""Metres between the targets on which answers are judged."""
+EVALUATION_SPACING = 0.35
+"""Metres between the targets on which answers are evaluated."""
 
-MOST_JUDGED = 400_000
-"""Targets to judge on; a larger place is judged on a coarser grid."""
+MAX_EVALUATION_TARGETS = 400_000
+"""Targets to evaluate on; a larger place is evaluated on a coarser grid."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The best placement under some spacings, and how good it is.
+    """The best placement under some spacings, with its coverage on its own grid and on the fine one.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Answer:
         How many these lay.
     own : float
         Share of the targets' weight that it sees, on its own grid.
-    judged : float
+    evaluated : float
         The same on the fine grid.
     """
 
@@ -61,12 +61,12 @@ class Answer:
     targets: int
     poses: int
     own: float
-    judged: float
+    evaluated: float
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """Which spacings were tried, and which were picked.
+    """Result of the search for the coarsest spacings: all that were tried, and those picked.
 
     Parameters
     ----------
@@ -76,33 +76,33 @@ class Convergence:
         Share of the weight within which answers agree.
     by_grid, by_candidates : tuple of Answer
         What was tried, from coarse to fine; the last is the finest, with which the others are compared.
-    judged_on : float, metres
-        Spacing of the grid that judged.
+    evaluation_spacing : float, metres
+        Spacing of the grid that evaluated.
     """
 
     settings: SurveySettings
     tolerance: float
     by_grid: tuple[Answer, ...]
     by_candidates: tuple[Answer, ...]
-    judged_on: float
+    evaluation_spacing: float
 
     @property
-    def sentence(self) -> str:
-        """What was picked and why."""
+    def message(self) -> str:
+        """The picked spacings and their coverage, as a message."""
         grid, finest = self.by_grid[-2:]
         posts, most = self.by_candidates[-2:]
         return (
             f"picked for a tolerance of {self.tolerance:g}: targets {grid.grid_spacing:g} m apart, whose placement "
-            f"covers {grid.judged:.2%} against {finest.judged:.2%} with {finest.grid_spacing:g} m; "
-            f"posts {posts.candidate_spacing:g} m apart, {posts.judged:.2%} against {most.judged:.2%} "
-            f"with {most.candidate_spacing:g} m; all judged on targets {self.judged_on:g} m apart"
+            f"covers {grid.evaluated:.2%} against {finest.evaluated:.2%} with {finest.grid_spacing:g} m; "
+            f"posts {posts.candidate_spacing:g} m apart, {posts.evaluated:.2%} against {most.evaluated:.2%} "
+            f"with {most.candidate_spacing:g} m; all judged on targets {self.evaluation_spacing:g} m apart"
         )
 
 
 def coarsest_settings(
-    geometry: SceneGeometry, settings: SurveySettings, goal: Objective, tolerance: float
+    geometry: SceneGeometry, settings: SurveySettings, objective: Objective, tolerance: float
 ) -> Generator[Progress, None, Convergence]:
-    """Find the coarsest spacings whose answer to a goal stays within a tolerance.
+    """Find the coarsest spacings whose answer to an objective stays within a tolerance.
 
     Each of the two may cost half of the tolerance. A spacing of targets has to agree
     with the fine grid about the coverage of its own placement as well.
@@ -125,32 +125,32 @@ def coarsest_settings(
     Raises
     ------
     SeipError
-        The tolerance or the goal does not suit this, or no spacing allows an answer.
+        The tolerance or the objective does not suit this, or no spacing allows an answer.
     """
     if not 0 < tolerance < 1:
         raise SeipError(f"the tolerance must be a share above 0 and below 1, not {tolerance:g}")
-    if goal.cheapest:
+    if objective.cheapest:
         raise SeipError("a tolerance needs a number of sensors or a budget: the coverage is not what you ask for")
     poles = {pole.name for pole in geometry.poles}
-    for name in (*goal.forbidden, *goal.mandatory):
+    for name in (*objective.forbidden, *objective.mandatory):
         if name not in poles:
             raise SeipError(
                 f"{name!r} is no pole: a tolerance lays posts on the pavement anew, under other names; "
                 "draw a forbidden or mandatory area instead, or give --grid and --spacing"
             )
-    judge = Judge(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, objective)
 
     def answer(grid_spacing: float, candidate_spacing: float) -> Generator[Progress, None, Answer]:
         candidates = replace(settings.candidates, spacing=candidate_spacing)
         tried = replace(settings, candidates=candidates, grid_spacing=grid_spacing)
-        return (yield from judge.answer(tried))
+        return (yield from evaluator.answer(tried))
 
     share = tolerance / 2
-    finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATES)
+    finest = yield from answer(GRID_SPACINGS[-1], COARSE_CANDIDATE_SPACING)
     by_grid = yield from _until_as_good(
         GRID_SPACINGS,
-        lambda spacing: answer(spacing, COARSE_CANDIDATES),
-        lambda found: abs(found.own - found.judged) <= share and finest.judged - found.judged <= share,
+        lambda spacing: answer(spacing, COARSE_CANDIDATE_SPACING),
+        lambda found: abs(found.own - found.evaluated) <= share and finest.evaluated - found.evaluated <= share,
         "spacing of the targets",
     )
     grid_spacing = by_grid[-1].grid_spacing
@@ -159,7 +159,7 @@ def coarsest_settings(
     by_candidates = yield from _until_as_good(
         CANDIDATE_SPACINGS,
         lambda spacing: answer(grid_spacing, spacing),
-        lambda found: most.judged - found.judged <= share,
+        lambda found: most.evaluated - found.evaluated <= share,
         "spacing of the candidates",
     )
     candidates = replace(settings.candidates, spacing=by_candidates[-1].candidate_spacing)
@@ -168,45 +168,45 @@ def coarsest_settings(
         tolerance=tolerance,
         by_grid=(*by_grid, finest),
         by_candidates=(*by_candidates, most),
-        judged_on=judge.site.targets.spacing,
+        evaluation_spacing=evaluator.site.targets.spacing,
     )
-    reasoned = replace(convergence.settings, spacings_because=convergence.sentence)
+    reasoned = replace(convergence.settings, spacings_because=convergence.message)
     return replace(convergence, settings=reasoned)
 
 
-class Judge:
-    """Answers a goal under any settings of the grids, and judges the answers on one fine grid.
+class Evaluator:
+    """Optimises under any grid settings, and evaluates the placements on one fine grid.
 
     Parameters
     ----------
     settings : SurveySettings
-        δ and the sensor types that judge.
+        δ and the sensor types of the evaluation.
     """
 
-    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, goal: Objective) -> None:
-        spacing = max(JUDGED_ON, math.sqrt(geometry.region.area / MOST_JUDGED))
+    def __init__(self, geometry: SceneGeometry, settings: SurveySettings, objective: Objective) -> None:
+        spacing = max(EVALUATION_SPACING, math.sqrt(geometry.region.area / MAX_EVALUATION_TARGETS))
         wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
         self.site = make_site(geometry, wide, spacing, settings.reach())
-        self.weights = target_weights(self.site, goal)
-        self.geometry, self._goal = geometry, goal
+        self.weights = target_weights(self.site, objective)
+        self.geometry, self._objective = geometry, objective
         self._models = settings.models()
         self._visibility: VisibilityModel = visibility_model(self.site, settings.visibility, settings.engine)
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
-        """Find the best placement under some settings, and judge it."""
+        """Find the best placement under some settings, and evaluate it."""
         site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach())
-        plan = yield from self.plan(site, settings)
-        seen = plan.deployment.seen_by > 0
+        solution = yield from self.solve(site, settings)
+        seen = solution.deployment.seen_by > 0
         return Answer(
             grid_spacing=settings.grid_spacing,
             candidate_spacing=settings.candidates.spacing,
             targets=len(site.targets),
             poses=len(site.candidates),
-            own=weighted_share(seen, target_weights(site, self._goal)),
-            judged=self.judge(plan),
+            own=weighted_share(seen, target_weights(site, self._objective)),
+            evaluated=self.evaluate(solution),
         )
 
-    def plan(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
+    def solve(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
         """Return the best placement on a site."""
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
         return (
@@ -214,15 +214,15 @@ class Judge:
                 site,
                 grid.visible,
                 self._models,
-                self._goal,
+                self._objective,
                 settings.limits,
             )
         )
 
-    def judge(self, plan: Solution) -> float:
+    def evaluate(self, solution: Solution) -> float:
         """Return the share of the fine grid's weight that a placement sees."""
         seen = np.zeros(len(self.site.targets), dtype=bool)
-        for sensor in plan.deployment.sensors:
+        for sensor in solution.deployment.sensors:
             seen |= self._visibility.see(sensor.model, sensor.xyz, sensor.orientation)
         return weighted_share(seen, self.weights)
 

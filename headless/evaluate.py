@@ -18,7 +18,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.claims import save_claims
-from headless.coverage_study.cells import NUMBERS
+from headless.coverage_study.cells import COUNTS
 from headless.detection import case_study, study_results
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
@@ -36,7 +36,7 @@ from seip_addon.core.scans import ScanSettings, static_scene
 
 
 def main(argv: list[str]) -> None:
-    """Place, simulate, train, judge, and write charts and tables to a folder."""
+    """Place, simulate, train, evaluate, and write charts and tables to a folder."""
     options = _parser().parse_args(argv)
     if options.seeds < 1:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
@@ -63,7 +63,7 @@ def main(argv: list[str]) -> None:
     claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
     site = study.surveyed.layout.site
-    with runtime.writing(folder):
+    with runtime.incomplete_if_interrupted(folder):
         results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
@@ -76,11 +76,11 @@ def main(argv: list[str]) -> None:
         )
         save_claims(folder / "claims_5_to_9.md", claims, site.name)
     for line in study_results.in_words(results):
-        runtime.say(line)
+        runtime.print_line(line)
     for claim in claims:
-        runtime.say(claim.describe())
-    runtime.say(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
-    runtime.say(f"written to {folder}/")
+        runtime.print_line(claim.describe())
+    runtime.print_line(", ".join(f"{what} {seconds:.0f} s" for what, seconds in watch.seconds.items()))
+    runtime.print_line(f"written to {folder}/")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=NUMBERS[-1])))
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=COUNTS[-1])))
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
     runtime.LOG.info(traffic.overlap())

@@ -15,48 +15,50 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime, survey
-from headless.charts.traffic import save_promise_chart, save_time_map
-from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
+from headless.charts.traffic import save_time_map, save_traffic_chart
+from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 
 from seip_addon.core.placement.objective import Solution, check_objective
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
+from seip_addon.core.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
 from seip_addon.core.workflows.traffic import TrafficSettings, place_in_traffic, read_runs
 
 CHARTS = ("time_seen.png", "traffic.png")
 
 
 def main(argv: list[str]) -> None:
-    """Place sensors for the road in traffic and write the result to a folder."""
+    """Optimise a placement for traffic and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, settings = read_goal(options), read_settings(TrafficSettings, options)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
+    objective, settings = read_objective(options), read_settings(TrafficSettings, options)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
     layout = surveyed.layout
     runs = finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout))
     runtime.LOG.info(runs.overlap)
-    steps = place_in_traffic(layout, surveyed.grid, goal, runs, settings)
+    steps = place_in_traffic(layout, surveyed.grid, objective, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)
-    plan, study = placed.plan, placed.study
-    runtime.say(_in_words(study, plan))
-    with runtime.writing(options.output):
+    solution, study = placed.solution, placed.study
+    runtime.print_line(_in_words(study, solution))
+    with runtime.incomplete_if_interrupted(options.output):
         name = layout.site.name
         title = f"{name}: for how long the placement sees what, {study.road_users:.0f} road users at a time"
-        save_time_map(options.output / CHARTS[0], layout.geometry, layout.site, plan.deployment, study.traffic, title)
-        sensors = f"{len(plan.deployment.sensors)} sensors"
-        save_promise_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
-        survey.save_plan(surveyed, plan, options.output, render=not options.no_render, traffic=asdict(settings))
-    runtime.say(f"written to {options.output}/")
+        save_time_map(
+            options.output / CHARTS[0], layout.geometry, layout.site, solution.deployment, study.traffic, title
+        )
+        sensors = f"{len(solution.deployment.sensors)} sensors"
+        save_traffic_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
+        survey.save_solution(surveyed, solution, options.output, render=not options.no_render, traffic=asdict(settings))
+    runtime.print_line(f"written to {options.output}/")
 
 
-def _in_words(study: TrafficStudy, plan: Solution) -> str:
-    sensors = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
+def _in_words(study: TrafficStudy, solution: Solution) -> str:
+    sensors = [survey.describe_sensor(sensor) for sensor in solution.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    return "\n".join([*sensors, *seen, plan.certificate, *plan.placement.notes])
+    return "\n".join([*sensors, *seen, solution.certificate, *solution.placement.notes])
 
 
-def _share(placed: JudgedInTraffic) -> str:
+def _share(placed: TrafficEvaluation) -> str:
     return "; ".join(
-        f"{seen.held.describe()} of the {WHAT[layer]} on average over time, {seen.empty:.2%} on the empty road"
+        f"{seen.mean.describe()} of the {LAYER_NAMES[layer]} on average over time, {seen.empty:.2%} on the empty road"
         for layer, seen in placed.seen.items()
     )
 
@@ -64,7 +66,7 @@ def _share(placed: JudgedInTraffic) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("in_traffic", "Place roadside LiDARs for the road in traffic.")
     survey.add_options(parser)
-    add_goal(parser)
+    add_objective(parser)
     traffic = parser.add_argument_group("traffic")
     traffic.add_argument(
         "--traffic",
@@ -75,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
         help="runs of traffic: the last third judges what is chosen on the others (those in the folder SCENE_traffic "
         "beside the scene)",
     )
-    names = ("layer", "weights_from_traffic", "instants", "judged_at", "seed")
+    names = ("layer", "weights_from_traffic", "instants", "evaluation_instants", "seed")
     add_settings(traffic, TrafficSettings, *names)
     parser.add_argument("--no-render", action="store_true", help="leave out the rendered view")
     return parser

@@ -17,23 +17,23 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from headless.build_extension import BUILDS, WHEEL_TAGS, pins
-from headless.set_up import LOCK, SUPPORTED, UNLOCKED, requirements
+from headless.set_up import LOCK, SUPPORTED_PYTHONS, UNLOCKED, requirements
 
 from packaging.requirements import Requirement
 
 GROUPS = ("installer", "development", "traffic", "detection", "second-opinion")
 """What `headless.set_up` installs; the groups ``benchmark`` and ``readers`` are tried out apart from the rest."""
 
-NEWEST_GLIBC = 36
+MAX_GLIBC_MINOR = 36
 """Of Debian 12, the oldest system that is tried: 2.36."""
 
 
 def main() -> None:
     """Ask pip for the wheels of all pins and write the lock."""
     everything = sorted({pin for group in GROUPS for pin in requirements(group) if pin.split("==")[0] not in UNLOCKED})
-    linux = [f"manylinux_2_{minor}_x86_64" for minor in range(NEWEST_GLIBC, 4, -1)]
+    linux = [f"manylinux_2_{minor}_x86_64" for minor in range(MAX_GLIBC_MINOR, 4, -1)]
     found: dict[str, str] = {}
-    for version in SUPPORTED:
+    for version in SUPPORTED_PYTHONS:
         found |= wheels(everything, "{}.{}".format(*version), linux)
     for pin in pins():  # the extension carries wheels without compiled code where there are any
         found |= wheels([pin], BUILDS["blender4.5"].python, ["any"], pure=True)

@@ -77,17 +77,17 @@ def read_settings(kind: type[Options], options: argparse.Namespace, **values: An
     return kind(**values)
 
 
-def add_goal(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
-    """Add what a goal is made of to a command, but for a coverage to reach, and return the group."""
-    goal = parser.add_argument_group("goal")
-    add_settings(goal, Objective, "count", "budget")
-    goal.add_argument("--weighted", action="store_true", help="count targets by the weights of their regions")
-    add_settings(goal, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
-    return goal
+def add_objective(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """Add what an objective is made of to a command, but for a coverage to reach, and return the group."""
+    objective = parser.add_argument_group("objective")
+    add_settings(objective, Objective, "count", "budget")
+    objective.add_argument("--weighted", action="store_true", help="count targets by the weights of their regions")
+    add_settings(objective, Objective, "central_weight", "min_distance", "forbidden", "mandatory")
+    return objective
 
 
-def read_goal(options: argparse.Namespace) -> Objective:
-    """Return the goal that options of `add_goal` name."""
+def read_objective(options: argparse.Namespace) -> Objective:
+    """Return the objective that options of `add_objective` name."""
     weight = "scene" if options.weighted and options.central_weight is None else options.central_weight
     return read_settings(Objective, options, central_weight=weight)
 

@@ -21,7 +21,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.convergence import coarsest_settings
-from headless.options import add_goal, add_settings, new_parser, read_goal
+from headless.options import add_objective, add_settings, new_parser, read_objective
 
 from seip_addon.core.placement.objective import Objective, Solution, check_objective
 from seip_addon.core.workflows.survey import place
@@ -30,29 +30,32 @@ from seip_addon.core.workflows.survey import place
 def main(argv: list[str]) -> None:
     """Place sensors in a scene and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal = read_goal(options)
-    refine = None if options.tolerance is None else partial(coarsest_settings, goal=goal, tolerance=options.tolerance)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal), refine)
-    steps = place(surveyed.layout, surveyed.grid, goal, pose_errors=options.pose_errors)
-    plan = surveyed.stopwatch.run("placement", steps)
-    runtime.say(_in_words(plan))
-    with runtime.writing(options.output):
-        survey.save_plan(surveyed, plan, options.output, render=not options.no_render, pose_errors=options.pose_errors)
-    runtime.say(f"written to {options.output}/")
+    objective = read_objective(options)
+    tolerance = options.tolerance
+    refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective), refine)
+    steps = place(surveyed.layout, surveyed.grid, objective, pose_errors=options.pose_errors)
+    solution = surveyed.stopwatch.run("placement", steps)
+    runtime.print_line(_in_words(solution))
+    with runtime.incomplete_if_interrupted(options.output):
+        survey.save_solution(
+            surveyed, solution, options.output, render=not options.no_render, pose_errors=options.pose_errors
+        )
+    runtime.print_line(f"written to {options.output}/")
 
 
-def _in_words(plan: Solution) -> str:
-    placement, deployment = plan.placement, plan.deployment
+def _in_words(solution: Solution) -> str:
+    placement, deployment = solution.placement, solution.deployment
     lines = [
-        f"{survey.sensor_in_words(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
+        f"{survey.describe_sensor(sensor)}: sees {sensor.alone:.1%} of the targets, {sensor.marginal:.1%} alone"
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"
     lines.append(f"coverage {deployment.coverage:.2%}{central}, price ${deployment.price:,.0f}")
-    lines.append(plan.certificate)
-    if plan.greedy is not None and placement.objective > 0:
+    lines.append(solution.certificate)
+    if solution.greedy is not None and placement.objective > 0:
         lines.append(
-            f"the greedy algorithm reaches {plan.greedy.objective / placement.objective:.2%} of that objective"
+            f"the greedy algorithm reaches {solution.greedy.objective / placement.objective:.2%} of that objective"
         )
     return "\n".join([*lines, *placement.notes])
 
@@ -60,7 +63,7 @@ def _in_words(plan: Solution) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
     survey.add_options(parser)
-    add_settings(add_goal(parser), Objective, "coverage")
+    add_settings(add_objective(parser), Objective, "coverage")
     parser.add_argument(
         "--tolerance",
         type=float,

@@ -16,49 +16,49 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
-from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
+from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 
 from seip_addon.core.placement.objective import check_objective
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_study import RobustnessSettings
-from seip_addon.core.workflows.robust import RobustPlan, place_robustly
+from seip_addon.core.workflows.robust import RobustSolution, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
 
 def main(argv: list[str]) -> None:
-    """Place sensors for what may go wrong and write the result to a folder."""
+    """Optimise a robust placement and write the result to a folder."""
     options = _parser().parse_args(argv)
-    goal, robustness = read_goal(options), _robustness(options)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, goal))
-    steps = place_robustly(surveyed.layout, surveyed.grid, goal, robustness)
+    objective, robustness = read_objective(options), _robustness(options)
+    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
+    steps = place_robustly(surveyed.layout, surveyed.grid, objective, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
-    plan, study = robust.plan, robust.study
-    runtime.say(_in_words(robust))
-    with runtime.writing(options.output):
+    solution, study = robust.solution, robust.study
+    runtime.print_line(_in_words(robust))
+    with runtime.incomplete_if_interrupted(options.output):
         layout = surveyed.layout
         save_spread_chart(options.output / CHARTS[0], study, f"{layout.site.name}: coverage under pose errors")
-        save_blame_chart(options.output / CHARTS[1], robust.judged, f"{layout.site.name}: what costs coverage")
+        save_blame_chart(options.output / CHARTS[1], robust.pose_study, f"{layout.site.name}: what costs coverage")
         save_frontier_chart(options.output / CHARTS[2], study, f"{layout.site.name}: what robustness costs and saves")
-        survey.save_plan(surveyed, plan, options.output, render=not options.no_render)
-    runtime.say(f"written to {options.output}/")
+        survey.save_solution(surveyed, solution, options.output, render=not options.no_render)
+    runtime.print_line(f"written to {options.output}/")
 
 
-def _in_words(robust: RobustPlan) -> str:
-    (chosen,), plan, study = robust.study.robust, robust.plan, robust.study
+def _in_words(robust: RobustSolution) -> str:
+    (chosen,), solution, study = robust.study.robust, robust.solution, robust.study
     nominal = study.beside(chosen)
-    lines = [survey.sensor_in_words(sensor) for sensor in plan.deployment.sensors]
+    lines = [survey.describe_sensor(sensor) for sensor in solution.deployment.sensors]
     return "\n".join(
         [
             *lines,
             f"planned coverage {chosen.planned:.2%}, the nominal optimum's {nominal.planned:.2%}",
-            f"over {study.settings.draws} unseen draws, {chosen.judged_by.describe_outcome()}:",
+            f"over {study.settings.draws} unseen draws, {chosen.evaluated_by.describe_outcome()}:",
             f"mean {chosen.mean.describe()}, the nominal optimum's {nominal.mean.describe()}",
             f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
             f"which is {study.saving(chosen).describe()} more, draw for draw",
-            plan.certificate,
-            *plan.placement.notes,
+            solution.certificate,
+            *solution.placement.notes,
         ]
     )
 
@@ -74,7 +74,7 @@ def _robustness(options: argparse.Namespace) -> RobustnessSettings:
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("robust", "Place roadside LiDARs for what may go wrong.")
     survey.add_options(parser)
-    add_goal(parser)
+    add_objective(parser)
     risk = parser.add_argument_group("what may go wrong")
     risk.add_argument(
         "--objective",

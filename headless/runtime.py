@@ -50,13 +50,13 @@ except ImportError:
         raise
     sys.exit(f"error: {complaint(missing)}")
 
-STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
+EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
-ELAPSED = "{desc} [{elapsed}]"
+ELAPSED_FORMAT = "{desc} [{elapsed}]"
 """How progress of unknown length is shown."""
 
 LOG = logging.getLogger("headless")
-"""What commands and their modules report on the way; `say` is for results."""
+"""Progress and warnings of commands and their modules; results go through `print_line`."""
 
 _LOCKS: dict[Path, int] = {}
 """Folders that this process has locked, and what holds each lock."""
@@ -104,16 +104,16 @@ def check_folder(folder: Path) -> None:
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[None]:
-    """Say of an interruption from here on that the folder is incomplete: each file in it is whole, but some lack."""
+def incomplete_if_interrupted(folder: Path) -> Iterator[None]:
+    """Add to a Ctrl-C within the block that the folder is incomplete: its files are whole, but some are missing."""
     try:
         yield
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(f"stopped while writing: the results in {folder} are incomplete") from stop
 
 
-def say(text: str) -> None:
-    """Print a line for the person who runs the command, at once."""
+def print_line(text: str) -> None:
+    """Print a line of the command's results on standard output, unbuffered."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
@@ -155,7 +155,7 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     except SeipError as error:
         _end(1, f"error: {error}")
     except KeyboardInterrupt as stop:
-        _end(STOPPED, str(stop) or "stopped, no result written")
+        _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
     _end(0)
 
 
@@ -170,13 +170,13 @@ def progress_bar() -> Iterator[Callable[[Progress], None]]:
     if not sys.stderr.isatty():
         yield _line_reporter()
         return
-    with tqdm(file=sys.stderr, leave=False, mininterval=0.1, maxinterval=0.1, bar_format=ELAPSED) as bar:
+    with tqdm(file=sys.stderr, leave=False, mininterval=0.1, maxinterval=0.1, bar_format=ELAPSED_FORMAT) as bar:
 
         def report(progress: Progress) -> None:
             known = progress.total > 0
             bar.set_description(progress.what, refresh=False)
             if (progress.total or None) != bar.total or (known and progress.done < bar.n):
-                bar.total, bar.bar_format = progress.total or None, None if known else ELAPSED
+                bar.total, bar.bar_format = progress.total or None, None if known else ELAPSED_FORMAT
                 bar.reset()
             bar.update(progress.done - bar.n if known else 1)
 
@@ -193,7 +193,7 @@ def _line_reporter() -> Callable[[Progress], None]:
         if now - shown < SECONDS_BETWEEN_LINES:
             return
         shown = now
-        style = None if progress.total else ELAPSED
+        style = None if progress.total else ELAPSED_FORMAT
         total = progress.total or None
         meter = tqdm.format_meter(progress.done, total, now - start, prefix=progress.what, bar_format=style)
         sys.stderr.write(f"{meter}\n")

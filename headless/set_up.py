@@ -23,14 +23,14 @@ from typing import Any
 
 from headless.system_libraries import complaint, missing_libraries
 
-SUPPORTED = ((3, 11), (3, 13))
+SUPPORTED_PYTHONS = ((3, 11), (3, 13))
 ROOT = Path(__file__).resolve().parent.parent
 LOCK = ROOT / "wheels.lock"
 
 UNLOCKED = {"torch"}
 """Packages of many builds, of which pip's settings choose: those for graphics cards bring packages of their own."""
 
-ALONE = {"second-opinion"}
+SEPARATE_GROUPS = {"second-opinion"}
 """Groups of packages that ask for others which are not used here."""
 
 
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> str | None:
 
 def what_is_missing() -> str | None:
     """Return what this system lacks, with its cure, before anything is downloaded."""
-    if sys.version_info[:2] not in SUPPORTED:
+    if sys.version_info[:2] not in SUPPORTED_PYTHONS:
         return (
             f"this is Python {sys.version_info[0]}.{sys.version_info[1]}, but Blender's module exists for 3.11 and "
             "3.13 alone; name one of these: make PYTHON=python3.13 ..."
@@ -134,7 +134,7 @@ def install(environment: Path) -> None:
 def install_group(environment: Path, group: str) -> None:
     """Install the packages of a group, those of the lock first."""
     pip = [str(environment / "bin" / "python"), "-m", "pip", "install", "-qq", "--only-binary", ":all:"]
-    pip += ["--no-deps"] if group in ALONE else []
+    pip += ["--no-deps"] if group in SEPARATE_GROUPS else []
     pins = requirements(group)
     free = [pin for pin in pins if pin.split("==")[0] in UNLOCKED]
     with tempfile.TemporaryDirectory() as folder:

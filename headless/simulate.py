@@ -50,10 +50,10 @@ def main(argv: list[str]) -> None:
     runtime.warn(simulation.warnings)
     with runtime.progress_bar() as report:
         manifest = finish(record(options.output, run, simulation, settings), report)
-    runtime.say(_summary(manifest))
+    runtime.print_line(_summary(manifest))
     for key in settings.formats:
-        runtime.say(f"{FORMATS[key].name}: {dataset_folder(options.output, settings, key)}/")
-    runtime.say(f"written to {options.output}/")
+        runtime.print_line(f"{FORMATS[key].name}: {dataset_folder(options.output, settings, key)}/")
+    runtime.print_line(f"written to {options.output}/")
 
 
 def _settings(options: argparse.Namespace) -> RecordingSettings:

@@ -42,26 +42,28 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
         lambda site, models: check_objective(site, models, Objective(count=DEFAULT_COUNT)),
     )
     runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
-    stage = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
+    studied = StudiedScene(
+        surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope()
+    )
     made_from = digest(
         grid_key(surveyed.layout),
         repr(surveyed.layout.settings),
-        repr(stage.scope),
+        repr(studied.scope),
         *(run.key for run in runs),
         *(other.name for other in options.other),
         source_digest("headless.stability"),
     )
     done = []
-    for name, work in chapters(stage):
+    for name, work in chapters(studied):
         kept = load_chapter(options.work / f"{name}.json", made_from)
         if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
-            kept = surveyed.stopwatch.run(name, work(stage))
+            kept = surveyed.stopwatch.run(name, work(studied))
             save_chapter(options.work / f"{name}.json", kept, made_from)
             runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
         done.append(kept)
-    with runtime.writing(options.output):
-        save_page(options.output / PAGE, introduction(stage), done, CHARTS)
-    runtime.say(f"written to {options.output / PAGE}")
+    with runtime.incomplete_if_interrupted(options.output):
+        save_page(options.output / PAGE, introduction(studied), done, CHARTS)
+    runtime.print_line(f"written to {options.output / PAGE}")
 
 
 def _check_other(scene: Path) -> None:

@@ -15,7 +15,7 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime, survey
 from headless.claims import save_claims
-from headless.coverage_study.cells import NUMBERS, WEIGHT_SHOWN, coverage_study
+from headless.coverage_study.cells import CHARTED_WEIGHT, COUNTS, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
 from headless.coverage_study.claims import coverage_claims
 from headless.coverage_study.tables import save_study_table
@@ -34,22 +34,22 @@ def main(argv: list[str]) -> None:
     study = surveyed.stopwatch.run("study", steps)
     claims = coverage_claims(study)
 
-    with runtime.writing(folder):
+    with runtime.incomplete_if_interrupted(folder):
         save_study_table(folder / "coverage.csv", study)
         save_height_chart(folder / "heights.png", study, site.name)
         weighted = site.targets.central.any()
         if weighted:
             save_weight_chart(folder / "weights.png", study, site.name)
         for sensor in study.sensors:
-            for weight in (1.0, WEIGHT_SHOWN) if weighted else (1.0,):
-                case = study.find(sensor, NUMBERS[-1], weight=weight)
+            for weight in (1.0, CHARTED_WEIGHT) if weighted else (1.0,):
+                case = study.find(sensor, COUNTS[-1], weight=weight)
                 if case is not None:
                     name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
                     save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
-        runtime.say(claim.describe())
-    runtime.say(f"written to {folder}/")
+        runtime.print_line(claim.describe())
+    runtime.print_line(f"written to {folder}/")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -30,7 +30,7 @@ from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.settings import VisibilitySettings
-from seip_addon.core.visibility.triangle_culling import triangles_sentence
+from seip_addon.core.visibility.triangle_culling import culling_message
 from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
 from seip_addon.core.workflows.traffic import runs_in, traffic_folder
 from seip_addon.scene.read import read_scene
@@ -62,7 +62,7 @@ class Stopwatch:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A scene laid out and seen."""
+    """A scene with its site layout and visibility grid."""
 
     layout: Layout
     grid: VisibilityGrid
@@ -133,20 +133,20 @@ def survey(
     runtime.warn(layout.warnings)
     check(layout.site, layout.models)
     grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
-    LOG.info(triangles_sentence(grid.parameters["triangles"]))
+    LOG.info(culling_message(grid.parameters["triangles"]))
     return Survey(layout, grid, watch)
 
 
-def save_plan(
+def save_solution(
     surveyed: Survey,
-    plan: Solution,
+    solution: Solution,
     folder: Path,
     *,
     render: bool,
     pose_errors: bool = False,
     traffic: Mapping[str, object] | None = None,
 ) -> None:
-    """Write a plan of a survey, with its record (see `record_of`), to the folder of results."""
+    """Write a solution of a survey, with its record (see `record_of`), to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
     now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
@@ -154,16 +154,16 @@ def save_plan(
         bpy.context.scene,
         layout.geometry,
         layout.site,
-        plan,
-        record_of(layout, grid, plan, now, render=render, pose_errors=pose_errors, traffic=traffic),
+        solution,
+        record_of(layout, grid, solution, now, render=render, pose_errors=pose_errors, traffic=traffic),
         visible=grid.visible,
         models=layout.models,
         render=render,
     )
 
 
-def sensor_in_words(sensor: Sensor) -> str:
-    """Say which sensor hangs where."""
+def describe_sensor(sensor: Sensor) -> str:
+    """Describe a sensor: type, position, height and tilt."""
     tilt = describe_tilt(sensor.tilt)
     return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
 

@@ -40,7 +40,7 @@ from seip_addon.core.traffic.overlaps import without_overlaps
 from seip_addon.core.traffic.road_fit import fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
 from seip_addon.core.traffic.source import (
-    MARGIN,
+    ROAD_MARGIN,
     TrafficFiles,
     describe_categories,
     load_traffic,
@@ -66,7 +66,7 @@ def main(argv: list[str]) -> None:
     if options.animate is not None:
         animate(bpy.context.scene, trajectories)
         save_blend(options.animate)
-    runtime.say(f"{options.output}: {_in_words(trajectories)}")
+    runtime.print_line(f"{options.output}: {_in_words(trajectories)}")
 
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
@@ -85,7 +85,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     with tempfile.TemporaryDirectory() as folder:
         files = _run(simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0)))
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
-        window = Extent(options.warm_up, end, road_bounds(geometry, MARGIN))
+        window = Extent(options.warm_up, end, road_bounds(geometry, ROAD_MARGIN))
         read = _run(read_sumo(files, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
     runtime.warn((*read.warnings, *fit.warnings))

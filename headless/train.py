@@ -29,7 +29,7 @@ from headless.detection.frames import SampledRecording, recording_of, require_in
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.pillars import grid_of
-from headless.detection.settings import GROUPS, NetworkSettings, TrainingSettings
+from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
 from headless.options import add_settings, new_parser, read_settings
@@ -77,7 +77,7 @@ def main(argv: list[str]) -> None:
     with runtime.progress_bar() as report:
         trained = finish(steps, report)
     best = trained.curve.best
-    runtime.say(
+    runtime.print_line(
         f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} on validation frames"
     )
     save_training_chart(
@@ -86,7 +86,7 @@ def main(argv: list[str]) -> None:
     if options.test:
         figures = _evaluated(trained.detector, options.test, geometry)
         save_json(options.output / "evaluation.json", figures)
-    runtime.say(f"written to {options.output}/")
+    runtime.print_line(f"written to {options.output}/")
 
 
 def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry) -> dict[str, dict[str, float]]:
@@ -99,7 +99,7 @@ def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry
         results = _results(detector, folder, geometry.region)
         figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
         words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
-        runtime.say(f"{folder}: {words}")
+        runtime.print_line(f"{folder}: {words}")
     return figures
 
 
@@ -107,7 +107,7 @@ def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[Fra
     """Return what is there and what is detected in each frame of a run."""
     recording = recording_of(folder)
     sensors = np.array([sensor["local_m"] for sensor in load_manifest(folder)["sensors"]])
-    common: dict[str, Any] = {"classes": tuple(GROUPS.values()), "region": region, "sensors": sensors}
+    common: dict[str, Any] = {"classes": tuple(CLASS_CATEGORIES.values()), "region": region, "sensors": sensors}
     return [
         frame_result(
             frame,

@@ -8,7 +8,7 @@ import bpy
 
 from .core.errors import SeipError
 from .core.lidar import LidarModel, load_catalogue
-from .core.visibility.ray_casting import MOST_THREADS
+from .core.visibility.ray_casting import MAX_THREADS
 from .core.visibility.store import GridFolder
 
 ADDON_ID = (__package__ or "").removesuffix(".seip_addon")
@@ -31,9 +31,9 @@ class SEIP_AP_preferences(bpy.types.AddonPreferences):
     cores: bpy.props.IntProperty(
         name="Cores",
         description="Processor cores that compute visibility at once; more than four rarely help",
-        default=MOST_THREADS,
+        default=MAX_THREADS,
         min=1,
-        max=MOST_THREADS,
+        max=MAX_THREADS,
     )
     cache: bpy.props.StringProperty(
         name="Cache",

@@ -10,9 +10,9 @@ from itertools import pairwise
 from typing import Any
 
 from headless.charts.style import (
+    COLOURS,
     DASHED,
-    FAINT,
-    SERIES,
+    FAINT_COLOUR,
     add_legend,
     colour,
     mark,
@@ -34,22 +34,22 @@ from seip_addon.core.pictures.callouts import place_callouts
 from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-PANEL = (6.0, 4.4)  # inches
-BESIDE, ASIDE = 0.09, 0.035  # of the step between two numbers of sensors: from type to type, from mark to seeds
+PANEL_SIZE = (6.0, 4.4)  # inches
+TYPE_SHIFT, SEED_SHIFT = 0.09, 0.035  # of the step between two numbers: from type to type, from mark to seeds
 SEED_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.4, "alpha": 0.55, "mew": 0.0, "zorder": 2}
-RINGED: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK}
-NAME: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
+RING_MARK: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK}
+LABEL: dict[str, Any] = {"size": 8.0, "color": INK, "ha": "center", "va": "center", "zorder": 5, "parse_math": False}
 
-STROKES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
+LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 
-PRECISION = "average precision"
+PRECISION_LABEL = "average precision"
 
 Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class PrecisionCell:
-    """What was reached with one type and number of sensors.
+    """Average precision of one type and number of sensors, by seed.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class PrecisionCell:
 
     @property
     def name(self) -> str:
-        """What it is called in a chart."""
+        """Name in charts."""
         return _named(self.count, self.sensor)
 
 
@@ -157,16 +157,16 @@ def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
     Small dots are single seeds, marks their means, bars the intervals of the means.
     """
     _check(cells, "average precision against the number of sensors")
-    figure, (panel,) = new_figure(*PANEL)
+    figure, (panel,) = new_figure(*PANEL_SIZE)
     counts = sorted({cell.count for cell in cells})
     sensors = _sensors(cells)
     for row, sensor in enumerate(sensors):
         own = sorted((cell for cell in cells if cell.sensor == sensor), key=lambda cell: cell.count)
-        x = [counts.index(cell.count) + BESIDE * (row - (len(sensors) - 1) / 2) for cell in own]
+        x = [counts.index(cell.count) + TYPE_SHIFT * (row - (len(sensors) - 1) / 2) for cell in own]
         panel.plot(x, [cell.mean for cell in own], label=sensor, linewidth=1.6, **_mark(row))
         for place, cell in zip(x, own, strict=True):
             _bar(panel, place, cell.interval, row)
-            panel.plot([place + ASIDE] * len(cell.values), cell.values, color=colour(row), marker="o", **SEED_MARK)
+            panel.plot([place + SEED_SHIFT] * len(cell.values), cell.values, color=colour(row), marker="o", **SEED_MARK)
     panel.set_xticks(range(len(counts)), [f"{count}" for count in counts])
     panel.set_xlim(-0.4, len(counts) - 0.6)
     _precision_axis(panel, _reached(cells), "number of sensors N")
@@ -176,7 +176,7 @@ def save_count_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
 def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell], title: str) -> None:
     """Draw average precision against price, with the front named, as PNG."""
     _check(cells, "average precision against price")
-    figure, (panel,) = new_figure(PANEL[0] * 1.25, PANEL[1])
+    figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     best = _front(cells)
     _scatter(panel, cells, [cell.price for cell in cells])
     panel.step(
@@ -219,7 +219,7 @@ def save_coverage_chart(
         Its 95 % interval, where there is one.
     """
     _check(cells, "average precision against coverage")
-    figure, (panel,) = new_figure(*PANEL)
+    figure, (panel,) = new_figure(*PANEL_SIZE)
     _scatter(panel, cells, [cell.coverage for cell in cells])
     panel.margins(x=0.1)
     panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.0f} %"))
@@ -237,11 +237,11 @@ def save_precision_recall_chart(
 ) -> None:
     """Draw precision against recall, a colour for each type and a stroke for each number of sensors, as PNG."""
     _check(curves, "precision against recall")
-    figure, (panel,) = new_figure(*PANEL)
+    figure, (panel,) = new_figure(*PANEL_SIZE)
     sensors = list(dict.fromkeys(curve.sensor for curve in curves))
     counts = sorted({curve.count for curve in curves}, reverse=True)
     for curve in curves:
-        stroke = STROKES[counts.index(curve.count) % len(STROKES)]
+        stroke = LINE_STYLES[counts.index(curve.count) % len(LINE_STYLES)]
         label = f"{_named(curve.count, curve.sensor)}: AP {curve.average_precision:.2f}"
         style: dict[str, Any] = {"color": colour(sensors.index(curve.sensor)), "linestyle": stroke, "linewidth": 1.6}
         panel.plot(curve.recall, curve.precision, label=label, **style)
@@ -253,7 +253,7 @@ def save_precision_recall_chart(
 def save_parts_chart(path: str | os.PathLike[str], panels: Sequence[BinnedFigure], title: str) -> None:
     """Draw figures in parts of the road users, a panel for each way to part them, as PNG."""
     _check(panels, "detection by parts of the road users")
-    figure, axes = new_figure(PANEL[0] * 0.85 * len(panels), PANEL[1], len(panels))
+    figure, axes = new_figure(PANEL_SIZE[0] * 0.85 * len(panels), PANEL_SIZE[1], len(panels))
     for panel, parts in zip(axes, panels, strict=True):
         places = range(len(parts.edges) - 1)
         if parts.road_users:
@@ -282,10 +282,10 @@ def save_training_chart(
         Average precision after so many steps; the best is marked.
     """
     _check(loss, "a training")
-    figure, (panel,) = new_figure(PANEL[0] * 1.25, PANEL[1])
+    figure, (panel,) = new_figure(PANEL_SIZE[0] * 1.25, PANEL_SIZE[1])
     each = np.arange(1, len(loss) + 1)
-    panel.plot(each, loss, color=FAINT, linewidth=0.7, label="loss")
-    panel.plot(each, _smoothed(np.asarray(loss, dtype=np.float64)), color=SERIES[0], linewidth=1.6, label="smoothed")
+    panel.plot(each, loss, color=FAINT_COLOUR, linewidth=0.7, label="loss")
+    panel.plot(each, _smoothed(np.asarray(loss, dtype=np.float64)), color=COLOURS[0], linewidth=1.6, label="smoothed")
     panel.set_yscale("log")
     panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -297,12 +297,12 @@ def save_training_chart(
         beside = panel.twinx()
         panels.append(beside)
         steps, reached = list(validation), list(validation.values())
-        beside.plot(steps, reached, color=SERIES[1], marker="s", markersize=4, label="validation AP")
+        beside.plot(steps, reached, color=COLOURS[1], marker="s", markersize=4, label="validation AP")
         best = max(validation, key=lambda step: validation[step])
         label = f"best: {validation[best]:.2f} after {best} steps"
-        beside.plot([best], [validation[best]], label=label, markersize=12, mew=1.3, **RINGED)
+        beside.plot([best], [validation[best]], label=label, markersize=12, mew=1.3, **RING_MARK)
         beside.set_ylim(0, 1.02)
-        beside.set_ylabel(f"{PRECISION} on validation frames", color=INK)
+        beside.set_ylabel(f"{PRECISION_LABEL} on validation frames", color=INK)
         beside.tick_params(colors=SOFT_INK)
         for side in ("top", "left"):
             beside.spines[side].set_visible(False)
@@ -312,7 +312,7 @@ def save_training_chart(
 def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[DetectorSetting], title: str) -> None:
     """Draw average precision against training seconds and inference milliseconds, the default marked, as PNG."""
     _check(settings, "settings of the detector")
-    figure, axes = new_figure(PANEL[0] * 2.2, PANEL[1], 2)
+    figure, axes = new_figure(PANEL_SIZE[0] * 2.2, PANEL_SIZE[1], 2)
     families = list(dict.fromkeys(setting.family for setting in settings))
     costs = [[one.training for one in settings], [one.inference for one in settings]]
     for panel, cost, what in zip(
@@ -325,7 +325,7 @@ def save_setting_chart(path: str | os.PathLike[str], settings: Sequence[Detector
             values = [one.average_precision for _, one in own]
             panel.plot([x for x, _ in own], values, label=family, linestyle="none", **_mark(row))
         chosen = [(x, one.average_precision) for x, one in zip(cost, settings, strict=True) if one.default]
-        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", markersize=14, mew=1.4, **RINGED)
+        panel.plot([x for x, _ in chosen], [y for _, y in chosen], label="default", markersize=14, mew=1.4, **RING_MARK)
         panel.margins(x=0.15)
         panel.set_xlim(left=0)
         _precision_axis(panel, [v for one in settings for v in (one.average_precision, *(one.interval or ()))], what)
@@ -383,10 +383,10 @@ def _reached(cells: Sequence[PrecisionCell]) -> list[float]:
 
 
 def _precision_axis(panel: Axes, reached: Sequence[float], x: str) -> None:
-    """Show what was reached: differences near 1 would not be seen on an axis from 0."""
+    """Scale the axis to the values: differences near 1 would not be visible on an axis from 0."""
     lowest = min(value for value in reached if math.isfinite(value))
     panel.set_ylim(max(0.0, math.floor(10 * lowest - 0.3) / 10), 1.005 if max(reached) <= 1 else None)
-    style_axes(panel, x, PRECISION, "y")
+    style_axes(panel, x, PRECISION_LABEL, "y")
 
 
 def _draw_road_users(panel: Axes, counts: Sequence[int]) -> None:
@@ -420,7 +420,7 @@ def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, 
     """Write names (x, y, name, whether it stands out) beside their marks, none on another or on a mark."""
     figure.draw_without_rendering()  # sets the panels' places and limits, which names have to know
     figure.set_layout_engine("none")
-    texts = [panel.text(x, y, words, weight="bold" if out else "normal", **NAME) for x, y, words, out in named]
+    texts = [panel.text(x, y, words, weight="bold" if out else "normal", **LABEL) for x, y, words, out in named]
     extents = [text.get_window_extent() for text in texts]
     sizes = np.array([(extent.width, extent.height) for extent in extents])
     points = panel.transData.transform([(x, y) for x, y, _, _ in named])
@@ -432,7 +432,7 @@ def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, 
         text.set(x=back.transform(centre)[0], y=back.transform(centre)[1])
         gap = np.maximum(np.abs(point - centre) - size / 2, 0)
         if np.hypot(*gap) > 2.5 * radius:  # far enough to be taken for another's
-            panel.plot(*back.transform([point, centre]).T, color=FAINT, linewidth=0.7, zorder=1)
+            panel.plot(*back.transform([point, centre]).T, color=FAINT_COLOUR, linewidth=0.7, zorder=1)
             text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
 
 

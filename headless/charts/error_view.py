@@ -23,23 +23,23 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.pictures.drawing import SENSOR_MARK
 from seip_addon.core.pictures.palette import INK, SOFT_INK
 
-TRUTH, DETECTED, OTHER = "#00875a", "#d1242f", "#a9b1b8"
-WASH = TRUTH + "22"
-RETURN, GROUND = "#9aa3ab", "#f1f3f4"
-SIDE, DPI = 5.6, 200  # inches
-AROUND = 0.03  # of the region's size, shown around it
-MOST_POINTS = 150_000
+TRUTH_COLOUR, DETECTED_COLOUR, IGNORED_COLOUR = "#00875a", "#d1242f", "#a9b1b8"
+TRUTH_FILL = TRUTH_COLOUR + "22"
+HIT_COLOUR, GROUND_COLOUR = "#9aa3ab", "#f1f3f4"
+PICTURE_SIDE, DPI = 5.6, 200  # inches
+MARGIN_SHARE = 0.03  # of the region's size, shown around it
+MAX_POINTS = 150_000
 """Returns that are drawn of each cloud, evenly chosen: more hide each other."""
 
-RING = 4.0  # metres, radius of the rings about errors
-SHORTEST_NOSE = 0.3  # metres, of the stroke that shows where a box's front is
+RING_RADIUS = 4.0  # metres, radius of the rings about errors
+MIN_NOSE_LENGTH = 0.3  # metres, of the stroke that shows where a box's front is
 
-CLOUD, REGION, IGNORED, WANTED, FOUND, ERROR, SENSOR = range(7)
+CLOUD, REGION, IGNORED, TRUTH, DETECTION, ERROR, SENSOR = range(7)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorView:
-    """One frame and what was made of it.
+    """One frame with its road users, detections and errors.
 
     Parameters
     ----------
@@ -82,9 +82,9 @@ def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], ti
     if not views:
         raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")
     left, bottom, right, top = shapely.total_bounds([view.region for view in views])
-    around = AROUND * max(right - left, top - bottom)
+    around = MARGIN_SHARE * max(right - left, top - bottom)
     shape = (top - bottom + 2 * around) / (right - left + 2 * around)
-    figure, panels = new_figure(SIDE * len(views), SIDE * shape + 1.1, len(views), dpi=DPI)
+    figure, panels = new_figure(PICTURE_SIDE * len(views), PICTURE_SIDE * shape + 1.1, len(views), dpi=DPI)
     for panel, view in zip(panels, views, strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
         _draw(panel, view)
@@ -95,17 +95,17 @@ def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], ti
 
 
 def _draw(panel: Axes, view: ErrorView) -> None:
-    cloud = view.cloud[:: max(1, -(-len(view.cloud) // MOST_POINTS))]
-    panel.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=",", color=RETURN, zorder=CLOUD, rasterized=True)
+    cloud = view.cloud[:: max(1, -(-len(view.cloud) // MAX_POINTS))]
+    panel.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=",", color=HIT_COLOUR, zorder=CLOUD, rasterized=True)
     for part in shapely.get_parts(view.region):
         ring = np.asarray(part.exterior.coords)
-        panel.fill(ring[:, 0], ring[:, 1], facecolor=GROUND, edgecolor="none", zorder=CLOUD - 1)
+        panel.fill(ring[:, 0], ring[:, 1], facecolor=GROUND_COLOUR, edgecolor="none", zorder=CLOUD - 1)
         panel.plot(ring[:, 0], ring[:, 1], color=INK, linewidth=0.9, zorder=REGION)
-    _boxes(panel, view.truth[~view.wanted], OTHER, IGNORED, linewidth=0.7)
-    _boxes(panel, view.truth[view.wanted], TRUTH, WANTED, linewidth=1.2, facecolor=WASH)
-    _boxes(panel, view.detected, DETECTED, FOUND, linewidth=0.9)
-    _rings(panel, view.truth[view.missed], TRUTH, dashed=True)
-    _rings(panel, view.detected[view.false], DETECTED, dashed=False)
+    _boxes(panel, view.truth[~view.wanted], IGNORED_COLOUR, IGNORED, linewidth=0.7)
+    _boxes(panel, view.truth[view.wanted], TRUTH_COLOUR, TRUTH, linewidth=1.2, facecolor=TRUTH_FILL)
+    _boxes(panel, view.detected, DETECTED_COLOUR, DETECTION, linewidth=0.9)
+    _rings(panel, view.truth[view.missed], TRUTH_COLOUR, dashed=True)
+    _rings(panel, view.detected[view.false], DETECTED_COLOUR, dashed=False)
     panel.plot(*view.sensors.T, zorder=SENSOR, marker="o", **SENSOR_MARK | {"markersize": 8.0})
     panel.set(xticks=(), yticks=())
     for spine in panel.spines.values():
@@ -121,7 +121,7 @@ def _boxes(panel: Axes, boxes: Float, colour: str, zorder: int, **style: Any) ->
         PolyCollection(list(corners(boxes)), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder),
         autolim=False,
     )
-    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * np.maximum(boxes[:, 2:3] / 2, SHORTEST_NOSE)
+    ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * np.maximum(boxes[:, 2:3] / 2, MIN_NOSE_LENGTH)
     strokes = np.stack([boxes[:, :2], boxes[:, :2] + ahead], axis=1)
     panel.add_collection(
         PolyCollection(list(strokes), closed=False, edgecolor=colour, facecolor="none", linewidth=0.7, zorder=zorder),
@@ -140,7 +140,7 @@ def corners(boxes: Float) -> Float:
 
 def _rings(panel: Axes, boxes: Float, colour: str, *, dashed: bool) -> None:
     angle = np.linspace(0, 2 * np.pi, 49)
-    radius = np.maximum(RING, 0.62 * boxes[:, 2])[:, None]
+    radius = np.maximum(RING_RADIUS, 0.62 * boxes[:, 2])[:, None]
     rings = boxes[:, None, :2] + radius[..., None] * np.column_stack([np.cos(angle), np.sin(angle)])
     panel.add_collection(
         PolyCollection(
@@ -163,10 +163,10 @@ def _legend() -> list[Patch | Line2D]:
     ring: dict[str, Any] = {"linestyle": "none", "markersize": 11, "mfc": "none", "mew": 1.3}
     dashes = Path.make_compound_path(*(Path.arc(start, start + 27) for start in range(0, 360, 45)))
     return [
-        Patch(facecolor=WASH, edgecolor=TRUTH, label="road user"),
-        Patch(facecolor="none", edgecolor=DETECTED, label="detection"),
-        Line2D([], [], mec=TRUTH, label="missed", marker=dashes, **ring),
-        Line2D([], [], mec=DETECTED, label="false", marker="o", **ring),
-        Patch(facecolor="none", edgecolor=OTHER, label="does not count"),
+        Patch(facecolor=TRUTH_FILL, edgecolor=TRUTH_COLOUR, label="road user"),
+        Patch(facecolor="none", edgecolor=DETECTED_COLOUR, label="detection"),
+        Line2D([], [], mec=TRUTH_COLOUR, label="missed", marker=dashes, **ring),
+        Line2D([], [], mec=DETECTED_COLOUR, label="false", marker="o", **ring),
+        Patch(facecolor="none", edgecolor=IGNORED_COLOUR, label="does not count"),
         Line2D([], [], marker="o", label="sensor", **SENSOR_MARK | {"markersize": 8.0}),
     ]

@@ -6,8 +6,8 @@ import os
 from textwrap import fill
 
 from headless.charts.style import (
+    COLOURS,
     DASHED,
-    SERIES,
     add_legend,
     colour,
     interval_ends,
@@ -26,9 +26,9 @@ from seip_addon.core.pictures.palette import SOFT_INK
 from seip_addon.core.robustness.pose_study import PoseStudy
 from seip_addon.core.robustness.robust_study import Contender, RobustStudy
 
-SIZE = (7.6, 4.4)  # inches
+FIGURE_SIZE = (7.6, 4.4)  # inches
 
-AXIS, UPRIGHT, LEGEND = 80, 34, 44
+X_LETTERS, Y_LETTERS, LEGEND_LETTERS = 80, 34, 44
 """Letters to a line below the axis, beside it, and in one of two columns of the legend."""
 
 
@@ -36,10 +36,10 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
     """Draw the distribution of coverage over unseen draws for each placement, as PNG.
 
     Steps are empirical distribution functions; a mark on the 5 % line is the quantile with its interval, a tick
-    on the axis what the placement covers as planned. Coverage is what a placement is judged by: after a loss, or by
+    on the axis what the placement covers as planned. Coverage is what a placement is evaluated by: after a loss, or by
     several sensors, where it was chosen for that.
     """
-    figure, (axes,) = new_figure(*SIZE)
+    figure, (axes,) = new_figure(*FIGURE_SIZE)
     for row, contender in enumerate((*study.nominal, *study.robust)):
         ordered = np.sort(contender.unseen)
         below = np.arange(1, len(ordered) + 1) / len(ordered)
@@ -47,7 +47,7 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
         _interval(axes, contender.low, 0.05, colour(row), mark(row), _named(study, contender))
         axes.plot(contender.undisturbed, 0.0, marker="|", markersize=14, color=colour(row), clip_on=False)
     axes.axhline(0.05, color=SOFT_INK, linewidth=0.8, linestyle=DASHED, zorder=0)
-    outcome = fill(f"{_outcome(study)}, share of the targets' weight (tick: as planned)", AXIS)
+    outcome = fill(f"{_outcome(study)}, share of the targets' weight (tick: as planned)", X_LETTERS)
     style_axes(axes, outcome, "share of draws that cover less")
     axes.set_ylim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=1))
@@ -57,12 +57,12 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
 
 
 def save_blame_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) -> None:
-    """Draw what each sensor's own error, and each kind of error, costs of the coverage on average, as PNG."""
-    figure, (axes,) = new_figure(*SIZE)
+    """Draw the mean loss of coverage by each sensor's own error, and by each kind of error, as PNG."""
+    figure, (axes,) = new_figure(*FIGURE_SIZE)
     sensors = list(zip(study.labels, study.loss_by_sensor(), strict=True))
     kinds = list(study.loss_by_kind().items())
-    rows = [(f"{label} alone", loss, SERIES[1]) for label, loss in sensors]
-    rows += [(f"{kind} alone", loss, SERIES[0]) for kind, loss in kinds]
+    rows = [(f"{label} alone", loss, COLOURS[1]) for label, loss in sensors]
+    rows += [(f"{kind} alone", loss, COLOURS[0]) for kind, loss in kinds]
     for place, (_, loss, shown) in enumerate(rows):
         _interval(axes, loss, place, shown, "o", None)
     axes.axvline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
@@ -75,13 +75,13 @@ def save_blame_chart(path: str | os.PathLike[str], study: PoseStudy, title: str)
 
 def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title: str) -> None:
     """Draw the 5 % quantile over unseen draws against the planned coverage of each placement, as PNG."""
-    figure, (axes,) = new_figure(*SIZE)
+    figure, (axes,) = new_figure(*FIGURE_SIZE)
     for row, contender in enumerate((*study.nominal, *study.robust)):
         low = contender.low
         axes.plot([contender.planned] * 2, [low.low, low.high], color=colour(row), linewidth=1.2)
         label = _named(study, contender)
         axes.plot(contender.planned, low.value, mark(row), color=colour(row), label=label)
-    style_axes(axes, "coverage as planned", fill(f"5 % quantile of {_outcome(study)} over unseen draws", UPRIGHT))
+    style_axes(axes, "coverage as planned", fill(f"5 % quantile of {_outcome(study)} over unseen draws", Y_LETTERS))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(PercentFormatter(1.0, decimals=1))
     add_legend(figure, [axes], columns=2)
@@ -89,15 +89,15 @@ def save_frontier_chart(path: str | os.PathLike[str], study: RobustStudy, title:
 
 
 def _outcome(study: RobustStudy) -> str:
-    """Name what placements are judged by, if it is one thing."""
-    return study.nominal[0].judged_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
+    """Name what placements are evaluated by, if it is one thing."""
+    return study.nominal[0].evaluated_by.describe_outcome() if len(study.nominal) == 1 else "coverage"
 
 
 def _named(study: RobustStudy, contender: Contender) -> str:
-    """Name a placement, and the nominal optimum, of which there are several then, with what it is judged by."""
+    """Name a placement, and the nominal optimum, of which there are several then, with what it is evaluated by."""
     several = len(study.nominal) > 1 and contender in study.nominal
-    name = f"{contender.name}: {contender.judged_by.describe_outcome()}" if several else contender.name
-    return fill(name, LEGEND)
+    name = f"{contender.name}: {contender.evaluated_by.describe_outcome()}" if several else contender.name
+    return fill(name, LEGEND_LETTERS)
 
 
 def _interval(  # what is drawn, where, and how

@@ -15,22 +15,22 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.pictures.drawing import save_png
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-SERIES = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Colours of series, told apart by colour-blind people (Okabe and Ito 2008)."""
 
-MARKS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours: 42 series before a pair comes again
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # one more than colours: 42 series before a pair comes again
 DASHED = (0, (4, 2))
-GRID, FAINT = "#e3e6e8", "#c3c9ce"
+GRID_COLOUR, FAINT_COLOUR = "#e3e6e8", "#c3c9ce"
 
 
 def colour(row: int) -> str:
     """Return the colour of a series."""
-    return SERIES[row % len(SERIES)]
+    return COLOURS[row % len(COLOURS)]
 
 
 def mark(row: int) -> str:
     """Return the marker of a series."""
-    return MARKS[row % len(MARKS)]
+    return MARKERS[row % len(MARKERS)]
 
 
 def new_figure(
@@ -48,7 +48,7 @@ def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x",
         panel.set_xlabel(x, color=INK, **font)
     if y:
         panel.set_ylabel(y, color=INK, **font)
-    panel.grid(axis=grid, color=GRID, linewidth=0.8)
+    panel.grid(axis=grid, color=GRID_COLOUR, linewidth=0.8)
     panel.set_axisbelow(True)
     panel.tick_params(which="both", colors=SOFT_INK)
     for side in ("top", "right"):

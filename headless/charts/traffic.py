@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import SERIES, interval_ends, new_figure, save_chart, style_axes
+from headless.charts.style import COLOURS, interval_ends, new_figure, save_chart, style_axes
 
 import numpy as np
 import shapely
@@ -20,20 +20,20 @@ from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
 from seip_addon.core.pictures.drawing import draw_sensors
 from seip_addon.core.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
-from seip_addon.core.pictures.plan_view import CRACK, draw_area
+from seip_addon.core.pictures.plan_view import MAX_GAP, draw_area
 from seip_addon.core.placement.deployment import Deployment
-from seip_addon.core.robustness.traffic_study import WHAT, JudgedInTraffic, TrafficStudy
+from seip_addon.core.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.target_squares import target_squares
 
-TIME = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae", *SEEN_COLOURS[1:]))
+TIME_CMAP = LinearSegmentedColormap.from_list("time", (SEEN_COLOURS[0], "#f7e3ae", *SEEN_COLOURS[1:]))
 """From never seen to always seen: from the colour of targets that no sensor sees to that of those that two see."""
 
-OBSTACLE = "#8b9285"
-SIDE = 6.4  # inches
-AROUND = 0.04  # of the region's size, shown around it
-THIRD = 0.26  # of the step from one group of bars to the next
+OBSTACLE_COLOUR = "#8b9285"
+PICTURE_SIDE = 6.4  # inches
+MARGIN_SHARE = 0.04  # of the region's size, shown around it
+BAR_STEP = 0.26  # of the step from one group of bars to the next
 
 
 def save_time_map(  # what is drawn, and where
@@ -41,17 +41,19 @@ def save_time_map(  # what is drawn, and where
     geometry: SceneGeometry,
     site: Site,
     deployment: Deployment,
-    placed: JudgedInTraffic,
+    placed: TrafficEvaluation,
     title: str,
 ) -> None:
     """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
     left, bottom, right, top = site.region.bounds
-    around = AROUND * max(right - left, top - bottom)
+    around = MARGIN_SHARE * max(right - left, top - bottom)
     shape = (top - bottom + 2 * around) / (right - left + 2 * around)
-    figure, panels = new_figure(SIDE * len(placed.seen) + 0.9, SIDE * shape + 0.9, len(placed.seen))
+    figure, panels = new_figure(PICTURE_SIDE * len(placed.seen) + 0.9, PICTURE_SIDE * shape + 0.9, len(placed.seen))
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
         panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
-        panel.set_title(f"{WHAT[layer]}: {seen.held.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10)
+        panel.set_title(
+            f"{LAYER_NAMES[layer]}: {seen.mean.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10
+        )
         panel.set(xticks=(), yticks=())
         _draw_shares(panel, site, seen.time)
         _draw_place(panel, geometry)
@@ -59,14 +61,14 @@ def save_time_map(  # what is drawn, and where
         figure.draw_without_rendering()
         where = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
         draw_sensors(panel, deployment, where, site.targets.xyz[:, :2], zorder=4)
-    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME), ax=list(panels), shrink=0.7, pad=0.01)
+    bar = figure.colorbar(ScalarMappable(Normalize(0, 1), TIME_CMAP), ax=list(panels), shrink=0.7, pad=0.01)
     bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     bar.set_label("share of time for which it is seen", color=INK)
     save_chart(path, figure, title)
 
 
-def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
-    """Draw what placements for the empty road promise and hold in traffic beside those chosen on traffic, as PNG.
+def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str, TrafficStudy]], title: str) -> None:
+    """Draw coverage on the empty road and in traffic, for placements optimised without and with traffic, as PNG.
 
     Parameters
     ----------
@@ -81,10 +83,10 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
         [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
         "promised, empty road",
     )
-    _bars(shares, 0, [empty.held for empty, _ in rows], "held in traffic")
-    _bars(shares, 1, [traffic.held for _, traffic in rows], "held, placed on traffic")
-    shares.set_ylabel(f"share of the {WHAT[studies[0][1].layer]} seen", color=INK)
-    _dots(changes, -0.5, [negative(empty.lost) for empty, _ in rows], 1, "lost to traffic")
+    _bars(shares, 0, [empty.mean for empty, _ in rows], "held in traffic")
+    _bars(shares, 1, [traffic.mean for _, traffic in rows], "held, placed on traffic")
+    shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)
+    _dots(changes, -0.5, [negative(empty.loss) for empty, _ in rows], 1, "lost to traffic")
     _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "won by placing on traffic")
     changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
     changes.set_ylabel("change, 95 % interval", color=INK)
@@ -98,14 +100,15 @@ def save_promise_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
 
 
 def negative(estimate: IntervalEstimate) -> IntervalEstimate:
-    """Return the estimate of what has the opposite sign."""
+    """Return an estimate with the opposite sign."""
     return IntervalEstimate(-estimate.value, -estimate.high, -estimate.low)
 
 
 def _draw_shares(panel: Axes, site: Site, time: Float) -> None:
     squares = list(target_squares(site.targets)[:, :, :2])
     panel.add_collection(
-        PolyCollection(squares, facecolors=TIME(time), edgecolors="none", antialiaseds=False, zorder=1), autolim=False
+        PolyCollection(squares, facecolors=TIME_CMAP(time), edgecolors="none", antialiaseds=False, zorder=1),
+        autolim=False,
     )
 
 
@@ -113,20 +116,20 @@ def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
     """Draw what stands in the way and the region's border."""
     shown = shapely.box(*panel.get_xlim()[:1], *panel.get_ylim()[:1], *panel.get_xlim()[1:], *panel.get_ylim()[1:])
     standing = shapely.intersection(outline(joined(geometry.occluders)), shown)
-    draw_area(panel, standing, facecolor=OBSTACLE, edgecolor="#3d4542", linewidth=0.4, alpha=0.75, zorder=2)
-    draw_area(panel, closed(geometry.region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
+    draw_area(panel, standing, facecolor=OBSTACLE_COLOUR, edgecolor="#3d4542", linewidth=0.4, alpha=0.75, zorder=2)
+    draw_area(panel, closed(geometry.region, MAX_GAP), facecolor="none", edgecolor=INK, linewidth=1.0, zorder=3)
 
 
 def _bars(axes: Axes, place: int, estimates: Sequence[IntervalEstimate], label: str) -> None:
-    at = np.arange(len(estimates)) + place * THIRD
+    at = np.arange(len(estimates)) + place * BAR_STEP
     values = np.array([estimate.value for estimate in estimates])
-    axes.bar(at, values, width=0.9 * THIRD, color=(SEEN_COLOURS[1], SERIES[1], SERIES[2])[place + 1], label=label)
+    axes.bar(at, values, width=0.9 * BAR_STEP, color=(SEEN_COLOURS[1], COLOURS[1], COLOURS[2])[place + 1], label=label)
     for x, estimate in zip(at, estimates, strict=True):
         axes.plot([x, x], interval_ends(estimate), color=INK, linewidth=1.4)
 
 
 def _dots(axes: Axes, place: float, estimates: Sequence[IntervalEstimate], colour: int, label: str) -> None:
-    at = np.arange(len(estimates)) + place * THIRD
+    at = np.arange(len(estimates)) + place * BAR_STEP
     for x, estimate in zip(at, estimates, strict=True):
-        axes.plot([x, x], interval_ends(estimate), color=SERIES[colour], linewidth=2.4)
-    axes.plot(at, [each.value for each in estimates], "o", color=SERIES[colour], label=label)
+        axes.plot([x, x], interval_ends(estimate), color=COLOURS[colour], linewidth=2.4)
+    axes.plot(at, [each.value for each in estimates], "o", color=COLOURS[colour], label=label)

@@ -17,9 +17,9 @@ from seip_addon.core.placement.search_limits import DEFAULT_LIMITS
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.site.site import Site
 
-NUMBERS = (1, 2, 4)
-WEIGHTS = (2.0, 4.0, 8.0, 16.0)
-WEIGHT_SHOWN = WEIGHTS[1]
+COUNTS = (1, 2, 4)
+CENTRAL_WEIGHTS = (2.0, 4.0, 8.0, 16.0)
+CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]
 """Central weight of the plans that stand beside the vanilla ones."""
 
 
@@ -29,7 +29,7 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class Cell:
-    """What one cell of the study allows.
+    """A cell of the study: type, height, number of sensors and central weight.
 
     Parameters
     ----------
@@ -163,9 +163,9 @@ def coverage_study(
     """
     sensors = tuple(dict.fromkeys(site.candidates.sensor.tolist()))
     heights = tuple(sorted(set(site.candidates.height.tolist())))
-    plan = [Cell(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in NUMBERS]
+    plan = [Cell(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in COUNTS]
     if site.targets.central.any():
-        plan += [Cell(s, None, n, w) for s in sensors for n in NUMBERS for w in WEIGHTS]
+        plan += [Cell(s, None, n, w) for s in sensors for n in COUNTS for w in CENTRAL_WEIGHTS]
     cells: list[Case | EmptyCell] = []
     for done, cell in enumerate(plan):
         at = "any height" if cell.height is None else f"{cell.height:g} m"
@@ -195,8 +195,8 @@ def solve_cell(
     allowed = site.candidates.sensor == cell.sensor
     if cell.height is not None:
         allowed &= site.candidates.height == cell.height
-    goal = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
-    problem = replace(placement_problem(site, visible, models, goal), forbidden=~allowed)
+    objective = Objective(count=cell.count, central_weight=None if cell.weight == 1.0 else cell.weight)
+    problem = replace(placement_problem(site, visible, models, objective), forbidden=~allowed)
     placement = yield from solve(problem, limits)
     deployment = deploy(site, models, visible, placement.chosen)
     return Case(**vars(cell), placement=placement, greedy=solve_greedy(problem), deployment=deployment)

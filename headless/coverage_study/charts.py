@@ -14,10 +14,10 @@ from matplotlib.ticker import PercentFormatter
 
 from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 
-from .cells import NUMBERS, WEIGHTS, CoverageStudy
+from .cells import CENTRAL_WEIGHTS, COUNTS, CoverageStudy
 
-HEIGHT, PANEL_WIDTH, FEWEST_PANELS = 4.2, 3.65, 3  # inches, inches, panels that a chart is wide at least
-BESIDE = 0.09  # of the step between two heights, from one type to the next
+PANEL_HEIGHT, PANEL_WIDTH, MIN_PANELS = 4.2, 3.65, 3  # inches, inches, panels that a chart is wide at least
+TYPE_SHIFT = 0.09  # of the step between two heights, from one type to the next
 
 
 def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
@@ -26,13 +26,13 @@ def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title:
     A bar above a mark ends at the coverage that the solver could not rule out.
     Cells without a placement are left out.
     """
-    figure, panels = _figure(len(NUMBERS))
+    figure, panels = _figure(len(COUNTS))
     ticks = [*(f"{height:g}" for height in study.heights), "free"]
-    for panel, count in zip(panels, NUMBERS, strict=True):
+    for panel, count in zip(panels, COUNTS, strict=True):
         for row, sensor in enumerate(study.sensors):
             # Side by side, so that no type's bar stands on another's mark.
-            aside = BESIDE * (row - (len(study.sensors) - 1) / 2)
-            spans = [study.possible(sensor, count, height) or NOTHING for height in (*study.heights, None)]
+            aside = TYPE_SHIFT * (row - (len(study.sensors) - 1) / 2)
+            spans = [study.possible(sensor, count, height) or NO_SPAN for height in (*study.heights, None)]
             x = [place + aside for place in range(len(spans))]
             _line(panel, row, x[:-1], [low for low, _ in spans[:-1]], label=sensor)
             _line(panel, row, x[-1:], [spans[-1][0]])
@@ -51,25 +51,25 @@ def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title:
 def save_weight_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
     """Draw whole and central coverage against the weight of the centre, a panel for each type, as PNG."""
     figure, panels = _figure(len(study.sensors))
-    weights = (1.0, *WEIGHTS)
+    weights = (1.0, *CENTRAL_WEIGHTS)
     for panel, sensor in zip(panels, study.sensors, strict=True):
-        for row, count in enumerate(NUMBERS):
+        for row, count in enumerate(COUNTS):
             found = [study.find(sensor, count, weight=weight) for weight in weights]
             central = [math.nan if case is None else case.deployment.central or 0.0 for case in found]
             whole = [math.nan if case is None else case.deployment.coverage for case in found]
             _line(panel, row, range(len(weights)), central, label=f"N = {count}, centre")
             _line(panel, row, range(len(weights)), whole, label=f"N = {count}, whole", dashed=True)
         panel.set_title(sensor, color=INK, fontsize=10, parse_math=False)
-        panel.set_xticks(range(len(weights)), ["1\n(vanilla)", *(f"{weight:g}" for weight in WEIGHTS)])
+        panel.set_xticks(range(len(weights)), ["1\n(vanilla)", *(f"{weight:g}" for weight in CENTRAL_WEIGHTS)])
         _style_shares(panel, "weight of the centre")
     _save(path, figure, panels, f"{title}: vanilla against weighted placement")
 
 
-NOTHING = (math.nan, math.nan)
+NO_SPAN = (math.nan, math.nan)
 
 
 def _figure(count: int) -> tuple[Figure, Sequence[Axes]]:
-    return new_figure(PANEL_WIDTH * max(count, FEWEST_PANELS), HEIGHT, count, sharey=True)
+    return new_figure(PANEL_WIDTH * max(count, MIN_PANELS), PANEL_HEIGHT, count, sharey=True)
 
 
 def _save(path: str | os.PathLike[str], figure: Figure, panels: Sequence[Axes], title: str) -> None:

@@ -6,16 +6,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
-from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, judge, judge_all
+from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, verdict, worst_verdict
 
-from .cells import NUMBERS, WEIGHTS, Case, CoverageStudy, Span
+from .cells import CENTRAL_WEIGHTS, COUNTS, Case, CoverageStudy, Span
 
-NEGLIGIBLE = 0.01
+MIN_CHANGE = 0.01
 """Share of the region below which a gain or loss of coverage counts as none."""
 
 
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
-    """Hold claims 1 to 4 and 10 of the study against the solved cells.
+    """Evaluate claims 1 to 4 and 10 of the paper on the solved cells.
 
     Claims that compare types, heights or weights are left out where there is
     nothing to compare.
@@ -31,38 +31,38 @@ def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
 
 
 def _more_is_better(study: CoverageStudy) -> Claim:
-    best, (few, most) = study.sensors[-1], NUMBERS[-2:]
-    shares = {(sensor, n): study.possible(sensor, n) for sensor in study.sensors for n in NUMBERS}
+    best, (few, most) = study.sensors[-1], COUNTS[-2:]
+    shares = {(sensor, n): study.possible(sensor, n) for sensor in study.sensors for n in COUNTS}
     verdicts = [
-        _rises(shares[sensor, b], shares[sensor, a]) for sensor in study.sensors[:-1] for a, b in pairwise(NUMBERS)
+        _rises(shares[sensor, b], shares[sensor, a]) for sensor in study.sensors[:-1] for a, b in pairwise(COUNTS)
     ]
-    verdicts += [_rises(shares[b, n], shares[a, n]) for a, b in pairwise(study.sensors) for n in NUMBERS]
+    verdicts += [_rises(shares[b, n], shares[a, n]) for a, b in pairwise(study.sensors) for n in COUNTS]
     gain = _gain(shares[best, most], shares[best, few])
-    verdicts.append(UNDECIDED if gain is None else judge(holds=gain[1] < NEGLIGIBLE, fails=gain[0] >= NEGLIGIBLE))
-    rows = [f"{sensor} " + ", ".join(_found(shares[sensor, n]) for n in NUMBERS) for sensor in study.sensors]
+    verdicts.append(UNDECIDED if gain is None else verdict(holds=gain[1] < MIN_CHANGE, fails=gain[0] >= MIN_CHANGE))
+    rows = [f"{sensor} " + ", ".join(_found(shares[sensor, n]) for n in COUNTS) for sensor in study.sensors]
     gained = "" if gain is None else f"; {best} gains {_range(gain)} from N = {few} to {most}"
     return Claim(
         1,
         f"coverage rises with N and with a better type; for {best} the gain is negligible",
-        judge_all(verdicts),
-        f"N = {', '.join(map(str, NUMBERS))}: {'; '.join(rows)}{gained}",
+        worst_verdict(verdicts),
+        f"N = {', '.join(map(str, COUNTS))}: {'; '.join(rows)}{gained}",
     )
 
 
 def _four_of_the_best(study: CoverageStudy) -> Claim:
-    best, most = study.sensors[-1], NUMBERS[-1]
+    best, most = study.sensors[-1], COUNTS[-1]
     text = f"four {best} sensors see 100 %, and fewer would do"
     case, share = study.find(best, most), study.possible(best, most)
     if case is None or share is None:
         return Claim(2, text, UNDECIDED, f"there is no placement of {most} {best} sensors")
     used = len(case.placement.chosen)
-    spare = used < most or any(_is_full(study.possible(best, n)) for n in NUMBERS[:-1])
+    spare = used < most or any(_is_full(study.possible(best, n)) for n in COUNTS[:-1])
     # All sensors in use means that none is to spare only if ties were broken; a note says so where they were not.
     settled = case.placement.status == "optimal" and not case.placement.notes
     return Claim(
         2,
         text,
-        judge_all([judge(holds=_is_full(share), fails=share[1] < 1), judge(holds=spare, fails=settled)]),
+        worst_verdict([verdict(holds=_is_full(share), fails=share[1] < 1), verdict(holds=spare, fails=settled)]),
         f"{_found(share)} with {used} of {most} sensors used",
     )
 
@@ -72,7 +72,7 @@ def _heights(study: CoverageStudy) -> Claim:
     verdicts, rows = [], []
     for sensor in study.sensors:
         named = []
-        for n in NUMBERS:
+        for n in COUNTS:
             shares = {h: study.possible(sensor, n, h) for h in study.heights}
             named.append(_best_heights(shares))
             if sensor == study.sensors[0]:
@@ -83,23 +83,23 @@ def _heights(study: CoverageStudy) -> Claim:
     return Claim(
         3,
         f"{study.sensors[0]} does best at {lowest:g} m; the other types prefer higher, at every N",
-        judge_all(verdicts),
-        f"best height at N = {', '.join(map(str, NUMBERS))}: {'; '.join(rows)}",
+        worst_verdict(verdicts),
+        f"best height at N = {', '.join(map(str, COUNTS))}: {'; '.join(rows)}",
     )
 
 
 def _weighting(study: CoverageStudy) -> Claim:
     verdicts, rows = [], []
     for sensor in study.sensors:
-        plain = study.find(sensor, NUMBERS[-1])
-        weighted = [study.find(sensor, NUMBERS[-1], weight=w) for w in WEIGHTS]
+        plain = study.find(sensor, COUNTS[-1])
+        weighted = [study.find(sensor, COUNTS[-1], weight=w) for w in CENTRAL_WEIGHTS]
         cases = [case for case in weighted if case is not None]
         if plain is None or not cases:
             verdicts.append(UNDECIDED)
             rows.append(f"{sensor}: no placement")
             continue
         changes = [_change(plain, case) for case in cases]
-        gain, loss = max((c for c in changes if c[1] > -NEGLIGIBLE), default=max(changes))
+        gain, loss = max((c for c in changes if c[1] > -MIN_CHANGE), default=max(changes))
         central, whole = _views(plain)
         rows.append(f"{sensor}: central {central:.1%} {gain:+.2%}, whole {whole:.1%} {loss:+.2%}")
         proven = [_is_proven(plain) and case is not None and _is_proven(case) for case in weighted]
@@ -107,19 +107,19 @@ def _weighting(study: CoverageStudy) -> Claim:
     return Claim(
         4,
         "weighting raises central coverage of all but the best type without hurting the whole; the best gains nothing",
-        judge_all(verdicts),
-        f"N = {NUMBERS[-1]}, best weight that costs the whole under {NEGLIGIBLE:.0%}: {'; '.join(rows)}; where several "
+        worst_verdict(verdicts),
+        f"N = {COUNTS[-1]}, best weight that costs the whole under {MIN_CHANGE:.0%}: {'; '.join(rows)}; where several "
         "placements are best, the figures are those of the one returned",
     )
 
 
 def _weighting_verdict(changes: Sequence[tuple[float, float]], proven: Sequence[bool], *, is_best: bool) -> str:
-    """Judge one type by its gains and losses, which mean something once all its placements are proven."""
+    """Return the verdict on one type by its gains and losses; undecided unless all its placements are proven."""
     if not all(proven):
         return UNDECIDED
     if is_best:
-        return HOLDS if all(gain < NEGLIGIBLE for gain, _ in changes) else FAILS
-    return HOLDS if any(gain >= NEGLIGIBLE and loss > -NEGLIGIBLE for gain, loss in changes) else FAILS
+        return HOLDS if all(gain < MIN_CHANGE for gain, _ in changes) else FAILS
+    return HOLDS if any(gain >= MIN_CHANGE and loss > -MIN_CHANGE for gain, loss in changes) else FAILS
 
 
 def _change(plain: Case, weighted: Case) -> tuple[float, float]:
@@ -137,15 +137,15 @@ def _is_proven(case: Case) -> bool:
 
 
 def _greedy(study: CoverageStudy) -> Claim:
-    promise = 1 - 1 / math.e
+    guarantee = 1 - 1 / math.e
     reached = [(case.greedy.objective, *case.span) for case in study.cases]
-    verdicts = [judge(holds=value >= promise * high, fails=value < promise * low) for value, low, high in reached]
+    verdicts = [verdict(holds=value >= guarantee * high, fails=value < guarantee * low) for value, low, high in reached]
     worst = min(value / high for value, _, high in reached)
     short = sum(value < low * (1 - 1e-9) for value, low, _ in reached)
     return Claim(
         10,
         "greedy reaches 1 − 1/e of the optimum",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"at worst {worst:.1%} of the bound; below the integer program in {short} of {len(reached)} cells",
     )
 
@@ -154,17 +154,17 @@ def _rises(more: Span | None, less: Span | None) -> str:
     """Whether coverage rises by more than a negligible share; where less than that is left to see, it need not."""
     if more is None or less is None:
         return UNDECIDED
-    full = 1 - NEGLIGIBLE
-    return judge(
-        holds=more[0] - less[1] > NEGLIGIBLE or less[0] >= full,
-        fails=more[1] - less[0] <= NEGLIGIBLE and less[1] < full,
+    full = 1 - MIN_CHANGE
+    return verdict(
+        holds=more[0] - less[1] > MIN_CHANGE or less[0] >= full,
+        fails=more[1] - less[0] <= MIN_CHANGE and less[1] < full,
     )
 
 
 def _exceeds(more: Span | None, less: Span | None) -> str:
     if more is None or less is None:
         return UNDECIDED
-    return judge(holds=more[0] > less[1], fails=more[1] <= less[0])
+    return verdict(holds=more[0] > less[1], fails=more[1] <= less[0])
 
 
 def _is_full(span: Span | None) -> bool:

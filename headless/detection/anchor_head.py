@@ -19,19 +19,19 @@ from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid
 from .settings import CLASSES, GROUND_ABOVE_BOTTOM
 
-CHANNELS = 10
+ANCHOR_CHANNELS = 10
 """Of an anchor: score, seven of its box, two of its direction."""
 
 DIRECTION_FROM = math.pi / 4
 """Yaw at which the first of the two directions begins: no street of a crossing along the axes runs there."""
 
-SMOOTH = 1 / 9
+SMOOTH_L1_BETA = 1 / 9
 """Where the smooth L1 loss turns from a square into a line."""
 
-RARE = 0.01
+INITIAL_SCORE = 0.01
 """Score that every anchor begins with."""
 
-MOST_CANDIDATES = 500
+MAX_BOXES = 500
 """Boxes of a cloud that are looked at, the best first."""
 
 
@@ -56,7 +56,7 @@ class AnchorSize:
     negative: float = 0.45
 
 
-SIZES = (
+ANCHOR_SIZES = (
     AnchorSize("car", 4.5, 1.8, 1.6),
     AnchorSize("car", 5.8, 2.0, 2.4),
     AnchorSize("truck", 8.0, 2.5, 3.3),
@@ -64,7 +64,7 @@ SIZES = (
     AnchorSize("cycle", 1.9, 0.7, 1.7, positive=0.5, negative=0.35),
     AnchorSize("pedestrian", 0.6, 0.6, 1.75, positive=0.5, negative=0.35),
 )
-TURNS = (0.0, math.pi / 2)
+ANCHOR_YAWS = (0.0, math.pi / 2)
 
 
 class AnchorHead(nn.Module):
@@ -78,10 +78,10 @@ class AnchorHead(nn.Module):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        anchors = len(SIZES) * len(TURNS)
-        self.final = nn.Conv2d(channels, anchors * CHANNELS, 1)
-        start = torch.zeros(anchors, CHANNELS)
-        start[:, 0] = math.log(RARE / (1 - RARE))
+        anchors = len(ANCHOR_SIZES) * len(ANCHOR_YAWS)
+        self.final = nn.Conv2d(channels, anchors * ANCHOR_CHANNELS, 1)
+        start = torch.zeros(anchors, ANCHOR_CHANNELS)
+        start[:, 0] = math.log(INITIAL_SCORE / (1 - INITIAL_SCORE))
         nn.init.normal_(self.final.weight, std=0.01)
         self.final.bias = nn.Parameter(start.flatten())
 
@@ -96,7 +96,7 @@ class AnchorHead(nn.Module):
         """Return the parts of the loss; see `heads.DetectionHead`."""
         predicted = _by_anchor(output)
         assigned = torch.stack([assignment(wanted, grid) for wanted in targets])
-        counted = (assigned != UNCLEAR) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
+        counted = (assigned != IGNORED) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
         positive = (assigned >= 0) & counted
         score = focal_loss(predicted[..., 0], positive, counted)
 
@@ -110,7 +110,7 @@ class AnchorHead(nn.Module):
         # The sine of the difference of the angles: a box turned by 180 degrees is as good.
         turn = torch.sin(found[:, 7] - wanted[:, 6])
         error = torch.cat((found[:, 1:7] - wanted[:, :6], turn[:, None]), dim=1)
-        box = functional.smooth_l1_loss(error, torch.zeros_like(error), beta=SMOOTH, reduction="sum") / count
+        box = functional.smooth_l1_loss(error, torch.zeros_like(error), beta=SMOOTH_L1_BETA, reduction="sum") / count
         direction = functional.cross_entropy(found[:, 8:], direction_of(target[:, 6]), reduction="sum") / count
         return {"score": score, "box": 2.0 * box, "direction": 0.2 * direction}
 
@@ -121,7 +121,7 @@ class AnchorHead(nn.Module):
             scores = torch.sigmoid(cloud[..., 0])
             anchor, row, column = torch.nonzero(scores >= least_score, as_tuple=True)
             score = scores[anchor, row, column]
-            best = torch.sort(score, descending=True, stable=True).indices[:MOST_CANDIDATES]
+            best = torch.sort(score, descending=True, stable=True).indices[:MAX_BOXES]
             anchor, row, column = anchor[best], row[best], column[best]
             predicted = cloud[anchor, row, column]
             boxes = decoded(predicted[:, 1:], anchor_boxes(grid, anchor, row, column))
@@ -130,12 +130,12 @@ class AnchorHead(nn.Module):
         return found
 
 
-NOTHING, UNCLEAR = -1, -2
+BACKGROUND, IGNORED = -1, -2
 """What an anchor is assigned to that must find no road user, and one that may do as it likes."""
 
 
 def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
-    """Return which box each anchor must find: (anchors, rows, columns) int64, or `NOTHING` or `UNCLEAR`.
+    """Return which box each anchor must find: (anchors, rows, columns) int64, or `BACKGROUND` or `IGNORED`.
 
     An anchor belongs to the road user of its class that overlaps it most, both
     set along the nearer axis, if that is its ``positive`` share or more. The
@@ -144,15 +144,15 @@ def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     device = wanted.boxes.device
     overlap = _overlaps(wanted, grid)  # (boxes, anchors, rows, columns)
     positive, negative = (
-        torch.tensor([getattr(size, name) for size in SIZES for _ in TURNS], device=device)[:, None, None]
+        torch.tensor([getattr(size, name) for size in ANCHOR_SIZES for _ in ANCHOR_YAWS], device=device)[:, None, None]
         for name in ("positive", "negative")
     )
     shape = overlap.shape[1:]
     if len(overlap) == 0:
-        return torch.full(shape, NOTHING, device=device)
+        return torch.full(shape, BACKGROUND, device=device)
     learnt = torch.nonzero(wanted.learnt)[:, 0]
     unclear = (overlap >= negative).any(dim=0)
-    assigned = torch.where(unclear, UNCLEAR, NOTHING)
+    assigned = torch.where(unclear, IGNORED, BACKGROUND)
     if len(learnt) == 0:
         return assigned
     most, owner = overlap[learnt].max(dim=0)
@@ -169,9 +169,9 @@ def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
 def anchor_boxes(grid: PillarGrid, anchor: Tensor, row: Tensor, column: Tensor) -> Tensor:
     """Return the boxes (m, 7) of anchors given by number, row and column."""
     x, y = cell_middles(grid, OUTPUT_STRIDE, anchor.device)
-    sizes = torch.tensor([(s.length, s.width, s.height) for s in SIZES], device=anchor.device)
-    size = sizes[anchor // len(TURNS)]
-    yaw = torch.tensor(TURNS, device=anchor.device)[anchor % len(TURNS)]
+    sizes = torch.tensor([(s.length, s.width, s.height) for s in ANCHOR_SIZES], device=anchor.device)
+    size = sizes[anchor // len(ANCHOR_YAWS)]
+    yaw = torch.tensor(ANCHOR_YAWS, device=anchor.device)[anchor % len(ANCHOR_YAWS)]
     z = grid.bottom + GROUND_ABOVE_BOTTOM + size[:, 2] / 2
     return torch.cat((torch.stack((x[column], y[row], z), dim=1), size, yaw[:, None]), dim=1)
 
@@ -222,14 +222,14 @@ def _overlaps(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     deep = torch.where(across, boxes[:, 3], boxes[:, 4])
     category = _categories(boxes.device)
     layers = []
-    for number, size in enumerate(SIZES):
-        for turn in range(len(TURNS)):
+    for number, size in enumerate(ANCHOR_SIZES):
+        for turn in range(len(ANCHOR_YAWS)):
             sides = (size.length, size.width) if turn == 0 else (size.width, size.length)
             shared_x = _shared(x, sides[0], boxes[:, 0], wide)
             shared_y = _shared(y, sides[1], boxes[:, 1], deep)
             shared = shared_x[:, None, :] * shared_y[:, :, None]
             whole = (wide * deep + size.length * size.width)[:, None, None] - shared
-            same = (wanted.category == category[len(TURNS) * number + turn])[:, None, None]
+            same = (wanted.category == category[len(ANCHOR_YAWS) * number + turn])[:, None, None]
             layers.append(shared / whole * same)
     return torch.stack(layers, dim=1)
 
@@ -242,10 +242,10 @@ def _shared(middles: Tensor, side: float, centre: Tensor, extent: Tensor) -> Ten
 
 
 def _categories(device: torch.device) -> Tensor:
-    return torch.tensor([CLASSES.index(size.category) for size in SIZES for _ in TURNS], device=device)
+    return torch.tensor([CLASSES.index(size.category) for size in ANCHOR_SIZES for _ in ANCHOR_YAWS], device=device)
 
 
 def _by_anchor(output: Tensor) -> Tensor:
     """Return the output as (b, anchors, rows, columns, 10)."""
     clouds, _, rows, columns = output.shape
-    return output.view(clouds, -1, CHANNELS, rows, columns).permute(0, 1, 3, 4, 2)
+    return output.view(clouds, -1, ANCHOR_CHANNELS, rows, columns).permute(0, 1, 3, 4, 2)

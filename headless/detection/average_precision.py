@@ -15,23 +15,23 @@ from seip_addon.core.estimates import Interval, percentiles
 from .frame_results import FrameResult
 from .matching import Match, Rule, match
 
-BLOCK = 10.0
+BLOCK_SECONDS = 10.0
 """Seconds of a run whose frames are drawn together: they show much the same vehicles in much the same places."""
 
-FEWEST_BLOCKS = 5
+MIN_BLOCKS = 5
 """Blocks below which an interval would say more about chance than about the traffic."""
 
-RESAMPLES, AT_ONCE = 1000, 50
+RESAMPLES, RESAMPLES_AT_ONCE = 1000, 50
 
 Table = TypeVar("Table", "EvaluatedDetections", "CountedTruth")
 
-MISSED = -np.inf
+MISSED_SCORE = -np.inf
 """The score at which a road user is found that none finds."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedDetections:
-    """The judged detections of all frames, best first; d of them.
+    """The evaluated detections of all frames, best first; d of them.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class CountedTruth:
     Parameters
     ----------
     score : (t,) float64
-        Of the detection that found it, `MISSED` where none did.
+        Of the detection that found it, `MISSED_SCORE` where none did.
     frame : (t,) int64
         The frame it is in.
     category, points, visibility, distance
@@ -142,7 +142,7 @@ def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
             f"{rule.fewest_points} returns or more: there is no average precision without one, so evaluate on frames "
             "with traffic"
         )
-    return Evaluation(rule, _judged(frames, matches), _wanted(frames, matches), _blocks(frames))
+    return Evaluation(rule, _evaluated(frames, matches), _wanted(frames, matches), _blocks(frames))
 
 
 def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
@@ -156,7 +156,7 @@ def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
 def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | None:
     """Return the 95 % interval of the average precision over other traffic like this, or None on too few blocks.
 
-    Bootstrap (Efron 1979) over blocks of `BLOCK` seconds of each run: frames
+    Bootstrap (Efron 1979) over blocks of `BLOCK_SECONDS` seconds of each run: frames
     that follow each other are nearly the same, and drawn one by one they would
     feign certainty. It says nothing about another training.
 
@@ -165,7 +165,7 @@ def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | 
     seed : int
         The same seed draws the same blocks.
     """
-    if int(evaluation.block.max()) + 1 < FEWEST_BLOCKS:
+    if int(evaluation.block.max()) + 1 < MIN_BLOCKS:
         return None
     return percentiles(resampled_average_precisions(evaluation, seed))
 
@@ -182,7 +182,7 @@ def resampled_average_precisions(evaluation: Evaluation, seed: int, resamples: i
     of_wanted = np.bincount(evaluation.block[evaluation.wanted.frame], minlength=count)
     areas = [
         _areas(evaluation, times[:, of_detection], times @ of_wanted)
-        for times in np.split(drawn, range(AT_ONCE, resamples, AT_ONCE))
+        for times in np.split(drawn, range(RESAMPLES_AT_ONCE, resamples, RESAMPLES_AT_ONCE))
     ]
     return np.concatenate(areas)
 
@@ -207,7 +207,7 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
     Parameters
     ----------
     detections : (d,) bool
-        Of the judged detections. Who found whom stays as it was.
+        Of the evaluated detections. Who found whom stays as it was.
     wanted : (t,) bool
         Of the road users that count.
     """
@@ -219,7 +219,7 @@ def part(evaluation: Evaluation, detections: Boolean, wanted: Boolean) -> Evalua
 def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> CountedTruth:
     truths = [frame.truth for frame in frames]
     score = [
-        np.append(frame.detected.score, MISSED)[found.found_by]  # NOBODY is the last
+        np.append(frame.detected.score, MISSED_SCORE)[found.found_by]  # NOBODY is the last
         for frame, found in zip(frames, matches, strict=True)
     ]
     everyone = CountedTruth(
@@ -233,7 +233,7 @@ def _wanted(frames: Sequence[FrameResult], matches: Sequence[Match]) -> CountedT
     return _rows(everyone, np.concatenate([found.counted for found in matches]))
 
 
-def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> EvaluatedDetections:
+def _evaluated(frames: Sequence[FrameResult], matches: Sequence[Match]) -> EvaluatedDetections:
     found, pairs = [frame.detected for frame in frames], list(zip(frames, matches, strict=True))
     everything = EvaluatedDetections(
         score=np.concatenate([boxes.score for boxes in found]),
@@ -243,8 +243,8 @@ def _judged(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Evaluate
         points=np.concatenate([one.of_found(f.truth.points, f.detected.points) for f, one in pairs]),
         distance=np.concatenate([one.of_found(f.truth.distance, f.detected.distance) for f, one in pairs]),
     )
-    judged = np.nonzero(np.concatenate([one.judged for one in matches]))[0]
-    return _rows(everything, judged[np.argsort(-everything.score[judged], kind="stable")])
+    evaluated = np.nonzero(np.concatenate([one.evaluated for one in matches]))[0]
+    return _rows(everything, evaluated[np.argsort(-everything.score[evaluated], kind="stable")])
 
 
 def _rows(table: Table, rows: Boolean | Integer) -> Table:
@@ -257,7 +257,7 @@ def _blocks(frames: Sequence[FrameResult]) -> Integer:
     times = np.array([frame.time for frame in frames])
     names, run = np.unique(runs, return_inverse=True)
     start = np.array([times[runs == name].min() for name in names])
-    keys = np.column_stack([run, (times - start[run]) // BLOCK])
+    keys = np.column_stack([run, (times - start[run]) // BLOCK_SECONDS])
     block: Integer = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
     return block
 

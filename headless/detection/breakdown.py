@@ -12,15 +12,15 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 
 from .average_precision import Evaluation, part
 
-ALONG_DISTANCE = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
-ALONG_POINTS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)
-ALONG_VISIBILITY = (0.0, 0.1, 0.25, 0.5, 0.75, 0.95, np.inf)
-ALONG_DENSITY = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, np.inf)
+DISTANCE_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 60.0, np.inf)
+POINT_EDGES = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, np.inf)
+VISIBILITY_EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.95, np.inf)
+DENSITY_EDGES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, np.inf)
 
 
 @dataclass(frozen=True)
 class Bin:
-    """What became of some of the road users and detections.
+    """Figures of the road users and detections in one bin.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def false_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], scor
 
 @dataclass(frozen=True)
 class FalsePositives:
-    """False detections with at least some score.
+    """Counts of the false detections with at least some score.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 Placements come from the integer program, clouds from simulated traffic. One
 detector learns from all placements at once (or one from each), several times
-with other seeds, and is judged with each placement on traffic that none has
+with other seeds, and is evaluated with each placement on traffic that none has
 seen.
 """
 
@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
-from headless.coverage_study.cells import NUMBERS, Case, Cell, solve_cell
+from headless.coverage_study.cells import COUNTS, Case, Cell, solve_cell
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from .kitti_precision import kitti
 from .matching import Rule
 from .pillars import PillarGrid
 from .recordings import SampledRun, SensorConfiguration, Simulator
-from .settings import GROUPS, NetworkSettings, TrainingSettings
+from .settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from .suitability import suitability_warnings
 from .training import TrainedDetector, deterministic, train
 
@@ -55,26 +55,26 @@ RULES = {
 }
 """How average precision is taken; the first is the study's own."""
 
-MAIN = next(iter(RULES.values()))
+MAIN_RULE = next(iter(RULES.values()))
 
-FEWEST_RUNS = 4
+MIN_RUNS = 4
 """One to learn from, one for validation, two for tests."""
 
 WARM_UP = 2.0
 """Seconds from the first sample of a run to its first frame."""
 
-SIDE_BY_SIDE = (os.cpu_count() or 1) + 1
+PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1
 """Trainings at once on the CPU: one more than there are cores, as each also waits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Traffic:
-    """Runs of traffic by what they are for.
+    """Runs of traffic for training, validation and tests.
 
     Parameters
     ----------
     training, validation, test : tuple of SampledRun
-        To learn from, to see by when that is enough, and to judge with.
+        To learn from, to see by when that is enough, and to evaluate with.
 
     Raises
     ------
@@ -110,9 +110,9 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     SeipError
         There are too few, or one is too short.
     """
-    if len(paths) < FEWEST_RUNS:
+    if len(paths) < MIN_RUNS:
         raise SeipError(
-            f"{len(paths)} runs of traffic are too few: name {FEWEST_RUNS} or more with --traffic, made by "
+            f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, made by "
             "headless/traffic.py with a seed each; the last two are for tests, the one before for validation"
         )
     runs = read_runs(paths, origin, every)
@@ -134,14 +134,14 @@ def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[Sampl
 
 @dataclass(frozen=True, eq=False)
 class ModelConfiguration:
-    """A detector that is to be trained.
+    """A detector to be trained: its settings, seed and sensor configurations.
 
     Parameters
     ----------
     name : str
         Also of its file.
     configurations : tuple of SensorConfiguration
-        Whose clouds it learns from, and is judged with.
+        Whose clouds it learns from, and is evaluated with.
     """
 
     name: str
@@ -152,7 +152,7 @@ class ModelConfiguration:
 
 @dataclass(frozen=True, eq=False)
 class DetectorOutcome:
-    """What one detector made of one configuration's test frames.
+    """Results of one detector on one configuration's test frames.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ class DetectorOutcome:
     def precisions(self) -> dict[str, float]:
         """Average precision by every rule, and KITTI's figures for the study's own."""
         by_rule = {name: evaluate(self.frames, rule).average_precision for name, rule in RULES.items()}
-        figures = kitti(self.frames, MAIN)
+        figures = kitti(self.frames, MAIN_RULE)
         return by_rule | {"kitti_ap40": figures.ap40, "kitti_ap11": figures.ap11}
 
     @cached_property
@@ -232,7 +232,7 @@ def place_all(
         There are fewer positions than sensors, or a type sees nothing.
     """
     visible = grid.visible
-    cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in NUMBERS]
+    cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in COUNTS]
     placed: list[Case] = []
     for done, cell in enumerate(cells):
         progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
@@ -245,7 +245,7 @@ def place_all(
 
 @dataclass(frozen=True, eq=False)
 class TrainingSet:
-    """What detectors learn from, and by what is seen when that is enough: recordings by their configuration's name."""
+    """Training and validation recordings, by the name of their sensor configuration."""
 
     training: dict[str, list[SampledRecording]]
     validation: dict[str, list[SampledRecording]]
@@ -304,7 +304,7 @@ def train_all(
         Of torch.
     """
     trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
-    at_once = SIDE_BY_SIDE if device == "cpu" else 1
+    at_once = PARALLEL_TRAININGS if device == "cpu" else 1
     with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
         return (yield from side_by_side(trainings, at_once))
 
@@ -312,19 +312,19 @@ def train_all(
 def evaluate_all(
     simulator: Simulator, models: Sequence[ModelConfiguration], detectors: Sequence[Detector], traffic: Traffic
 ) -> Generator[Progress, None, list[DetectorOutcome]]:
-    """Judge every detector with each of its configurations; a frame is simulated once for all of them."""
+    """Evaluate every detector with each of its configurations; a frame is simulated once for all of them."""
     configurations = {one.name: one for model in models for one in model.configurations}.values()
     total = len(configurations) * sum(len(run.times) for run in (*traffic.validation, *traffic.test))
     done = 0
-    tried: dict[tuple[str, str], list[FrameResult]] = {}
-    judged: dict[tuple[str, str], list[FrameResult]] = {}
+    validated: dict[tuple[str, str], list[FrameResult]] = {}
+    tested: dict[tuple[str, str], list[FrameResult]] = {}
     for configuration in configurations:
         asked = [
             (model, detector)
             for model, detector in zip(models, detectors, strict=True)
             if configuration in model.configurations
         ]
-        for results, runs in ((tried, traffic.validation), (judged, traffic.test)):
+        for results, runs in ((validated, traffic.validation), (tested, traffic.test)):
             for run in runs:
                 for number in range(len(run.times)):
                     yield Progress(done, total, f"detect with {configuration.name}")
@@ -337,7 +337,7 @@ def evaluate_all(
                         result = _result(simulator, configuration, run, frame, cloud, found)
                         results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "judged")
-    return [outcome for model in models for outcome in _outcomes(model, tried, judged)]
+    return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
 
 
 def suitability_by_configuration(
@@ -355,14 +355,14 @@ def suitability_by_configuration(
 
 def _outcomes(
     model: ModelConfiguration,
-    tried: Mapping[tuple[str, str], list[FrameResult]],
-    judged: Mapping[tuple[str, str], list[FrameResult]],
+    validated: Mapping[tuple[str, str], list[FrameResult]],
+    tested: Mapping[tuple[str, str], list[FrameResult]],
 ) -> Iterator[DetectorOutcome]:
     names = [configuration.name for configuration in model.configurations]
-    score = balanced_score(evaluate([frame for name in names for frame in tried[model.name, name]], MAIN))
+    score = balanced_score(evaluate([frame for name in names for frame in validated[model.name, name]], MAIN_RULE))
     for configuration in model.configurations:
-        frames = tuple(judged[model.name, configuration.name])
-        yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN), score)
+        frames = tuple(tested[model.name, configuration.name])
+        yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN_RULE), score)
 
 
 def _result(
@@ -377,7 +377,7 @@ def _result(
         frame,
         cloud,
         found,
-        classes=tuple(GROUPS.values()),
+        classes=tuple(CLASS_CATEGORIES.values()),
         region=simulator.static.region,
         sensors=configuration.places,
         run=run.name,

@@ -28,22 +28,22 @@ from .rotated_boxes import in_plan, paired_iou
 from .settings import CLASSES
 
 # Channels after the heat maps.
-OFFSET, SIZE, AXIS, AHEAD, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
+OFFSET, SIZE, AXIS, HEADING, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
 BOX_CHANNELS = 11
 
 TYPICAL_SIZE = (4.5, 1.8, 1.6)
 """Metres, of which sizes are the exponentials: predictions begin there."""
 
-SPREAD = 0.18
+HEAT_STD = 0.18
 """Standard deviation of heat along and across, in lengths and widths of the road user."""
 
-LEAST_HEAT = 0.2
+MIN_HEAT = 0.2
 """Cells with less heat of a road user do not learn its box."""
 
-RARE = 0.01
+INITIAL_HEAT = 0.01
 """Heat that every cell begins with."""
 
-MOST_CANDIDATES = 500
+MAX_PEAKS = 500
 """Peaks of a cloud that are looked at, the highest first."""
 
 OVERLAP_POWER = 0.5
@@ -63,7 +63,7 @@ class CentreHead(nn.Module):
 
     def __init__(self, channels: int, width: int) -> None:
         super().__init__()
-        self.heat = _branch(channels, width, len(CLASSES), math.log(RARE / (1 - RARE)))
+        self.heat = _branch(channels, width, len(CLASSES), math.log(INITIAL_HEAT / (1 - INITIAL_HEAT)))
         self.box = _branch(channels, width, BOX_CHANNELS, 0.0)
 
     def forward(self, features: Tensor) -> Tensor:
@@ -77,7 +77,7 @@ class CentreHead(nn.Module):
         maps = [_target(wanted, grid, output.device) for wanted in targets]
         heat, owner = (torch.stack([pair[part] for pair in maps]) for part in (0, 1))
         unclear = torch.stack([heat_of(wanted.boxes[~wanted.learnt], grid, output.device)[0] for wanted in targets])
-        counted = (unclear < LEAST_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
+        counted = (unclear < MIN_HEAT) & inner_cells(grid, OUTPUT_STRIDE, margin, output.device)
         score = heat_map_loss(output[:, : len(CLASSES)], heat, counted[:, None])
 
         cloud, row, column = torch.nonzero((owner >= 0) & counted, as_tuple=True)
@@ -95,7 +95,7 @@ class CentreHead(nn.Module):
         found = []
         for cloud, values in enumerate(heat):
             category, row, column = torch.nonzero(values >= least_score, as_tuple=True)
-            best = torch.sort(values[category, row, column], descending=True, stable=True).indices[:MOST_CANDIDATES]
+            best = torch.sort(values[category, row, column], descending=True, stable=True).indices[:MAX_PEAKS]
             category, row, column = category[best], row[best], column[best]
             predicted = output[cloud, len(CLASSES) :, row, column].T
             boxes = _boxes(predicted, cell_bottoms(grid, row, column))
@@ -125,7 +125,7 @@ def box_losses(predicted: Tensor, target: Tensor, middle: Tensor, weight: Tensor
         "offset": 2.0 * weighted_mean((predicted[:, OFFSET] - (target[:, :3] - middle)).abs().sum(1), weight),
         "size": 2.0 * weighted_mean((predicted[:, SIZE] - size).abs().sum(1), weight),
         "axis": 2.0 * weighted_mean((predicted[:, AXIS] - axis).abs().sum(1), weight),
-        "ahead": 0.2 * weighted_mean(functional.softplus(-(predicted[:, AHEAD] * ahead).sum(1)), weight),
+        "ahead": 0.2 * weighted_mean(functional.softplus(-(predicted[:, HEADING] * ahead).sum(1)), weight),
         "overlap": 0.5 * weighted_mean(overlap, weight),
     }
 
@@ -156,7 +156,7 @@ def _target(wanted: TrainingTargets, grid: PillarGrid, device: torch.device) -> 
     most, owner = heat_of(wanted.boxes[learnt], grid, device)
     if len(learnt) == 0:
         return heat, torch.full_like(owner, -1)
-    return heat, torch.where(most >= LEAST_HEAT, learnt[owner], -1)
+    return heat, torch.where(most >= MIN_HEAT, learnt[owner], -1)
 
 
 def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tensor, Tensor]:
@@ -171,7 +171,7 @@ def heat_of(boxes: Tensor, grid: PillarGrid, device: torch.device) -> tuple[Tens
     along = cosine * dx[:, None, :] + sine * dy[:, :, None]
     across = cosine * dy[:, :, None] - sine * dx[:, None, :]
     # No narrower than lets the cells about a pedestrian's have some.
-    spread = (SPREAD * boxes[:, 3:5]).clamp(min=0.6 * side)[:, :, None, None]
+    spread = (HEAT_STD * boxes[:, 3:5]).clamp(min=0.6 * side)[:, :, None, None]
     heat = torch.exp(-0.5 * ((along / spread[:, 0]).square() + (across / spread[:, 1]).square()))
     centre = (dx.abs() <= side / 2)[:, None, :] & (dy.abs() <= side / 2)[:, :, None]
     heat = torch.where(centre, torch.ones_like(heat), heat)

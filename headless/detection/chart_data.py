@@ -19,9 +19,9 @@ from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin
 from .claims import SeedResult
 from .frame_results import FrameResult
-from .matching import NOBODY, Rule, match
+from .matching import NO_MATCH, Rule, match
 
-IN_PLAN = [0, 1, 3, 4, 6]
+PLAN_COLUMNS = [0, 1, 3, 4, 6]
 
 
 def cells(trials: Sequence[SeedResult]) -> tuple[PrecisionCell, ...]:
@@ -64,7 +64,7 @@ def parts(what: str, figure: str, lines: Mapping[str, Sequence[Bin]]) -> BinnedF
     )
 
 
-def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
+def error_view(  # noqa: PLR0913 - a frame, how it is evaluated, and where it is
     name: str,
     frame: FrameResult,
     rule: Rule,
@@ -91,9 +91,9 @@ def error_view(  # noqa: PLR0913 - a frame, how it is judged, and where it is
         cloud=cloud[:, :2].astype(np.float64),
         region=region,
         sensors=sensors[:, :2],
-        truth=frame.truth.boxes[:, IN_PLAN],
+        truth=frame.truth.boxes[:, PLAN_COLUMNS],
         wanted=found.counted,
-        missed=found.counted & (found.found_by == NOBODY),
-        detected=shown.detected.boxes[:, IN_PLAN],
-        false=found.judged & ~found.hit,
+        missed=found.counted & (found.found_by == NO_MATCH),
+        detected=shown.detected.boxes[:, PLAN_COLUMNS],
+        false=found.evaluated & ~found.hit,
     )

@@ -12,23 +12,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from headless.claims import UNDECIDED, Claim, judge_above, judge_all, judge_within
-from headless.coverage_study.cells import NUMBERS
+from headless.claims import UNDECIDED, Claim, verdict_above, verdict_within, worst_verdict
+from headless.coverage_study.cells import COUNTS
 
 import numpy as np
 
 from seip_addon.core.estimates import Interval, mean_interval
 
-ABOUT = 2.0
+FACTOR = 2.0
 """Factor up to which a figure is about another."""
 
-FEWEST_SEEDS = 3
+MIN_SEEDS = 3
 """Seeds below which nothing is decided."""
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
 """What the study gained from one to two and from two to four sensors, of the simplest type and the next."""
 
-FEW, SOME, MANY = NUMBERS
+FEW, SOME, MANY = COUNTS
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class SeedResult:
 
 
 def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
-    """Hold claims 5 to 9 of the study against what was measured.
+    """Evaluate claims 5 to 9 of the paper on the measurements.
 
     Claims for which a type or the ablation is missing are left out.
 
@@ -102,7 +102,7 @@ def _gains(number: int, results: Sequence[SeedResult], sensor: str, published: t
         number,
         f"{sensor}: AP rises by about {100 * published[0]:g} points from N = {FEW} to {SOME} and by about "
         f"{100 * published[1]:g} from {SOME} to {MANY}",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"{'; '.join(figures)}; {_seeds(gains)}",
     )
 
@@ -116,21 +116,21 @@ def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[s
     return Claim(
         7,
         f"adding {simple} sensors gains more AP than adding {' or '.join(better)}",
-        judge_all([_above(lead) for lead in leads]),
+        worst_verdict([_above(lead) for lead in leads]),
         f"N = {FEW} to {MANY}: {'; '.join(rows)}; {simple} gains {', '.join(ahead)}",
     )
 
 
 def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
-    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in NUMBERS}
+    false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in COUNTS}
     more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
     sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse)) for count in (FEW, SOME)]
-    rows = [f"N = {count} {_mean(false[count]).plain()}" for count in NUMBERS]
+    rows = [f"N = {count} {_mean(false[count]).plain()}" for count in COUNTS]
     shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
     return Claim(
         8,
         f"{sensor}: N = {FEW} and {SOME} give more false positives than N = {MANY}, mostly where the cloud is sparse",
-        judge_all([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
+        worst_verdict([*map(_above, more), *(_above(share, 0.5) for share in sparse)]),
         f"per frame: {'; '.join(rows)}; of them in the sparser half: {'; '.join(shares)}",
     )
 
@@ -149,7 +149,7 @@ def _padding(results: Sequence[SeedResult]) -> Claim:
     return Claim(
         9,
         "zero-padded pillars cause false positives where the cloud is sparse",
-        judge_all(verdicts),
+        worst_verdict(verdicts),
         f"false positives per frame in the sparser half: {'; '.join(rows)}",
     )
 
@@ -185,7 +185,7 @@ def _mean(of: BySeed) -> _Mean:
     values = list(of.values())
     if not values:
         return _Mean(np.nan, 0, None)
-    interval = mean_interval(values) if len(values) >= FEWEST_SEEDS else None
+    interval = mean_interval(values) if len(values) >= MIN_SEEDS else None
     return _Mean(float(np.mean(values)), len(values), interval)
 
 
@@ -223,8 +223,8 @@ def _seeds(gains: Sequence[_Mean]) -> str:
 
 
 def _about(mean: _Mean, expected: float) -> str:
-    return UNDECIDED if mean.interval is None else judge_within(mean.interval, expected / ABOUT, expected * ABOUT)
+    return UNDECIDED if mean.interval is None else verdict_within(mean.interval, expected / FACTOR, expected * FACTOR)
 
 
 def _above(mean: _Mean, least: float = 0.0) -> str:
-    return UNDECIDED if mean.interval is None else judge_above(mean.interval, least)
+    return UNDECIDED if mean.interval is None else verdict_above(mean.interval, least)

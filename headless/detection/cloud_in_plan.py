@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Float, Integer
 
-CELL = 1.0
+CELL_SIZE = 1.0
 """Side of a cell in metres: a few of them make up the surroundings of a road user."""
 
 
@@ -20,7 +20,7 @@ class CloudInPlan:
     """
 
     def __init__(self, points: NDArray[np.float32]) -> None:
-        cells = np.floor(points[:, :2] / CELL).astype(np.int64)
+        cells = np.floor(points[:, :2] / CELL_SIZE).astype(np.int64)
         self._first: Integer = cells.min(axis=0, initial=0)
         self._columns, self._rows = (cells.max(axis=0, initial=0) - self._first + 1).tolist()
         column, row = (cells - self._first).T
@@ -32,7 +32,7 @@ class CloudInPlan:
     def about(self, x: float, y: float, reach: float) -> Float:
         """Return the points (m, 3) in a square about a place: all within the reach, and some beyond it."""
         (west, south), (east, north) = (
-            np.floor((np.array((x, y)) + side * reach) / CELL).astype(np.int64) - self._first for side in (-1, 1)
+            np.floor((np.array((x, y)) + side * reach) / CELL_SIZE).astype(np.int64) - self._first for side in (-1, 1)
         )
         west, east = max(west, 0), min(east, self._columns - 1)
         rows = np.arange(max(south, 0), min(north, self._rows - 1) + 1) * self._columns

@@ -26,18 +26,18 @@ from .anchor_head import AnchorHead
 from .centre_head import CentreHead
 from .heads import DetectionHead
 from .network import FeatureMap
-from .pillars import MOST_PILLARS, PillarGrid, Pillars
+from .pillars import MAX_PILLARS, PillarGrid, Pillars
 from .settings import NetworkSettings
 
 SCHEMA, VERSION = "seip.detector", 2
-_UNDIGESTED = 1  # the version of files that hold no digest
-_LARGEST = 1 << 32  # bytes of a file: 4 GiB
-_SEEDED = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
+_OLD_VERSION = 1  # the version of files that hold no digest
+_MAX_BYTES = 1 << 32  # bytes of a file: 4 GiB
+_SEED_LOCK = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
 
 
 @dataclass(frozen=True)
 class TrainingRecord:
-    """What a detector has learnt from, as far as it is known.
+    """Sensor types and sites that a detector has been trained on, as far as known.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Detector(nn.Module):
     ) -> None:
         super().__init__()
         self.settings, self.grid, self.training_record = settings, grid, training_record
-        with _SEEDED, torch.random.fork_rng(devices=[]):
+        with _SEED_LOCK, torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.feature_map = FeatureMap(settings)
             channels = self.feature_map.channels
@@ -87,11 +87,11 @@ class Detector(nn.Module):
 
     @property
     def found_by(self) -> DetectionHead:
-        """The head as what it can do, rather than as a module."""
+        """The head, typed by its interface rather than as a module."""
         return cast("DetectionHead", self.head)
 
     def forward(self, pillars: Pillars, shape: tuple[int, int, int]) -> Tensor:
-        """Return what the head says of some clouds; ``shape`` is their number and the rows and columns of a cloud."""
+        """Return the head's output for some clouds; ``shape`` is their number and the rows and columns of a cloud."""
         features = torch.from_numpy(pillars.features).to(self.device)
         pillar = torch.from_numpy(pillars.pillar).to(self.device)
         output: Tensor = self.head(self.feature_map(features, pillar, shape))
@@ -158,7 +158,7 @@ def _with_the_same_weights(detector: Detector, settings: NetworkSettings, grid: 
 
 
 def check_device(device: str) -> None:
-    """See that torch can use a device, before the work rather than after.
+    """Raise SeipError where torch cannot use a device.
 
     Raises
     ------
@@ -191,7 +191,7 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
     """
     try:
         with Path(path).open("rb") as file:
-            content = file.read(_LARGEST + 1)
+            content = file.read(_MAX_BYTES + 1)
     except OSError as error:
         raise SeipError(f"there is no detector {path}: train one, or name another file") from error
     with fault_of(path):
@@ -199,9 +199,9 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
         state: dict[str, Any] = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
         _check_sizes(state, len(content))
         version = state["version"]
-        known = state["schema"] == SCHEMA and version in {_UNDIGESTED, VERSION}
+        known = state["schema"] == SCHEMA and version in {_OLD_VERSION, VERSION}
         written = state.pop("digest", None)
-        if known and (version != _UNDIGESTED or written is not None) and written != _digest(state):
+        if known and (version != _OLD_VERSION or written is not None) and written != _digest(state):
             raise _ContentError("its content is not what was written")
     if not known:
         raise SeipError(f"{path} is no detector of this version; train it again")
@@ -210,12 +210,12 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 @contextmanager
 def fault_of(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Lay what goes wrong in the block at the door of the file."""
+    """Raise errors within the block as errors of the file."""
     try:
         yield
     except SeipError as error:
         raise SeipError(f"{path} is no detector, or is damaged: {error}; train it again") from error
-    except _DAMAGE as error:
+    except _READ_ERRORS as error:
         raise SeipError(f"{path} is no detector, or is damaged; train it again") from error
 
 
@@ -223,7 +223,7 @@ class _ContentError(SeipError):
     """What is wrong with the content of a file, as a part of a sentence."""
 
 
-_DAMAGE = (
+_READ_ERRORS = (
     ArithmeticError,
     AssertionError,
     AttributeError,
@@ -245,8 +245,8 @@ _DAMAGE = (
 
 def _check_archive(content: bytes) -> None:
     """See that a file is what `torch.save` writes, to the last of its bits: torch itself compares no checksums."""
-    if len(content) > _LARGEST:
-        raise _ContentError(f"it is larger than {_LARGEST >> 30} GiB")
+    if len(content) > _MAX_BYTES:
+        raise _ContentError(f"it is larger than {_MAX_BYTES >> 30} GiB")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         infos = archive.infolist()
         if any(info.compress_type != zipfile.ZIP_STORED or info.file_size > len(content) for info in infos):
@@ -268,7 +268,7 @@ def _check_grid(grid: PillarGrid, settings: NetworkSettings) -> None:
     counts = (grid.columns, grid.rows)
     if not all(isinstance(value, int | float) and abs(value) <= 1e8 for value in places) or grid.bottom >= grid.top:
         raise _ContentError("its grid is nowhere")
-    if not all(isinstance(count, int) and count > 0 for count in counts) or len(grid) > MOST_PILLARS:
+    if not all(isinstance(count, int) and count > 0 for count in counts) or len(grid) > MAX_PILLARS:
         raise _ContentError("its grid has no or too many pillars")
 
 

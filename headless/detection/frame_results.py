@@ -14,7 +14,7 @@ from seip_addon.core.scans.frame import Frame
 
 from .cloud_in_plan import CloudInPlan
 
-NEIGHBOURHOOD = 3.0
+DENSITY_RADIUS = 3.0
 """Radius in metres of the circle around a box in which the density of returns is taken."""
 
 
@@ -85,7 +85,7 @@ class EvaluatedBoxes:
     points : (k,) int64
         Returns in the box.
     density : (k,) float64, per square metre
-        Returns within `NEIGHBOURHOOD` of its middle in plan.
+        Returns within `DENSITY_RADIUS` of its middle in plan.
     inside, distance
         As in `GroundTruth`.
     """
@@ -182,11 +182,11 @@ def _returns_around(boxes: Float, cloud: CloudInPlan) -> tuple[Integer, Float]:
     """Return the number of returns in each box, and how dense they are in the plan around it."""
     inside, near = np.zeros(len(boxes), dtype=np.int64), np.zeros(len(boxes), dtype=np.int64)
     for row, (x, y, z, length, width, height, yaw) in enumerate(boxes):
-        reach = max(NEIGHBOURHOOD, np.hypot(length, width) / 2)
+        reach = max(DENSITY_RADIUS, np.hypot(length, width) / 2)
         here = cloud.about(x, y, reach) - (x, y, z)
-        near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= NEIGHBOURHOOD**2)
+        near[row] = np.count_nonzero(here[:, 0] ** 2 + here[:, 1] ** 2 <= DENSITY_RADIUS**2)
         ahead = np.cos(yaw) * here[:, 0] + np.sin(yaw) * here[:, 1]
         aside = np.cos(yaw) * here[:, 1] - np.sin(yaw) * here[:, 0]
         within = (np.abs(ahead) <= length / 2) & (np.abs(aside) <= width / 2) & (np.abs(here[:, 2]) <= height / 2)
         inside[row] = np.count_nonzero(within)
-    return inside, near / (np.pi * NEIGHBOURHOOD**2)
+    return inside, near / (np.pi * DENSITY_RADIUS**2)

@@ -25,7 +25,7 @@ from .settings import CLASS_OF
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What one configuration of sensors measured of one run of traffic.
+    """Scans of one run of traffic by one sensor configuration.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class LazyFrames(Sequence[Frame]):
 
 @dataclass(frozen=True, eq=False)
 class TrainingSample:
-    """What a detector learns from a frame.
+    """A training sample: the pillars of a frame and its boxes.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def training_record_of(recordings: Sequence[Recording]) -> TrainingRecord:
 
 
 def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
-    """See that no run of traffic is in two splits: neighbouring frames show the same vehicles in the same places.
+    """Raise SeipError where a run is in two splits: its frames show the same vehicles in the same places.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class BoxProposals:
 
 
 class DetectionHead(Protocol):
-    """What every head can do, beside being a module."""
+    """Interface of detection heads, beside that of a module."""
 
     def loss(
         self, output: Tensor, targets: list[TrainingTargets], grid: PillarGrid, margin: float

@@ -11,10 +11,10 @@ from .frame_results import Detections
 from .pillars import fill_pillars
 from .rotated_boxes import in_plan, suppress
 
-LEAST_SCORE = 0.05
+MIN_SCORE = 0.05
 """Boxes below it are not kept: average precision hardly sees them, and time is spent on each."""
 
-MOST_OVERLAP = 0.1
+MAX_OVERLAP = 0.1
 """Two boxes that overlap more, as intersection over union in plan, are one road user: none stands in another."""
 
 
@@ -24,7 +24,7 @@ def detect(
     points: NDArray[np.float32],
     intensity: NDArray[np.float32],
     *,
-    least_score: float = LEAST_SCORE,
+    least_score: float = MIN_SCORE,
 ) -> Detections:
     """Return the road users in a cloud.
 
@@ -46,7 +46,7 @@ def detect(
     pillars = fill_pillars(np.column_stack((points, intensity)), grid, detector.settings.most_points)
     output = detector(pillars, (1, grid.rows, grid.columns))
     (found,) = detector.found_by.candidates(output, grid, least_score)
-    stays = suppress(in_plan(found.boxes), found.score, MOST_OVERLAP)
+    stays = suppress(in_plan(found.boxes), found.score, MAX_OVERLAP)
     return Detections(
         boxes=found.boxes[stays].double().cpu().numpy(),
         score=found.score[stays].double().cpu().numpy(),

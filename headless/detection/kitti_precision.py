@@ -24,7 +24,7 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from .frame_results import FrameResult
 from .matching import Rule, must_be_found, of_its_kind, overlaps
 
-POINTS = 41
+RECALL_POINTS = 41
 
 
 class Kitti(NamedTuple):
@@ -36,7 +36,7 @@ class Kitti(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A frame as this benchmark sees it: k detections in the order given, who overlaps whom enough.
+    """A frame as this benchmark treats it: k detections in the order given, and which overlap which road user.
 
     ``near`` holds for each road user the detections that overlap it enough,
     and by how much; ``blamed`` (k,) whether a detection that finds nobody is
@@ -54,7 +54,7 @@ def kitti(frames: Sequence[FrameResult], rule: Rule) -> Kitti:
     scenes = [_scene(frame, rule) for frame in frames]
     wanted = sum(int(scene.counted.sum()) for scene in scenes)
     thresholds = _thresholds(np.concatenate([_scores_of_hits(scene) for scene in scenes]), wanted)
-    precision = np.zeros(POINTS)
+    precision = np.zeros(RECALL_POINTS)
     for place, threshold in enumerate(thresholds):
         hits, false = np.sum([_count(scene, threshold) for scene in scenes], axis=0)
         precision[place] = hits / max(hits + false, 1)
@@ -93,7 +93,7 @@ def _thresholds(scores: Float, wanted: int) -> list[float]:
         here, beyond = (place + 1) / wanted, (place + 2) / wanted
         if is_last or beyond - recall >= recall - here:
             thresholds.append(score)
-            recall += 1 / (POINTS - 1)  # summed up as KITTI does, for ties fall by its rounding
+            recall += 1 / (RECALL_POINTS - 1)  # summed up as KITTI does, for ties fall by its rounding
     return thresholds
 
 

@@ -4,7 +4,7 @@ The rule: detections take turns, the best score first (of equal scores the one
 that overlaps its road user most). Each takes, of the road users that count and
 that none has taken, the one it overlaps most, if the overlap exceeds the
 threshold. One that finds none of these, but overlaps a road user that does not
-count, or has its middle outside the region, is not judged. All others are false.
+count, or has its middle outside the region, is not evaluated. All others are false.
 
 This is the rule of PASCAL VOC (Everingham et al. 2010) and COCO (Lin et al.
 2014); the two differ where road users overlap each other alone. Road users
@@ -30,13 +30,13 @@ from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
 VEHICLES = ("car", "van", "truck", "bus")
 """Categories whose average precision the study compares."""
 
-NOBODY = -1
+NO_MATCH = -1
 """Index that stands for no match, of a detection and of a road user."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What is to be found, and what finding is.
+    """Which road users count, and when a detection matches one.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Rule:
     in_space : bool
         Whether boxes have to agree in height as well; in plan otherwise.
     categories : tuple of str
-        Of the road users that count and of the detections that are judged.
+        Of the road users that count and of the detections that are evaluated.
     fewest_points : int
         Returns from a road user below which it does not count; 0 counts those that no sensor sees as well.
     """
@@ -65,22 +65,22 @@ class Match:
     counted : (g,) bool
         Whether the road user is one that had to be found.
     found_by : (g,) int64
-        The detection that found it, `NOBODY` where none did.
+        The detection that found it, `NO_MATCH` where none did.
     found : (k,) int64
-        The road user that each detection found, `NOBODY` where it found none that counts.
-    judged : (k,) bool
+        The road user that each detection found, `NO_MATCH` where it found none that counts.
+    evaluated : (k,) bool
         Whether it is a hit or false; the rest neither helps nor harms.
     """
 
     counted: Boolean
     found_by: Integer
     found: Integer
-    judged: Boolean
+    evaluated: Boolean
 
     @property
     def hit(self) -> Boolean:
         """Whether each detection found a road user that counts, (k,) bool."""
-        hit: Boolean = self.found != NOBODY
+        hit: Boolean = self.found != NO_MATCH
         return hit
 
     def of_found(self, of_truth: NDArray[Any], own: NDArray[Any]) -> NDArray[Any]:
@@ -96,16 +96,16 @@ def match(frame: FrameResult, rule: Rule) -> Match:
     counted = must_be_found(frame, rule)
     overlap = np.where(of_its_kind(frame, rule)[:, None], overlaps(frame, rule), 0.0)
     best = overlap.max(axis=1, initial=0.0)
-    found_by, found = np.full(len(truth), NOBODY), np.full(len(detected), NOBODY)
+    found_by, found = np.full(len(truth), NO_MATCH), np.full(len(detected), NO_MATCH)
     for row in np.lexsort((-best, -detected.score)):
         if best[row] <= rule.iou:
             continue
-        free = np.where(counted & (found_by == NOBODY), overlap[row], 0.0)
+        free = np.where(counted & (found_by == NO_MATCH), overlap[row], 0.0)
         if free.max() > rule.iou:
             found[row] = free.argmax()
             found_by[found[row]] = row
     excused = (overlap[:, ~counted] > rule.iou).any(axis=1) | ~detected.inside
-    return Match(counted, found_by, found, (found != NOBODY) | (of_its_kind(frame, rule) & ~excused))
+    return Match(counted, found_by, found, (found != NO_MATCH) | (of_its_kind(frame, rule) & ~excused))
 
 
 def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:

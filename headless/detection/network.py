@@ -10,7 +10,7 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
-from .pillars import FEATURES
+from .pillars import POINT_FEATURES
 from .settings import NetworkSettings
 
 OUTPUT_STRIDE = 2
@@ -34,7 +34,7 @@ class PillarEncoder(nn.Module):
     def __init__(self, width: int, padded_to: int = 0) -> None:
         super().__init__()
         self.padded_to = padded_to
-        self.linear = nn.Linear(FEATURES, width, bias=False)
+        self.linear = nn.Linear(POINT_FEATURES, width, bias=False)
         self.normalisation = nn.BatchNorm1d(width, NORMALISATION_EPSILON, NORMALISATION_MOMENTUM)
 
     def forward(self, features: Tensor, pillar: Tensor, count: int) -> Tensor:
@@ -57,7 +57,7 @@ class PillarEncoder(nn.Module):
             met, places = torch.unique_consecutive(pillar, return_counts=True)
             empty_places = met.repeat_interleave((self.padded_to - places).clamp(min=0))
             pillar = torch.cat((pillar, empty_places))
-            features = torch.cat((features, features.new_zeros((len(empty_places), FEATURES))))
+            features = torch.cat((features, features.new_zeros((len(empty_places), POINT_FEATURES))))
         points = torch.relu(self.normalisation(self.linear(features)))
         # After ReLU nothing is below the zero that empty pillars hold.
         return empty.scatter_reduce(0, pillar[:, None].expand_as(points), points, "amax")

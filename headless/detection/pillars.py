@@ -19,12 +19,12 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
 from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 
-from .settings import GROUND_ABOVE_BOTTOM, HEADROOM, STRIDE
+from .settings import GRID_STRIDE, GROUND_ABOVE_BOTTOM, HEADROOM
 
-FEATURES = 8
+POINT_FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
 
-MOST_PILLARS = 16_000_000
+MAX_PILLARS = 16_000_000
 """Of a grid at most."""
 
 
@@ -84,7 +84,7 @@ class PillarGrid:
 
 
 def grid_over(
-    bounds: tuple[float, float, float, float], heights: tuple[float, float], pillar: float, stride: int = STRIDE
+    bounds: tuple[float, float, float, float], heights: tuple[float, float], pillar: float, stride: int = GRID_STRIDE
 ) -> PillarGrid:
     """Return the smallest grid about the middle of a rectangle that covers it.
 
@@ -105,7 +105,7 @@ def grid_over(
     if not (west < east and south < north and heights[0] < heights[1]):
         raise SeipError("the extent of the detector is empty: give a region of interest with an area")
     columns, rows = (stride * math.ceil(side / (pillar * stride) - 1e-9) for side in (east - west, north - south))
-    if columns * rows > MOST_PILLARS:
+    if columns * rows > MAX_PILLARS:
         raise SeipError(f"{columns} × {rows} pillars are too many: choose larger ones or a smaller region")
     return PillarGrid(
         west=(west + east - columns * pillar) / 2,
@@ -183,7 +183,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
     counts = np.diff(first, append=len(pillar))
     mean = np.add.reduceat(offset, first, axis=0) / counts[:, None] if len(first) else offset
     half = grid.pillar / 2
-    features = np.empty((len(kept), FEATURES), dtype=np.float32)
+    features = np.empty((len(kept), POINT_FEATURES), dtype=np.float32)
     features[:, 0] = offset[:, 2] / 2.0
     features[:, 1] = kept[:, 3]
     features[:, 2:5] = (offset - np.repeat(mean, counts, axis=0)) / np.array((half, half, 0.5))
@@ -194,7 +194,7 @@ def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pi
 
 @dataclass(frozen=True)
 class Filling:
-    """How full the pillars of a cloud are.
+    """Numbers of points, of pillars, and of pillars with more points than they keep.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class Filling:
 
 
 def filling(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Filling:
-    """Tell how full the pillars of a cloud (n, 3 or more columns) are, where each keeps so many points."""
+    """Return how full the pillars of a cloud (n, 3 or more columns) are, where each keeps so many points."""
     _, pillar = _choose(points, grid, len(points) + 1)
     counts = np.unique(pillar, return_counts=True)[1]
     if not len(counts):

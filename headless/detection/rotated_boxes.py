@@ -17,7 +17,7 @@ from torch import Tensor
 CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))
 """Of a unit square, counter-clockwise."""
 
-AT_ONCE = 2000
+PAIRS_AT_ONCE = 2000
 """Pairs that stay in a core's cache; spread over threads, small steps like these take ten times as long."""
 
 
@@ -104,7 +104,7 @@ def suppress(boxes: Tensor, scores: Tensor, threshold: float) -> Tensor:
 
 def _overlap(a: Tensor, b: Tensor) -> Tensor:
     """Return the area in plan that each pair shares."""
-    parts = zip(torch.split(a, AT_ONCE), torch.split(b, AT_ONCE), strict=True)
+    parts = zip(torch.split(a, PAIRS_AT_ONCE), torch.split(b, PAIRS_AT_ONCE), strict=True)
     return torch.cat([_few_overlaps(*part) for part in parts])
 
 

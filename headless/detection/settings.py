@@ -10,7 +10,7 @@ from seip_addon.core.settings import setting
 
 Head = Literal["centre", "anchor"]
 
-GROUPS = {
+CLASS_CATEGORIES = {
     "car": ("car", "van"),
     "truck": ("truck", "bus"),
     "cycle": ("motorcycle", "bicycle"),
@@ -23,11 +23,11 @@ alike, one class for both spends no detection on their difference, and their
 sizes are regressed anyway.
 """
 
-CLASSES = tuple(GROUPS)
-CLASS_OF = {category: number for number, group in enumerate(GROUPS.values()) for category in group}
+CLASSES = tuple(CLASS_CATEGORIES)
+CLASS_OF = {category: number for number, group in enumerate(CLASS_CATEGORIES.values()) for category in group}
 """Number of the class of each category of road users."""
 
-STRIDE = 8
+GRID_STRIDE = 8
 """Pillars along a side of the coarsest cell of the network: grids have a multiple of it."""
 
 
@@ -50,7 +50,7 @@ def _whole(value: object, least: int, most: int) -> bool:
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """The network, apart from its weights.
+    """Settings of the network: pillars, widths, blocks and head.
 
     Parameters
     ----------
@@ -91,13 +91,13 @@ class NetworkSettings:
         _require(checks)
 
 
-PUBLISHED = NetworkSettings(pillar=0.24, most_points=32, width=64, blocks=(3, 5, 5), head="anchor")
+PUBLISHED_NETWORK = NetworkSettings(pillar=0.24, most_points=32, width=64, blocks=(3, 5, 5), head="anchor")
 """The network of the study: 0.24 m pillars of 32 points, blocks of 3, 5, 5 at 64, 128, 256 channels, anchors."""
 
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """How a detector is trained.
+    """Settings of the training of a detector.
 
     Parameters
     ----------

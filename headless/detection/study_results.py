@@ -26,16 +26,16 @@ from seip_addon.core.estimates import Interval, rank_correlation, rank_correlati
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .breakdown import (
-    ALONG_DENSITY,
-    ALONG_DISTANCE,
-    ALONG_POINTS,
-    ALONG_VISIBILITY,
+    DENSITY_EDGES,
+    DISTANCE_EDGES,
+    POINT_EDGES,
+    VISIBILITY_EDGES,
     Bin,
     average_precision_by,
     false_by,
     recall_by,
 )
-from .case_study import MAIN, DetectorOutcome, ModelConfiguration, Traffic
+from .case_study import MAIN_RULE, DetectorOutcome, ModelConfiguration, Traffic
 from .chart_data import cells, curve, error_view, parts
 from .recordings import Simulator
 from .training import TrainedDetector
@@ -110,22 +110,22 @@ def _parts(outcomes: Sequence[DetectorOutcome]) -> list[BinnedFigure]:
         panel(
             "distance to the nearest sensor (m)",
             "average precision",
-            lambda one: average_precision_by(one.evaluation, "distance", ALONG_DISTANCE),
+            lambda one: average_precision_by(one.evaluation, "distance", DISTANCE_EDGES),
         ),
         panel(
             "returns from the road user",
             "average precision",
-            lambda one: average_precision_by(one.evaluation, "points", ALONG_POINTS),
+            lambda one: average_precision_by(one.evaluation, "points", POINT_EDGES),
         ),
         panel(
             "share of the road user that is not hidden",
             "recall",
-            lambda one: recall_by(one.evaluation, "visibility", ALONG_VISIBILITY, one.score),
+            lambda one: recall_by(one.evaluation, "visibility", VISIBILITY_EDGES, one.score),
         ),
         panel(
             "returns per square metre around it",
             "false positives per frame",
-            lambda one: false_by(one.evaluation, "density", ALONG_DENSITY, one.score),
+            lambda one: false_by(one.evaluation, "density", DENSITY_EDGES, one.score),
         ),
     ]
 
@@ -139,7 +139,7 @@ def _save_errors(path: Path, results: StudyResults, outcomes: Sequence[DetectorO
         error_view(
             f"{one.configuration.name}: AP {one.evaluation.average_precision:.2f} over all frames",
             one.frames[number],
-            MAIN,
+            MAIN_RULE,
             score=one.score,
             cloud=results.simulator.frame(one.configuration, run, number).points,
             region=results.simulator.static.region,

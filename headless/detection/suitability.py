@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .detector import Detector
 from .pillars import filling
 
-MOST_OVER_FULL = 0.6
+MAX_OVERFULL_SHARE = 0.6
 """Share of the pillars with points that may have more than are kept: up to it no loss was told from chance.
 
 Measured on the shipped junction with four sensors of 32 channels, where pillars
@@ -59,7 +59,7 @@ def _of_site(detector: Detector, site: str) -> str:
 def _of_pillars(detector: Detector, points: NDArray[np.float32]) -> str:
     most, grid = detector.settings.most_points, detector.grid
     full = filling(points, grid, most)
-    if full.over_full <= MOST_OVER_FULL:
+    if full.over_full <= MAX_OVERFULL_SHARE:
         return ""
     return (
         f"{full.over_full:.0%} of the pillars with points have more than the {most} that are kept, "

@@ -30,12 +30,12 @@ from .heads import TrainingTargets
 from .inference import detect
 from .matching import Rule
 from .pillars import PillarGrid, Pillars, fill_pillars, stacked
-from .settings import GROUPS, STRIDE, NetworkSettings, TrainingSettings
+from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18
 """Frames, spread over the recordings set aside, that each validation looks at."""
 
-MARGIN = 1.6
+LOSS_MARGIN = 1.6
 """Metres at the border of a window for which no loss is computed: much of what is there lies outside."""
 
 MAX_CROP_SHIFT = 0.25
@@ -136,7 +136,7 @@ def train(
 
 
 class _Run:
-    """A training that is under way."""
+    """State of a running training."""
 
     def __init__(
         self,
@@ -156,14 +156,14 @@ class _Run:
         self.schedule = torch.optim.lr_scheduler.OneCycleLR(
             self.optimiser, settings.learning_rate, total_steps=settings.steps + 1
         )
-        self.window = STRIDE * math.ceil(settings.window / (network.pillar * STRIDE) - 1e-9)
+        self.window = GRID_STRIDE * math.ceil(settings.window / (network.pillar * GRID_STRIDE) - 1e-9)
         self.step = 0
         self.curve = LearningCurve()
         self.best = _copied(self.detector.state_dict())
 
     @property
     def done(self) -> bool:
-        """Whether there is nothing left to do."""
+        """Whether the training has ended."""
         waited = sum(step > self.curve.best for step in self.curve.validation)
         return self.step >= self.settings.steps or waited >= self.settings.patience
 
@@ -190,7 +190,7 @@ class _Run:
             self.best = _copied(self.detector.state_dict())
 
     def progress(self) -> Progress:
-        """Return how far it is, with the loss."""
+        """Return the progress, with the loss."""
         what = "train"
         if self.curve.loss:
             what += f", loss {np.mean(self.curve.loss[-20:]):.2f}"
@@ -223,7 +223,7 @@ class _Run:
         )
 
     def restore(self, path: str | os.PathLike[str]) -> None:
-        """Go on where an earlier training was when it was stored."""
+        """Continue from a stored training."""
         state = load_state(path)
         earlier = state.get("training", {})
         same = (
@@ -254,7 +254,7 @@ class _Run:
 
     def _loss(self, batch: _Batch) -> Tensor:
         output = self.detector(batch.pillars, (len(batch.targets), batch.grid.rows, batch.grid.columns))
-        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, MARGIN)
+        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, LOSS_MARGIN)
         return torch.stack(list(parts.values())).sum()
 
 
@@ -324,7 +324,7 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
 def result_of_sample(detector: Detector, sample: TrainingSample) -> FrameResult:
     """Return what a detector finds in a sample, all of which counts, beside what is there."""
     found = detect(detector, sample.points[:, :3], sample.points[:, 3])
-    names = np.array([members[0] for members in GROUPS.values()], dtype=np.str_)
+    names = np.array([members[0] for members in CLASS_CATEGORIES.values()], dtype=np.str_)
     return FrameResult(
         run="",
         time=0.0,

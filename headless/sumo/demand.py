@@ -1,4 +1,4 @@
-"""Who drives and walks where and when, as a route file for SUMO."""
+"""Traffic demand, departures and routes of vehicles and pedestrians, as a route file for SUMO."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from seip_addon.core.storage.files import whole_file
 
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 
-_LONGEST_ROUTE = 40  # edges; in a network without ends a vehicle leaves after so many
-_LONGEST_WALK = 150.0  # metres in plan from one pavement to another
-_SHORTEST_PAVEMENT = 20.0  # metres; on a shorter one nobody sets out
-_DELIVERING = 0.35  # of the vans and trucks; they stop once on their way
-_STOP = (20.0, 60.0)  # seconds
-_BAY = 6.5  # metres of kerb for a parked car
-_OCCUPIED = 0.6  # of the bays in parking lanes
-_ROW = 3  # cars at the kerb of a street without parking lane
+_MAX_ROUTE_EDGES = 40  # edges; in a network without ends a vehicle leaves after so many
+_MAX_WALK = 150.0  # metres in plan from one pavement to another
+_MIN_PAVEMENT = 20.0  # metres; on a shorter one nobody sets out
+_DELIVERY_SHARE = 0.35  # of the vans and trucks; they stop once on their way
+_STOP_SECONDS = (20.0, 60.0)  # seconds
+_BAY_LENGTH = 6.5  # metres of kerb for a parked car
+_OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
+_CARS_AT_KERB = 3  # cars at the kerb of a street without parking lane
 _FIRST_BAY = 35.0  # metres from where the street begins
-_FOR_EVER = 1e6  # seconds
+_PARKING_SECONDS = 1e6  # seconds
 
 
 class RoadUserModel(NamedTuple):
@@ -77,13 +77,13 @@ MODELS = {
 }
 """Sizes of what drives and walks in European cities, riders included; after makers' data sheets, rounded."""
 
-MIX = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
+VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcycle": 0.07, "bicycle": 0.06}
 """Shares of the vehicles that come in on each arm."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """How much traffic there is.
+    """Traffic volumes by kind of road user.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Demand:
     pedestrians: float = 200.0
 
     def __post_init__(self) -> None:
-        """Refuse what no traffic can be."""
+        """Raise SeipError where a volume cannot be meant."""
         if not 0.0 < self.flow <= 3000.0:
             raise SeipError(f"--flow must be above 0 and at most 3000 vehicles per hour and arm, not {self.flow:g}")
         if not 0.0 <= self.pedestrians <= 3000.0:
@@ -112,7 +112,7 @@ class Demand:
 def write_routes(
     path: str | os.PathLike[str], network: StreetNetwork, demand: Demand, seed: int, duration: float
 ) -> None:
-    """Write who is on the road from 0 to ``duration`` seconds; the same for the same seed.
+    """Write the routes of all road users from 0 to ``duration`` seconds; the same for the same seed.
 
     Raises
     ------
@@ -182,9 +182,9 @@ def _departures(rate: float, random: np.random.Generator, duration: float) -> It
 def _vehicle(
     number: str, depart: float, route: list[NetworkEdge], free: set[str], random: np.random.Generator
 ) -> _Departure:
-    categories, shares = list(MIX), np.array(list(MIX.values()))
+    categories, shares = list(VEHICLE_SHARES), np.array(list(VEHICLE_SHARES.values()))
     category = str(random.choice(categories, p=shares / shares.sum()))
-    delivers = category in {"van", "truck"} and random.random() < _DELIVERING
+    delivers = category in {"van", "truck"} and random.random() < _DELIVERY_SHARE
     stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
     edges = " ".join(edge.id for edge in route)
     return _Departure(
@@ -200,7 +200,7 @@ def _route(
     """Return a way through the network that turns at random, by the shares of what each junction offers."""
     share = dict(zip("lsr", turns, strict=True))
     route = [arm]
-    while network.leads_on(route[-1]) and len(route) < _LONGEST_ROUTE:
+    while network.leads_on(route[-1]) and len(route) < _MAX_ROUTE_EDGES:
         ways = network.onward[route[-1].id]
         weights = np.array([share[way] for _, way in ways])
         if not weights.any():
@@ -217,7 +217,7 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
     edge = streets[int(random.integers(len(streets)))]
     lane = edge.of(DRIVING)[0]
     place = float(random.uniform(_FIRST_BAY, lane.length - _FIRST_BAY))
-    return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP):.0f}"/>'
+    return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP_SECONDS):.0f}"/>'
 
 
 def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[NetworkEdge, NetworkLane, float]]:
@@ -229,8 +229,8 @@ def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[Net
         (edge, lane, float(place))
         for edge in network.edges.values()
         for lane in edge.of(PARKING)
-        for place in np.arange(_BAY + 2.0, lane.length - 2.0, _BAY)
-        if random.random() < _OCCUPIED
+        for place in np.arange(_BAY_LENGTH + 2.0, lane.length - 2.0, _BAY_LENGTH)
+        if random.random() < _OCCUPIED_SHARE
     ]
     return bays or list(_rows(network, random))
 
@@ -241,7 +241,7 @@ def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.rando
         text = (
             f'<vehicle id="parked-{number}" type="parked_{_pick(models, random)}" depart="0" departLane="{lane.index}" '
             f'departPos="{place:.1f}" departSpeed="0"><route edges="{edge.id}"/>'
-            f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_FOR_EVER:.0f}"/></vehicle>'
+            f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
         )
         yield _Departure(0.0, text)
 
@@ -250,15 +250,15 @@ def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
     for index in sorted(random.permutation(len(exits))[: (len(exits) + 1) // 2].tolist()):
         lane = exits[index].of(DRIVING)[0]
-        first = _FIRST_BAY + float(random.uniform(0.0, _BAY))
-        for place in first + _BAY * np.arange(_ROW):
-            if place < lane.length - _BAY:
+        first = _FIRST_BAY + float(random.uniform(0.0, _BAY_LENGTH))
+        for place in first + _BAY_LENGTH * np.arange(_CARS_AT_KERB):
+            if place < lane.length - _BAY_LENGTH:
                 yield exits[index], lane, float(place)
 
 
 def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, duration: float) -> Iterator[_Departure]:
     pavements = [
-        (edge, lane) for edge in network.edges.values() for lane in edge.of(WALKING) if lane.length > _SHORTEST_PAVEMENT
+        (edge, lane) for edge in network.edges.values() for lane in edge.of(WALKING) if lane.length > _MIN_PAVEMENT
     ]
     if len(pavements) < 2:
         return
@@ -266,7 +266,7 @@ def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, d
     middle = np.array([lane.line.mean(axis=0) for _, lane in pavements])
     for number, depart in enumerate(_departures(rate, random, duration)):
         start = int(random.choice(len(pavements), p=length / length.sum()))
-        within = np.hypot(*(middle - middle[start]).T) < _LONGEST_WALK
+        within = np.hypot(*(middle - middle[start]).T) < _MAX_WALK
         within[start] = False
         if not within.any():
             continue

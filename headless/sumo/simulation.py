@@ -25,17 +25,17 @@ from seip_addon.core.traffic.source import TrafficFiles
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
-STEP = 0.1
+STEP_SECONDS = 0.1
 """Seconds between two steps of the simulation."""
 
-SAMPLING = 0.2
+SAMPLING_SECONDS = 0.2
 """Seconds between two samples of the trajectories."""
 
-_LANE_CHANGE = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
-_REACH = 60.0  # metres: a crosswalk further from any traffic light belongs to none
-_BESIDE = 6.0  # metres that pavements reach beyond the ends of a crosswalk
+_LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
+_MAX_SIGNAL_DISTANCE = 60.0  # metres: a crosswalk further from any traffic light belongs to none
+_PAVEMENT_REACH = 6.0  # metres that pavements reach beyond the ends of a crosswalk
 
-_ALLOWED = {
+_PERMISSIONS = {
     "driving": 'disallow="pedestrian"',
     "sidewalk": 'allow="pedestrian"',
     "biking": 'allow="bicycle"',
@@ -43,7 +43,7 @@ _ALLOWED = {
 }
 """Who may use which type of lane; nobody the others."""
 
-_CLOSED = ("shoulder", "restricted", "median", "stop", "none", "border")
+_CLOSED_LANES = ("shoulder", "restricted", "median", "stop", "none", "border")
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ class SignalPlan:
     all_red: int = 2
 
     def __post_init__(self) -> None:
-        """Refuse a plan that never turns."""
+        """Raise SeipError where a duration cannot be meant."""
         if min(self.green, self.amber) < 1 or self.all_red < 0:
             raise SeipError("a signal plan needs green and amber of at least 1 s, and no negative times")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """What to simulate.
+    """Seed, duration, demand and signals of a simulation.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Scenario:
     duration: float
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Raise SeipError where the scenario cannot be simulated."""
         if not 0 <= self.seed < 2**31:
             raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
         if not 0.0 < self.duration <= 86400.0:
@@ -144,9 +144,9 @@ def simulate(
         programs.sumo,
         [
             *("--net-file", network, "--route-files", routes, "--fcd-output", recorded),
-            *("--seed", scenario.seed, "--end", scenario.duration, "--step-length", STEP, "--precision", 3),
-            *("--device.fcd.period", SAMPLING, "--person-device.fcd.period", SAMPLING),
-            *("--lanechange.duration", _LANE_CHANGE, "--time-to-teleport", -1),
+            *("--seed", scenario.seed, "--end", scenario.duration, "--step-length", STEP_SECONDS, "--precision", 3),
+            *("--device.fcd.period", SAMPLING_SECONDS, "--person-device.fcd.period", SAMPLING_SECONDS),
+            *("--lanechange.duration", _LANE_CHANGE_SECONDS, "--time-to-teleport", -1),
             *("--collision.action", "warn", "--collision.check-junctions", "true", "--ignore-route-errors", "true"),
             *("--no-step-log", "true", "--no-warnings", "true", "--xml-validation", "never"),
         ],
@@ -165,7 +165,7 @@ def _network(
     """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
     road_map = read_map(map_path)
     types, plain, nodes = (network.with_name(name) for name in ("lanes.typ.xml", "plain.net.xml", "shapes.nod.xml"))
-    allowed = _ALLOWED | dict.fromkeys(_CLOSED, 'disallow="all"')
+    allowed = _PERMISSIONS | dict.fromkeys(_CLOSED_LANES, 'disallow="all"')
     _write(types, "types", [f'<type id="{lane}" speed="13.89" {who}/>' for lane, who in allowed.items()])
     common: list[object] = [
         *("--offset.disable-normalization", "true", "--no-turnarounds", "true", "--xml-validation", "never"),
@@ -198,7 +198,7 @@ def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Flo
     corners: dict[str, list[Float]] = {}
     for crosswalk in _crosswalks(road_map):
         distance = np.hypot(*(places - crosswalk.mean(axis=0)).T)
-        if distance.min() < _REACH:
+        if distance.min() < _MAX_SIGNAL_DISTANCE:
             corners.setdefault(nodes[int(distance.argmin())], []).append(crosswalk)
     hulls = {node: shapely.MultiPoint(np.concatenate(parts)).convex_hull for node, parts in corners.items()}
     return {node: shapely.get_coordinates(hull)[:-1] for node, hull in hulls.items()}
@@ -213,7 +213,7 @@ def _crosswalks(road_map: RoadMap) -> list[Float]:
                 s, t = np.array([item.s]), np.array([item.t])
                 heading = float(road.frame(s).heading[0]) + item.heading
                 ahead = np.array([np.cos(heading), np.sin(heading)]) * item.length / 2.0
-                aside = np.array([-np.sin(heading), np.cos(heading)]) * (item.width / 2.0 + _BESIDE)
+                aside = np.array([-np.sin(heading), np.cos(heading)]) * (item.width / 2.0 + _PAVEMENT_REACH)
                 signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
                 outlines.append(road.place(s, t)[0, :2] + signs @ np.stack([ahead, aside]))
     return outlines

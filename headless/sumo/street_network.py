@@ -12,7 +12,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.traffic.sumo_files import Attributes, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"
-"""What a lane is for."""
+"""Uses of lanes."""
 
 PARKED_CLASS = "custom1"
 """The vClass that alone may stand in a parking lane."""

@@ -1,6 +1,6 @@
 """`SeipError`, the exception for mistakes that a user can correct."""
 
-_LONGEST = 1000
+_MAX_LENGTH = 1000
 
 
 class SeipError(Exception):
@@ -13,5 +13,5 @@ class SeipError(Exception):
     """
 
     def __init__(self, sentence: str) -> None:
-        half = _LONGEST // 2
-        super().__init__(sentence if len(sentence) <= _LONGEST else f"{sentence[:half]} … {sentence[-half:]}")
+        half = _MAX_LENGTH // 2
+        super().__init__(sentence if len(sentence) <= _MAX_LENGTH else f"{sentence[:half]} … {sentence[-half:]}")

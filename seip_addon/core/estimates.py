@@ -14,16 +14,16 @@ from .errors import SeipError
 Interval = tuple[float, float]
 """Least and largest value that a 95 % interval holds."""
 
-TAIL = 0.025
+TAIL_PROBABILITY = 0.025
 """Share of probability on either side of an interval."""
 
-NORMAL = 1.959963984540054
+NORMAL_QUANTILE = 1.959963984540054
 """Value that a standard normal variable exceeds with a probability of 2.5 %."""
 
 RESAMPLES = 2000
 """Of a bootstrap."""
 
-FEWEST_STRETCHES = 4
+MIN_BATCHES = 4
 """Of fewer the spread of a mean is not known well enough for an interval."""
 
 
@@ -68,12 +68,12 @@ def mean_of(values: Float) -> IntervalEstimate:
     mean = math.fsum(values) / len(values)
     if len(values) < 2:
         return IntervalEstimate(mean, -math.inf, math.inf)
-    reach = NORMAL * float(values.std(ddof=1)) / math.sqrt(len(values))
+    reach = NORMAL_QUANTILE * float(values.std(ddof=1)) / math.sqrt(len(values))
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
-def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
-    """Estimate a mean of values that depend on each other when they are near in time, by means of stretches.
+def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
+    """Estimate the mean of a time series from the means of its batches, since neighbouring values are dependent.
 
     Stretches are taken as independent and as equally long (batch means; Law 2015,
     section 9.5.3), and Student's interval is that of their means.
@@ -81,14 +81,14 @@ def mean_over_time(values: Float, stretch: Integer) -> IntervalEstimate:
     Parameters
     ----------
     values : (n,) float64
-    stretch : (n,) int64
-        In which stretch of time each was taken.
+    batch : (n,) int64
+        In which batch of time each was taken.
     """
-    _, which = np.unique(stretch, return_inverse=True)
+    _, which = np.unique(batch, return_inverse=True)
     many = np.bincount(which)
     means = np.bincount(which, values) / many
     mean, number = math.fsum(values) / len(values), len(many)
-    if number < FEWEST_STRETCHES:
+    if number < MIN_BATCHES:
         return IntervalEstimate(mean, -math.inf, math.inf)
     reach = student_reach(means)
     return IntervalEstimate(mean, mean - reach, mean + reach)
@@ -131,7 +131,7 @@ def student_quantile(freedom: int) -> float:
     low, high = 1.0, 13.0  # between the normal quantile, 1.96, and that of one degree, 12.706
     for _ in range(60):
         middle = (low + high) / 2
-        low, high = (middle, high) if _student_tail(middle, freedom) > TAIL else (low, middle)
+        low, high = (middle, high) if _student_tail(middle, freedom) > TAIL_PROBABILITY else (low, middle)
     return (low + high) / 2
 
 
@@ -150,7 +150,7 @@ def _student_tail(value: float, freedom: int) -> float:
 
 def percentiles(values: Float) -> Interval:
     """Return the interval that leaves 2.5 % of the values on either side; NaN does not count."""
-    low, high = np.nanquantile(values, (TAIL, 1 - TAIL))
+    low, high = np.nanquantile(values, (TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))
     return float(low), float(high)
 
 
@@ -204,8 +204,8 @@ def quantile_of(values: Float, share: float) -> IntervalEstimate:
     """
     ordered, number = np.sort(values), len(values)
     below = _binomial_distribution(number, share)
-    first = int(np.searchsorted(below, TAIL, side="right"))  # P(B < first) <= TAIL
-    last = int(np.searchsorted(below, 1 - TAIL))  # P(B > last) <= TAIL
+    first = int(np.searchsorted(below, TAIL_PROBABILITY, side="right"))  # P(B < first) <= TAIL_PROBABILITY
+    last = int(np.searchsorted(below, 1 - TAIL_PROBABILITY))  # P(B > last) <= TAIL_PROBABILITY
     return IntervalEstimate(
         value=float(ordered[math.ceil(share * number) - 1]),
         low=float(ordered[first - 1]) if first > 0 else -math.inf,

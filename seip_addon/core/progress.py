@@ -16,7 +16,7 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
-PAUSE = 0.1
+REPORT_INTERVAL = 0.1
 """Seconds between the reports of work in a thread."""
 
 
@@ -88,7 +88,7 @@ def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator
     thread.start()
     try:
         while thread.is_alive():
-            thread.join(PAUSE)
+            thread.join(REPORT_INTERVAL)
             yield Progress(0, 0, what)
         return result.result()
     finally:
@@ -133,7 +133,7 @@ def side_by_side(
     futures = [pool.submit(run, number) for number in range(len(works))]
     try:
         while any(not future.done() for future in futures):
-            for ended in wait(futures, PAUSE, FIRST_EXCEPTION).done:
+            for ended in wait(futures, REPORT_INTERVAL, FIRST_EXCEPTION).done:
                 ended.result()  # raises here what went wrong there
             yield _sum_of(list(latest.values()), len(works))
         return [future.result() for future in futures]
@@ -143,7 +143,7 @@ def side_by_side(
 
 
 class _Stopped(BaseException):
-    """Nobody waits for this work any more."""
+    """Raised in a worker thread whose result is no longer wanted."""
 
 
 def _sum_of(parts: Sequence[Progress], works: int) -> Progress:

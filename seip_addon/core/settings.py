@@ -1,4 +1,4 @@
-"""Fields of settings that carry what commands and panel say of them."""
+"""Settings with help, unit and limits, from which commands and panel make their options."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _KEY = "setting"
 
 @dataclass(frozen=True)
 class Setting:
-    """What a user is told of a setting.
+    """Help, unit and limits of a setting, for commands and panel.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ def _placed(
     if robustness is None:
         plan = yield from place(known.layout, grid, goal, pose_errors=pose_errors)
     else:
-        plan = (yield from place_robustly(known.layout, grid, goal, robustness)).plan
+        plan = (yield from place_robustly(known.layout, grid, goal, robustness)).solution
     return replace(known, plan=plan, durations=known.timed("placement", began))
 
 
@@ -93,7 +93,7 @@ def _placed_in_traffic(
     known, grid = yield from scene_survey.with_visibility(known)
     began = time.perf_counter()
     placed = yield from place_in_traffic(known.layout, grid, goal, runs, settings)
-    return replace(known, plan=placed.plan, durations=known.timed("placement", began))
+    return replace(known, plan=placed.solution, durations=known.timed("placement", began))
 
 
 def _read_runs(folder: Path, layout: Layout) -> Generator[Progress, None, TrafficRuns]:

@@ -139,7 +139,7 @@ def _ranked(
     known = yield from finding
     plan, grid = _plan_and_grid(known)
     site, visible = known.layout.site, grid.visible
-    weight = target_weights(site, plan.goal)
+    weight = target_weights(site, plan.objective)
     if order == "ALONE":
         return known, rank_alone(visible, weight, MOST_RANKED)
     free = ~np.isin(site.candidates.position_of, site.candidates.position_of[plan.placement.chosen])

@@ -15,7 +15,7 @@ from ..core.placement.objective import target_weights
 from ..core.progress import Progress, finish
 from ..core.results.placement_record import parsed_record, versions
 from ..core.robustness.traffic_instants import check_runs, spread_instants
-from ..core.robustness.traffic_study import IN_TRAFFIC, tried_in_traffic
+from ..core.robustness.traffic_study import IN_TRAFFIC, traffic_message
 from ..core.scans import MountedSensor
 from ..core.scans.run_folder import Record, Run, check_run_folder
 from ..core.site.scene_geometry import SceneGeometry
@@ -175,8 +175,8 @@ def _tried(
     layout, chosen = known.layout, known.plan.placement.chosen
     check_runs([traffic], layout.site.region)
     instants = spread_instants([traffic], INSTANTS, seed=0)
-    weight = target_weights(layout.site, known.plan.goal)
-    sentence = yield from tried_in_traffic(surroundings(layout), chosen, weight, instants)
+    weight = target_weights(layout.site, known.plan.objective)
+    sentence = yield from traffic_message(surroundings(layout), chosen, weight, instants)
     return known, sentence
 
 

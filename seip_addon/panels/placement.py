@@ -18,7 +18,7 @@ from .sidebar import RowList, Sidebar, settings_column
 from .wrapped_text import draw_sentence
 
 _ERRING = ("position_error", "tilt_error", "seen_by", "failure")
-_IN_TRAFFIC = ("layer", "weights_from_traffic", "instants", "judged_at")
+_IN_TRAFFIC = ("layer", "weights_from_traffic", "instants", "evaluation_instants")
 
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):

@@ -11,10 +11,10 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 from .. import selection
 from ..core.errors import SeipError
 from ..core.placement.objective import DEFAULT_COUNT, Objective
-from ..core.robustness.pose_errors import STEEPEST, PoseErrors
+from ..core.robustness.pose_errors import MAX_ANGLE_STD, PoseErrors
 from ..core.robustness.risk import Risk
 from ..core.robustness.robust_study import RobustnessSettings
-from ..core.robustness.traffic_study import WHAT
+from ..core.robustness.traffic_study import LAYER_NAMES
 from ..core.workflows.traffic import TrafficSettings, traffic_folder
 from .conversion import absolute, as_typed, of_setting
 
@@ -81,7 +81,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         ),
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
-    tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=STEEPEST)
+    tilt_error: of_setting(PoseErrors, "tilt", "Tilt Error", min=0.0, max=MAX_ANGLE_STD)
     seen_by: of_setting(Risk, "seen_by", "Seen by", max=8)
     failure: EnumProperty(
         name="Sensor Failure",
@@ -104,13 +104,13 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         "layer",
         "See",
         items=(
-            ("road", "Road", f"The {WHAT['road']}"),
-            ("height", "Vehicles' Height", f"The {WHAT['height']}"),
+            ("road", "Road", f"The {LAYER_NAMES['road']}"),
+            ("height", "Vehicles' Height", f"The {LAYER_NAMES['height']}"),
         ),
     )
     weights_from_traffic: of_setting(TrafficSettings, "weights_from_traffic", "Weights from Traffic")
     instants: of_setting(TrafficSettings, "instants", "Instants")
-    judged_at: of_setting(TrafficSettings, "judged_at", "Evaluation Instants")
+    evaluation_instants: of_setting(TrafficSettings, "evaluation_instants", "Evaluation Instants")
     pose_errors: BoolProperty(
         name="Test Pose Errors",
         description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",
@@ -160,7 +160,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         """Return how the placement is chosen on traffic, None where it is not."""
         if self.objective != "TRAFFIC":
             return None
-        return TrafficSettings(self.layer, self.weights_from_traffic, self.instants, self.judged_at)
+        return TrafficSettings(self.layer, self.weights_from_traffic, self.instants, self.evaluation_instants)
 
     def runs_folder(self) -> Path:
         """Return the folder with the runs of traffic.

@@ -7,7 +7,7 @@ import math
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..core.site.candidates import HIGHEST, CandidateSettings, heights_of, tilts_of
+from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
 from ..core.visibility.settings import VisibilitySettings
 from ..core.workflows.survey import SurveySettings
 from ..preferences import catalogue_files
@@ -34,7 +34,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         unit="LENGTH",
         default=5.4,
         min=0.1,
-        max=HIGHEST,
+        max=MAX_SENSOR_HEIGHT,
         soft_max=20.0,
         step=10,
     )

@@ -24,7 +24,7 @@ from ..core.errors import SeipError
 from ..core.pictures.labelled_view import Sight, save_labelled_view
 from ..core.pictures.viewpoint import Viewpoint, frame
 from ..core.placement.deployment import Deployment
-from ..core.progress import PAUSE, Progress
+from ..core.progress import REPORT_INTERVAL, Progress
 from ..core.site.site import Site
 from . import contract
 from .daylight import add_daylight
@@ -156,7 +156,7 @@ def _waited_for(command: list[str], log: Path) -> Generator[Progress, None, None
         while process.poll() is None:
             told = SAMPLE.findall(log.read_bytes())
             yield Progress(int(told[-1]) if told else 0, SAMPLES, "rendering")
-            time.sleep(PAUSE)
+            time.sleep(REPORT_INTERVAL)
     finally:
         process.kill()
         process.wait()

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..core.pictures.cloud_colours import STANDING, By, cloud_colours, sensor_colour, strength_ramp
-from ..core.pictures.palette import STRONGEST, rgb
+from ..core.pictures.cloud_colours import STATIC_COLOUR, By, cloud_colours, sensor_colour, strength_ramp
+from ..core.pictures.palette import MAX_INTENSITY, rgb
 from ..core.scans import Frame, MountedSensor
 from ..overlay import Block, Colour, Entry, Layer, Overlay
 
@@ -36,9 +36,9 @@ def _entries(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> tuple[En
         )
     if by == "intensity":
         ramp = tuple(_opaque(colour) for colour in strength_ramp(np.linspace(0.0, 1.0, RAMP_STEPS)).tolist())
-        return (Entry(f"intensity 0 to {STRONGEST:g} and more", ramp),)
+        return (Entry(f"intensity 0 to {MAX_INTENSITY:g} and more", ramp),)
     users = tuple(_opaque(colour) for colour in ((1.0, 0.4, 0.4), (0.4, 1.0, 0.6), (0.4, 0.6, 1.0)))
-    return (Entry("one colour for each road user", users), Entry("standing still", (_opaque(rgb(STANDING)),)))
+    return (Entry("one colour for each road user", users), Entry("standing still", (_opaque(rgb(STATIC_COLOUR)),)))
 
 
 def _opaque(colour: Sequence[float]) -> Colour:

@@ -30,7 +30,7 @@ def coarse(junction):
     survey.heights, survey.grid, survey.spacing, survey.delta = "5.4", 8.0, 25.0, 6.0
     for one in survey.types:
         one.use = one.name == "vlp16"
-    goal.objective, goal.instants, goal.judged_at = "TRAFFIC", 2, 8
+    goal.objective, goal.instants, goal.evaluation_instants = "TRAFFIC", 2, 8
     return junction
 
 
@@ -58,7 +58,7 @@ def test_the_panel_shows_what_the_objective_asks_for(coarse):
     SEIP_PT_placement_precaution.draw(SimpleNamespace(layout=layout), bpy.context)
     column = layout.column.return_value
     names = [call.args[1] for call in column.prop.call_args_list]
-    assert names == ["objective", "runs", "layer", "weights_from_traffic", "instants", "judged_at"]
+    assert names == ["objective", "runs", "layer", "weights_from_traffic", "instants", "evaluation_instants"]
     assert all(hasattr(coarse.seip.goal, name) for name in names)
     assert column.prop.call_args_list[1].kwargs == {"placeholder": "small_traffic"}
     said = " ".join(call.kwargs["text"] for call in column.column.return_value.label.call_args_list)

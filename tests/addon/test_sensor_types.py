@@ -13,7 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import orientation
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.visibility.ray_casting import MOST_THREADS
+from seip_addon.core.visibility.ray_casting import MAX_THREADS
 from seip_addon.core.visibility.ring_resolution import unresolved_from
 from seip_addon.session import session
 from seip_addon.viewport import beam_preview
@@ -214,7 +214,7 @@ def test_cores_are_those_that_the_user_allows(own):
     own.cores = 1
     assert preferences.cores() == 1
     own.cores = 1000
-    assert preferences.cores() == MOST_THREADS
+    assert preferences.cores() == MAX_THREADS
 
 
 def test_tilts_are_degrees_in_the_panel_and_radians_inside(survey):

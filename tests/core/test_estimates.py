@@ -2,7 +2,7 @@
 
 import math
 
-from headless.claims import judge_above, judge_all, judge_within
+from headless.claims import verdict_above, verdict_within, worst_verdict
 
 import numpy as np
 import pytest
@@ -76,15 +76,15 @@ def test_too_few_pairs_give_no_interval():
 
 
 def test_verdicts():
-    assert judge_above((0.01, 0.2)) == "holds"
-    assert judge_above((-0.2, 0.0)) == "does not hold"
-    assert judge_above((-0.01, 0.2)) == "undecided"
-    assert judge_above((0.4, 0.6), 0.5) == "undecided"
-    assert judge_within((0.1, 0.2), 0.1, 0.4) == "holds"
-    assert judge_within((0.05, 0.2), 0.1, 0.4) == "undecided"
-    assert judge_within((0.0, 0.09), 0.1, 0.4) == "does not hold"
-    assert judge_within((0.41, 0.5), 0.1, 0.4) == "does not hold"
-    assert judge_within((0.0, 0.9), 0.1, 0.4) == "undecided"
-    assert judge_all(["holds", "undecided", "holds"]) == "undecided"
-    assert judge_all(["undecided", "does not hold"]) == "does not hold"
-    assert judge_all(["holds"]) == "holds"
+    assert verdict_above((0.01, 0.2)) == "holds"
+    assert verdict_above((-0.2, 0.0)) == "does not hold"
+    assert verdict_above((-0.01, 0.2)) == "undecided"
+    assert verdict_above((0.4, 0.6), 0.5) == "undecided"
+    assert verdict_within((0.1, 0.2), 0.1, 0.4) == "holds"
+    assert verdict_within((0.05, 0.2), 0.1, 0.4) == "undecided"
+    assert verdict_within((0.0, 0.09), 0.1, 0.4) == "does not hold"
+    assert verdict_within((0.41, 0.5), 0.1, 0.4) == "does not hold"
+    assert verdict_within((0.0, 0.9), 0.1, 0.4) == "undecided"
+    assert worst_verdict(["holds", "undecided", "holds"]) == "undecided"
+    assert worst_verdict(["undecided", "does not hold"]) == "does not hold"
+    assert worst_verdict(["holds"]) == "holds"

@@ -7,7 +7,7 @@ import numpy as np
 
 from seip_addon.core.datasets import FORMATS, SensorPose, TrafficRun, write_dataset
 from seip_addon.core.progress import finish
-from seip_addon.core.scans.frame import STATIC, Frame, Labels
+from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
 from seip_addon.core.traffic.trajectories import CATEGORIES
 
 ORIGIN = np.array([389_123.456, 5_712_345.678, 87.25])
@@ -61,7 +61,7 @@ def make_frame(seed=0, users=7, static=50, sensors=2, time=0.0, pitch=0.0, outsi
     points = np.concatenate([on_users, random.uniform(-80, 80, (static, 3))]).astype(np.float32)
     number = random.integers(0, sensors, len(points)).astype(np.int16)
     order = np.argsort(number, kind="stable")
-    owner = np.concatenate([instance, np.full(static, STATIC)]).astype(np.int32)
+    owner = np.concatenate([instance, np.full(static, STATIC_INSTANCE)]).astype(np.int32)
     returns = np.zeros((users, sensors), dtype=np.int64)
     np.add.at(returns, (instance, number[: len(instance)]), 1)
     labels = Labels(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seip_addon.core.scans.frame import STATIC, Frame, Labels
+from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
 
 SIZES = {"car": (4.4, 1.8, 1.5), "truck": (9.0, 2.5, 3.4), "bicycle": (1.8, 0.6, 1.7), "pedestrian": (0.5, 0.6, 1.75)}
 SENSORS = np.array([[16.0, 16.0, 5.0], [-16.0, -16.0, 5.0]])
@@ -13,7 +13,7 @@ def street_frame(seed, *, half=16.0, users=6, rays=6000, time=0.0, kinds=tuple(S
     random = np.random.default_rng(seed)
     boxes, names = _parked(random, half, users, kinds)
     clouds = [_ground(random, half, rays)]
-    instances = [np.full(len(clouds[0]), STATIC)]
+    instances = [np.full(len(clouds[0]), STATIC_INSTANCE)]
     for number, box in enumerate(boxes):
         cloud = _surface(random, box, rays)
         clouds.append(cloud)

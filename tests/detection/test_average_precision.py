@@ -18,7 +18,7 @@ from headless.detection.average_precision import (
     precision_recall,
 )
 from headless.detection.kitti_precision import kitti
-from headless.detection.matching import NOBODY, VEHICLES, Rule, match
+from headless.detection.matching import NO_MATCH, VEHICLES, Rule, match
 
 from seip_addon.core.errors import SeipError
 
@@ -80,7 +80,7 @@ def test_a_car_is_found_once():
     told = frame(truth([box(0)]), detected([box(0.1), box(0)], [0.9, 0.8]))
     found = match(told, AT_07)
     assert found.hit.tolist() == [True, False]
-    assert found.judged.tolist() == [True, True]
+    assert found.evaluated.tolist() == [True, True]
     assert found.found_by.tolist() == [0]
     assert average_precision([told]) == 1
 
@@ -120,14 +120,14 @@ def test_who_does_not_count_neither_helps_nor_harms():
     for rows in ([0], [0, 1], [0, 1, 2, 3]):
         told = frame(there, detected([boxes[row] for row in rows], np.linspace(0.5, 0.9, len(rows))))
         assert average_precision([told], rule) == 1
-        assert match(told, rule).judged.tolist() == [True] + [False] * (len(rows) - 1)
+        assert match(told, rule).evaluated.tolist() == [True] + [False] * (len(rows) - 1)
     assert len(evaluate([frame(there, detected([], []))], AT_07).wanted) == 2  # the car without returns counts here
 
 
 def test_false_detections_outside_the_region_do_not_count_but_hits_do():
     """The region ends at x = 0: a car just inside, found just outside, is found; what else lies outside is let be."""
     told = frame(truth([box(0)]), detected([box(0.1), box(FAR)], [0.8, 0.9], inside=False))
-    assert match(told, AT_07).judged.tolist() == [True, False]
+    assert match(told, AT_07).evaluated.tolist() == [True, False]
     assert average_precision([told]) == 1
 
 
@@ -152,7 +152,7 @@ def test_frames_without_vehicles_or_detections():
     nothing = frame(truth([]), detected([], []))
     false = frame(truth([]), detected([box(0)], [0.9]))
     missed = frame(truth([box(0)]), detected([], []))
-    assert match(missed, AT_07).found_by.tolist() == [NOBODY]
+    assert match(missed, AT_07).found_by.tolist() == [NO_MATCH]
     assert average_precision([nothing, missed]) == 0
     assert average_precision([false, frame(truth([box(0)]), detected([box(0)], [0.5]))]) == 0.5
     assert balanced_score(evaluate([missed], AT_07)) == 0

@@ -9,7 +9,7 @@ pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import evaluate
 from headless.detection.breakdown import (
-    ALONG_DISTANCE,
+    DISTANCE_EDGES,
     average_precision_by,
     false_by,
     false_positives,
@@ -58,7 +58,7 @@ def test_average_precision_by_returns():
 
 def test_the_parts_hold_everything():
     evaluation = evaluate(traffic(1), AT_07)
-    bins = average_precision_by(evaluation, "distance", ALONG_DISTANCE)
+    bins = average_precision_by(evaluation, "distance", DISTANCE_EDGES)
     assert sum(one.wanted for one in bins) == len(evaluation.wanted)
     whole = average_precision_by(evaluation, "distance", (0, math.inf))
     assert whole[0].value == evaluation.average_precision

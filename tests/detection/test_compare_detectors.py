@@ -15,9 +15,9 @@ COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "
 
 
 def test_each_setting_gets_its_price_and_its_precision(small_scene, tmp_path, monkeypatch):
-    default = compare_detectors.DEFAULT
+    default = compare_detectors.DEFAULT_NETWORK
     small = {("default", "default"): default, ("pillars", "0.5 m"): replace(default, pillar=0.5)}
-    monkeypatch.setattr(compare_detectors, "SETTINGS", small)
+    monkeypatch.setattr(compare_detectors, "NETWORKS", small)
     compare_detectors.main([str(small_scene), "-o", str(tmp_path), *COARSE])
     first, second = json.loads((tmp_path / "settings.json").read_text(encoding="utf-8"))
     assert (first["name"], first["default"], second["name"], second["default"]) == ("default", True, "0.5 m", False)
@@ -29,5 +29,5 @@ def test_each_setting_gets_its_price_and_its_precision(small_scene, tmp_path, mo
 
 
 def test_the_settings_hold_the_default_and_the_published():
-    assert list(compare_detectors.SETTINGS.values()).count(compare_detectors.DEFAULT) == 1
-    assert compare_detectors.PUBLISHED in compare_detectors.SETTINGS.values()
+    assert list(compare_detectors.NETWORKS.values()).count(compare_detectors.DEFAULT_NETWORK) == 1
+    assert compare_detectors.PUBLISHED in compare_detectors.NETWORKS.values()

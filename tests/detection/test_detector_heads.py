@@ -3,7 +3,7 @@
 import math
 
 from headless.detection import anchor_head, centre_head
-from headless.detection.anchor_head import NOTHING, SIZES, UNCLEAR, AnchorHead, anchor_boxes, assignment
+from headless.detection.anchor_head import ANCHOR_SIZES, BACKGROUND, IGNORED, AnchorHead, anchor_boxes, assignment
 from headless.detection.centre_head import CentreHead
 from headless.detection.heads import TrainingTargets
 from headless.detection.losses import focal_loss, heat_map_loss
@@ -34,7 +34,7 @@ def random_targets(seed, count=4):
     rows = []
     for _ in range(count):
         category = int(random.integers(4))
-        size = SIZES[[s.category for s in SIZES].index(CLASSES[category])]
+        size = ANCHOR_SIZES[[s.category for s in ANCHOR_SIZES].index(CLASSES[category])]
         shape = np.array([size.length, size.width, size.height]) * random.uniform(0.8, 1.25, 3)
         place = random.uniform([-7.5, -6.0], [7.5, 6.0])
         rows.append((category, *place, shape[2] / 2, *shape, random.uniform(-math.pi, math.pi)))
@@ -56,10 +56,10 @@ def plain_iou(a, b):
 def test_anchors_are_assigned_as_a_slow_loop_does(seed):  # noqa: C901  # a loop for each thing to choose among
     wanted = random_targets(seed)
     got = assignment(wanted, GRID)
-    expected = torch.full_like(got, NOTHING)
+    expected = torch.full_like(got, BACKGROUND)
     best = dict.fromkeys(range(len(wanted.boxes)), (0.0, None))
-    for anchor in range(2 * len(SIZES)):
-        size = SIZES[anchor // 2]
+    for anchor in range(2 * len(ANCHOR_SIZES)):
+        size = ANCHOR_SIZES[anchor // 2]
         sides = (size.length, size.width) if anchor % 2 == 0 else (size.width, size.length)
         for row in range(16):
             for column in range(20):
@@ -77,7 +77,7 @@ def test_anchors_are_assigned_as_a_slow_loop_does(seed):  # noqa: C901  # a loop
                 if most >= size.positive:
                     expected[anchor, row, column] = owner
                 elif most >= size.negative:
-                    expected[anchor, row, column] = UNCLEAR
+                    expected[anchor, row, column] = IGNORED
     for box, (_, place) in best.items():
         if place is not None:
             expected[place] = box
@@ -90,15 +90,15 @@ def test_anchors_are_assigned_as_a_slow_loop_does(seed):  # noqa: C901  # a loop
 def test_no_anchor_is_held_against_a_road_user_that_nobody_saw():
     hidden = targets((CAR, 0.4, 0.0, 0.8, 4.5, 1.8, 1.6, 0.0), learnt=[False])
     got = assignment(hidden, GRID)
-    assert (got != NOTHING).any()
-    assert (got[got != NOTHING] == UNCLEAR).all()
+    assert (got != BACKGROUND).any()
+    assert (got[got != BACKGROUND] == IGNORED).all()
 
 
 @given(st.integers(0, 10_000))
 def test_anchors_become_the_boxes_they_are_told_to(seed):
     random = np.random.default_rng(seed)
     count = 5
-    places = [torch.from_numpy(random.integers(0, top, count)) for top in (2 * len(SIZES), 16, 20)]
+    places = [torch.from_numpy(random.integers(0, top, count)) for top in (2 * len(ANCHOR_SIZES), 16, 20)]
     anchors = anchor_boxes(GRID, *places)
     boxes = anchors.clone()
     boxes[:, :3] += torch.from_numpy(random.uniform(-2, 2, (count, 3)).astype(np.float32))

@@ -7,9 +7,9 @@ from headless.detection.detector import Detector, keeping_at_most
 from headless.detection.pillars import grid_over
 from headless.detection.settings import NetworkSettings
 from headless.lab.detector.disturbances import (
-    DIAGONAL,
     DROP_INTENSITY,
-    NEAR,
+    DROP_RANGE,
+    ERROR_AXIS,
     CappedPillars,
     ClockOffset,
     Disturbance,
@@ -38,11 +38,11 @@ TIME = 1.0
 
 def frame_under(disturbance, *, time=TIME):
     static, trajectories = road()
-    hung, driving = disturbance.hung(sensors()), disturbance.on_the_road(trajectories)
+    hung, driving = disturbance.disturbed_sensors(sensors()), disturbance.disturbed_traffic(trajectories)
     bodies = [fitted_body(user) for user in driving.users]
     simulation = finish(prepare(static, hung, driving, bodies, ScanSettings(seed=3)))
-    taken = disturbance.taken(simulation, 7, time)
-    return disturbance.shown(taken, hung, np.random.default_rng([3, 7]))
+    taken = disturbance.disturbed_scan(simulation, 7, time)
+    return disturbance.disturbed_frame(taken, hung, np.random.default_rng([3, 7]))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_size_0_changes_nothing_bit_for_bit(kind, plain):
 
 def test_no_cap_leaves_the_detector_alone():
     detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4))
-    assert CappedPillars(0.0).looked_at(detector) is detector
+    assert CappedPillars(0.0).disturbed_detector(detector) is detector
 
 
 def test_noise_has_the_spread_that_is_asked_for():
@@ -92,7 +92,7 @@ def test_a_larger_loss_takes_what_a_smaller_one_takes():
 
 
 def test_rain_takes_light_range_and_returns():
-    clear, wet = sensors()[0].model, Rain(20.0).hung(sensors())[0].model
+    clear, wet = sensors()[0].model, Rain(20.0).disturbed_sensors(sensors())[0].model
     assert wet.attenuation == pytest.approx(clear.attenuation + 0.04)
     # As strong as from 100 m in clear air: exp(-0.04 r) / r^2 = 1 / 100^2.
     assert math.exp(-0.04 * wet.max_range) / wet.max_range**2 == pytest.approx(1e-4, rel=1e-9)
@@ -106,9 +106,9 @@ def test_rain_puts_drops_near_the_sensor_and_takes_more_from_afar(plain):
     places = np.array([sensor.xyz for sensor in sensors()])
     far = [np.linalg.norm(frame.points - places[frame.sensor], axis=1) for frame in (plain, wet)]
     drops = wet.intensity == np.float32(DROP_INTENSITY)
-    share = 1 - math.exp(-size / 1000 * NEAR)
+    share = 1 - math.exp(-size / 1000 * DROP_RANGE)
     assert abs(drops.sum() - share * len(wet)) < 4 * math.sqrt(len(wet) * share * (1 - share))
-    assert far[1][drops].max() <= NEAR + 1e-3
+    assert far[1][drops].max() <= DROP_RANGE + 1e-3
     assert (wet.instance[drops] == -1).all()
     left = [np.count_nonzero(far[1][~drops] >= r) / np.count_nonzero(far[0] >= r) for r in (10, 20)]
     assert left[1] < left[0] < 1
@@ -138,9 +138,9 @@ def test_points_of_a_tilted_sensor_keep_their_distance_and_what_lies_on_the_axis
     tilted, own = frame_under(TiltError(1.0, sensor=0)), plain.sensor == 0
     way, other = plain.points[own] - place, tilted.points[own] - place
     np.testing.assert_allclose(np.linalg.norm(other, axis=1), np.linalg.norm(way, axis=1), rtol=1e-5)
-    np.testing.assert_allclose(other @ DIAGONAL, way @ DIAGONAL, atol=1e-4)
+    np.testing.assert_allclose(other @ ERROR_AXIS, way @ ERROR_AXIS, atol=1e-4)
     # At right angles to the axis, on the ground: lifted or sunk by its distance times the angle.
-    across = way @ np.cross(DIAGONAL, [0.0, 0, 1])
+    across = way @ np.cross(ERROR_AXIS, [0.0, 0, 1])
     np.testing.assert_allclose(other[:, 2] - way[:, 2], -across * math.sin(math.radians(1.0)), atol=0.01)
 
 
@@ -173,16 +173,16 @@ def test_thinner_traffic_leaves_whole_road_users_out():
         **{name: np.tile(getattr(trajectories, name)[:2].T, 400).T for name in ("time", "yaw", "pitch", "speed")},
         position=np.tile(trajectories.position[:2], (400, 1)),
     )
-    left = Thinned(0.3).on_the_road(many)
+    left = Thinned(0.3).disturbed_traffic(many)
     assert abs(len(left) - 280) < 4 * math.sqrt(400 * 0.3 * 0.7)
     assert len(left.time) == left.first[-1] == 2 * len(left)
-    assert {user.name for user in Thinned(0.6).on_the_road(many).users} < {user.name for user in left.users}
+    assert {user.name for user in Thinned(0.6).disturbed_traffic(many).users} < {user.name for user in left.users}
     np.testing.assert_array_equal(left.at(1.0).position, many.at(1.0).position[: len(left)])
 
 
 def test_a_capped_detector_has_the_same_weights():
     detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4), seed=5)
-    capped = CappedPillars(2.0).looked_at(detector)
+    capped = CappedPillars(2.0).disturbed_detector(detector)
     assert capped.settings == replace(detector.settings, most_points=2)
     for name, value in keeping_at_most(detector, 2).state_dict().items():
         assert (value == detector.state_dict()[name]).all()

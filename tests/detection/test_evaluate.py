@@ -78,7 +78,7 @@ def test_the_record_says_what_was_for_what(folder):
 def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys, monkeypatch):
     for name in ("visibility.npz", "detector-1.pt"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
-    monkeypatch.setattr(suitability, "MOST_OVER_FULL", -1.0)  # so that every cloud is worth a warning
+    monkeypatch.setattr(suitability, "MAX_OVERFULL_SHARE", -1.0)  # so that every cloud is worth a warning
     run(tmp_path, "--ablation")
     said = capsys.readouterr().out
     assert all(f"warning: {count} × type1: " in said for count in (1, 2, 4))

@@ -3,7 +3,7 @@
 import math
 
 from headless.detection.cloud_in_plan import CloudInPlan
-from headless.detection.frame_results import NEIGHBOURHOOD, Detections, frame_result
+from headless.detection.frame_results import DENSITY_RADIUS, Detections, frame_result
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_returns_in_and_around_a_box():
     ]
     told = result(points, [[10, 10, 1, 4, 2, 2, math.pi / 2]])
     assert told.detected.points.tolist() == [2]
-    assert told.detected.density.tolist() == pytest.approx([4 / (math.pi * NEIGHBOURHOOD**2)])
+    assert told.detected.density.tolist() == pytest.approx([4 / (math.pi * DENSITY_RADIUS**2)])
 
 
 def test_returns_as_a_plain_search_counts_them():
@@ -92,8 +92,8 @@ def test_returns_as_a_plain_search_counts_them():
         turned = offset @ np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
         inside = np.all(np.abs(turned) <= np.array([length, width, height]) / 2, axis=1)
         assert told.detected.points[row] == inside.sum()
-        near = np.hypot(offset[:, 0], offset[:, 1]) <= NEIGHBOURHOOD
-        assert told.detected.density[row] == pytest.approx(near.sum() / (math.pi * NEIGHBOURHOOD**2))
+        near = np.hypot(offset[:, 0], offset[:, 1]) <= DENSITY_RADIUS
+        assert told.detected.density[row] == pytest.approx(near.sum() / (math.pi * DENSITY_RADIUS**2))
 
 
 def test_an_empty_cloud_has_no_returns():

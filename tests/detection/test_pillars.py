@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from headless.detection.network import PillarEncoder
-from headless.detection.pillars import FEATURES, PillarGrid, fill_pillars, grid_over, stacked
+from headless.detection.pillars import POINT_FEATURES, PillarGrid, fill_pillars, grid_over, stacked
 
 import numpy as np
 import pytest
@@ -97,7 +97,7 @@ def test_points_are_chosen_evenly():
 
 def test_an_empty_cloud_has_no_pillars():
     pillars = fill_pillars(np.zeros((0, 4), dtype=np.float32), GRID, 8)
-    assert pillars.features.shape == (0, FEATURES)
+    assert pillars.features.shape == (0, POINT_FEATURES)
     far = fill_pillars(np.full((5, 4), 99.0, dtype=np.float32), GRID, 8)
     assert len(far.pillar) == 0
 

@@ -4,7 +4,7 @@ from headless.detection.detector import Detector, TrainingRecord, on_grid
 from headless.detection.frames import Recording, training_record_of
 from headless.detection.pillars import filling, grid_over
 from headless.detection.settings import NetworkSettings
-from headless.detection.suitability import MOST_OVER_FULL, suitability_warnings
+from headless.detection.suitability import MAX_OVERFULL_SHARE, suitability_warnings
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_over_full_pillars_are_counted():
     assert full.left_out == pytest.approx(3 / 8)
     assert filling(NOTHING, GRID, 2).empty == 1.0
     crowded = heaps(5, 5, 5, 1)
-    assert filling(crowded, GRID, 2).over_full > MOST_OVER_FULL
+    assert filling(crowded, GRID, 2).over_full > MAX_OVERFULL_SHARE
     (sentence,) = suitability_warnings(detector(), ["type1"], "Junction", crowded)
     assert sentence.startswith("75% of the pillars with points have more than the 2 that are kept, and 56% of all")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from headless import convergence
-from headless.convergence import Answer, Judge, coarsest_settings
+from headless.convergence import Answer, Evaluator, coarsest_settings
 from headless.lab.stability import charts
 from headless.lab.stability.criterion import (
     Draws,
@@ -47,7 +47,7 @@ def answers(judged: dict[float, float]):
         value = judged[spacing]
         return Answer(settings.grid_spacing, spacing, 100, 10, value, value)
 
-    return patch.object(Judge, "answer", answer)
+    return patch.object(Evaluator, "answer", answer)
 
 
 def picked(judged: dict[float, float], tolerance: float = 0.01) -> float:
@@ -74,13 +74,13 @@ def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
     goal, tolerance = Objective(count=2), 0.02
     found = finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
     assert found.settings.spacings_because == found.sentence
-    judge = Judge(GEOMETRY, SETTINGS, goal)
-    taken = finish(judge.answer(found.settings))
+    evaluator = Evaluator(GEOMETRY, SETTINGS, goal)
+    taken = finish(evaluator.answer(found.settings))
     finest = finish(
-        judge.answer(replace(SETTINGS, grid_spacing=0.5, candidates=replace(SETTINGS.candidates, spacing=2.0)))
+        evaluator.answer(replace(SETTINGS, grid_spacing=0.5, candidates=replace(SETTINGS.candidates, spacing=2.0)))
     )
-    assert finest.judged - taken.judged <= tolerance
-    assert abs(taken.own - taken.judged) <= tolerance
+    assert finest.evaluated - taken.evaluated <= tolerance
+    assert abs(taken.own - taken.evaluated) <= tolerance
 
 
 @needs_any

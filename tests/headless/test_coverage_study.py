@@ -4,7 +4,7 @@ import csv
 from dataclasses import replace
 
 from headless.claims import save_claims
-from headless.coverage_study.cells import NUMBERS, WEIGHT_SHOWN, WEIGHTS, EmptyCell, coverage_study
+from headless.coverage_study.cells import CENTRAL_WEIGHTS, CHARTED_WEIGHT, COUNTS, EmptyCell, coverage_study
 from headless.coverage_study.charts import save_height_chart, save_weight_chart
 from headless.coverage_study.claims import coverage_claims
 from headless.coverage_study.tables import save_study_table
@@ -31,7 +31,7 @@ def study(example):
 
 def test_every_cell_is_solved_within_its_own_type_and_height(example, study):
     sensors, heights = len(study.sensors), len(study.heights)
-    assert len(study.cases) == sensors * len(NUMBERS) * (heights + 1 + len(WEIGHTS))
+    assert len(study.cases) == sensors * len(COUNTS) * (heights + 1 + len(CENTRAL_WEIGHTS))
     candidates = example.site.candidates
     for case in study.cases:
         assert set(candidates.sensor[case.placement.chosen]) == {case.sensor}
@@ -42,7 +42,7 @@ def test_every_cell_is_solved_within_its_own_type_and_height(example, study):
 
 def test_free_heights_are_no_worse_than_any_one_height(study):
     for sensor in study.sensors:
-        for count in NUMBERS:
+        for count in COUNTS:
             free = study.case(sensor, count).placement
             for height in study.heights:
                 assert free.bound >= study.case(sensor, count, height).placement.objective
@@ -61,7 +61,7 @@ def test_greedy_keeps_its_promise(study):
 
 
 def test_the_weight_shown_in_plans_is_one_that_is_solved(study):
-    assert all(study.find(sensor, NUMBERS[-1], weight=WEIGHT_SHOWN) for sensor in study.sensors)
+    assert all(study.find(sensor, COUNTS[-1], weight=CHARTED_WEIGHT) for sensor in study.sensors)
 
 
 def test_a_cell_that_was_not_asked_for_is_an_error_in_words(study):

@@ -208,12 +208,12 @@ def test_error_view(tmp_path, figures):
     panel = figures[0].axes[0]
     assert panel.get_title(loc="left") == "1 × type1"
     assert panel.get_title(loc="right") == "1 missed of 2, 2 false"
-    assert middles(panel, error_view.TRUTH, error_view.WANTED) == [pytest.approx([0, 0]), pytest.approx([20, 5])]
-    assert middles(panel, error_view.OTHER, error_view.IGNORED) == [pytest.approx([30, 0])]
-    assert len(middles(panel, error_view.DETECTED, error_view.FOUND)) == 3
-    (missed,) = middles(panel, error_view.TRUTH, error_view.ERROR)
+    assert middles(panel, error_view.TRUTH_COLOUR, error_view.TRUTH) == [pytest.approx([0, 0]), pytest.approx([20, 5])]
+    assert middles(panel, error_view.IGNORED_COLOUR, error_view.IGNORED) == [pytest.approx([30, 0])]
+    assert len(middles(panel, error_view.DETECTED_COLOUR, error_view.DETECTION)) == 3
+    (missed,) = middles(panel, error_view.TRUTH_COLOUR, error_view.ERROR)
     assert missed == pytest.approx([20, 5], abs=0.2)
-    assert len(middles(panel, error_view.DETECTED, error_view.ERROR)) == 2
+    assert len(middles(panel, error_view.DETECTED_COLOUR, error_view.ERROR)) == 2
 
 
 def test_corners_of_a_turned_box():
@@ -234,7 +234,7 @@ def test_dense_clouds_are_thinned_evenly(tmp_path, figures):
     cloud = np.column_stack([np.arange(500_000) / 10_000, np.zeros(500_000)])
     save_error_view(tmp_path / "errors.png", [errors(cloud=cloud)], "Junction")
     drawn = figures[0].axes[0].get_lines()[0].get_xdata()
-    assert error_view.MOST_POINTS / 2 < len(drawn) <= error_view.MOST_POINTS
+    assert error_view.MAX_POINTS / 2 < len(drawn) <= error_view.MAX_POINTS
     assert np.diff(drawn) == pytest.approx(drawn[1] - drawn[0])
 
 

@@ -47,7 +47,7 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     assert {*FILES, *in_traffic.CHARTS, "visibility.npz"} - {"view.png"} <= names
     record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
     asked, notes = record["settings"]["traffic"], record["notes"]
-    assert (asked["layer"], asked["instants"], asked["judged_at"]) == ("height" if options else "road", 4, 24)
+    assert (asked["layer"], asked["instants"], asked["evaluation_instants"]) == ("height" if options else "road", 4, 24)
     assert "in traffic, on average over 4 instants" in notes[0]
     assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
     said = capsys.readouterr().out

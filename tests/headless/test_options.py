@@ -3,7 +3,7 @@
 import argparse
 import math
 
-from headless.options import add_goal, add_settings, new_parser, read_goal, read_settings
+from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 from headless.survey import add_options
 
 import pytest
@@ -70,7 +70,7 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
 
 def test_weights_are_the_scene_s_or_one_for_all():
     parser = argparse.ArgumentParser()
-    add_goal(parser)
+    add_objective(parser)
     wanted = {
         (): None,
         ("--weighted",): "scene",
@@ -78,5 +78,5 @@ def test_weights_are_the_scene_s_or_one_for_all():
         ("--weighted", "--forbid", "x"): "scene",
     }
     for typed, weight in wanted.items():
-        assert read_goal(parser.parse_args(typed)).central_weight == weight
-    assert read_goal(parser.parse_args(["--require", "a", "b"])) == Objective(mandatory=("a", "b"))
+        assert read_objective(parser.parse_args(typed)).central_weight == weight
+    assert read_objective(parser.parse_args(["--require", "a", "b"])) == Objective(mandatory=("a", "b"))

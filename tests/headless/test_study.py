@@ -3,7 +3,7 @@
 import csv
 
 from headless import study
-from headless.coverage_study.cells import NUMBERS, WEIGHTS
+from headless.coverage_study.cells import CENTRAL_WEIGHTS, COUNTS
 
 import pytest
 from matplotlib.image import imread
@@ -41,7 +41,7 @@ def test_the_folder_holds_charts_tables_and_plans(folder):
 
 def test_the_table_has_a_row_for_each_cell(folder):
     rows = list(csv.DictReader((folder / "coverage.csv").read_text(encoding="utf-8").splitlines()))
-    assert len(rows) == len(TYPES) * len(NUMBERS) * (len(HEIGHTS) + 1 + len(WEIGHTS))
+    assert len(rows) == len(TYPES) * len(COUNTS) * (len(HEIGHTS) + 1 + len(CENTRAL_WEIGHTS))
     for row in rows:
         assert 0 < float(row["coverage"]) <= 1
         assert float(row["objective"]) <= float(row["bound"])

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from headless.coverage_study.cells import NUMBERS, WEIGHTS, Case, CoverageStudy, EmptyCell
+from headless.coverage_study.cells import CENTRAL_WEIGHTS, COUNTS, Case, CoverageStudy, EmptyCell
 from headless.coverage_study.claims import coverage_claims
 
 import pytest
@@ -51,8 +51,8 @@ class Told:
 
 def study(tell, sensors=TYPES, heights=HEIGHTS):
     """A study of what ``tell(sensor, height, count, weight)`` says; None where there is no placement."""
-    keys = [(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in NUMBERS]
-    keys += [(s, None, n, w) for s in sensors for n in NUMBERS for w in WEIGHTS]
+    keys = [(s, h, n, 1.0) for s in sensors for h in (*heights, None) for n in COUNTS]
+    keys += [(s, None, n, w) for s in sensors for n in COUNTS for w in CENTRAL_WEIGHTS]
     told = [(key, tell(*key)) for key in keys]
     cells = [EmptyCell(*key, "no room") if cell is None else cell.case(*key) for key, cell in told]
     return CoverageStudy(sensors, heights, tuple(cells), TARGETS)
@@ -186,7 +186,7 @@ def test_claim_4_weighs_gain_against_loss():
 def test_claim_4_is_open_where_placements_are_unproven_or_missing():
     assert verdict(4, weighted(proven=False)) == "undecided"
     assert verdict(4, weighted(gain=0.0, proven=False)) == "undecided"
-    assert verdict(4, weighted(absent=WEIGHTS[:1])) == "undecided"
+    assert verdict(4, weighted(absent=CENTRAL_WEIGHTS[:1])) == "undecided"
     assert verdict(4, weighted(absent=(1.0,))) == "undecided"
 
 

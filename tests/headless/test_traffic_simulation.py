@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from headless.sumo import simulation as sumo
-from headless.sumo.demand import MIX, MODELS, Demand, write_routes
+from headless.sumo.demand import MODELS, VEHICLE_SHARES, Demand, write_routes
 from headless.sumo.street_network import DRIVING, PARKING, WALKING, read_network
 
 import numpy as np
@@ -78,8 +78,8 @@ def test_flow_turns_and_mix_are_as_asked_for(tmp_path):
     for name, share in (("left", 0.1), ("on", 0.6), ("right", 0.3)):
         assert turned[name] / len(driving) == pytest.approx(share, abs=0.03)
     categories = Counter(vehicle.get("id").partition("-")[0] for vehicle in driving)
-    for category, share in MIX.items():
-        assert categories[category] / len(driving) == pytest.approx(share / sum(MIX.values()), abs=0.03)
+    for category, share in VEHICLE_SHARES.items():
+        assert categories[category] / len(driving) == pytest.approx(share / sum(VEHICLE_SHARES.values()), abs=0.03)
     departs = [float(entry.get("depart")) for entry in root if entry.get("depart")]
     assert departs == sorted(departs)
     assert departs[-1] < 7200.0

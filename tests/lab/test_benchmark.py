@@ -8,7 +8,7 @@ from pathlib import Path
 
 from headless import benchmark
 from headless.lab.benchmark.approximations import bounding_box, decimated, every_other_channel, thinner
-from headless.lab.benchmark.baselines import RIVALS, can_run
+from headless.lab.benchmark.baselines import BASELINES, can_run
 from headless.lab.benchmark.fresh_process import alone
 from headless.lab.benchmark.growth import repeated
 from headless.lab.benchmark.measurements import BenchmarkScope
@@ -68,7 +68,7 @@ def test_the_figures_hold_every_way(folder):
     assert record["visibility"]["lazy embree"]["rays"] < record["visibility"]["full embree"]["rays"]
     assert record["harm"]["exact"]["wrong"] == 0 < record["harm"]["azimuth ÷ 8"]["wrong"]
     ways = {run["way"] for run in record["placement"]}
-    assert ways == {way for way in RIVALS if can_run(way)}
+    assert ways == {way for way in BASELINES if can_run(way)}
     assert len(record["bars"]) == 9
     assert record["scans"]["kept embree"]["rays"] == record["scans"]["anew bvh"]["rays"] == 4 * 60_000
     assert all(len(growth["seconds"]) == len(growth["size"]) for growth in record["growth"])
@@ -76,7 +76,7 @@ def test_the_figures_hold_every_way(folder):
 
 def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():
     problem = street_problem(20, 300, blocks=2, count=3)
-    ways = [way for way in RIVALS if can_run(way)]
+    ways = [way for way in BASELINES if can_run(way)]
     runs = {run.way: run for run in compare("streets", problem, ways, 20)}
     best = runs["ours"]
     assert best.proven

@@ -58,7 +58,7 @@ def test_hard_scenes_flip_no_hit_and_no_target(engine: Engine, name: str) -> Non
 
 @needs_embree
 def test_without_float64_on_needles_embree_is_off() -> None:
-    with patch.object(ray_casting, "_NEEDLE", 0.0):
+    with patch.object(ray_casting, "_MAX_NEEDLE_HEIGHT", 0.0):
         check = check_hits(SCENES["slivers"], "embree", truth(SCENES["slivers"]))
     assert check.unexplained.count > 0
 

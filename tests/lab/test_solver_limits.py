@@ -31,7 +31,7 @@ from random_cases import cases
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import SolverLimits, cheapest_for_coverage, near_optimal, solve, solve_greedy
 from seip_addon.core.placement.near_optimal import near_optimal_set
-from seip_addon.core.placement.problem import TIE
+from seip_addon.core.placement.problem import TIE_TOLERANCE
 from seip_addon.core.placement.solver import scale_notes
 from seip_addon.core.progress import finish
 
@@ -49,7 +49,7 @@ def test_what_is_lost_to_weights_far_apart_is_said(seed: int, decades: int) -> N
     problem, random = random_problem(seed)
     problem = replace(problem, weights=10 ** (decades * (random.random(12) - 0.5)))
     found, best = finish(solve(problem)), best_covered(problem)
-    assert found.covered >= best * (1 - 2 * TIE)
+    assert found.covered >= best * (1 - 2 * TIE_TOLERANCE)
     if found.covered < best * (1 - 1e-12):
         assert any("cannot decide" in note for note in found.notes)
 
@@ -148,7 +148,7 @@ def test_near_optimal_set_lists_exactly_what_enumeration_finds(seed: int, share:
 def test_near_optimal_set_says_when_there_are_more() -> None:
     problem, _ = random_problem(5, candidates=20, targets=12, count=4)
     best = finish(solve(problem))
-    with patch.object(near_optimal, "MOST_LISTED", 3):
+    with patch.object(near_optimal, "MAX_LISTED", 3):
         top = finish(near_optimal_set(problem, best.chosen, 0.5))
     assert not top.complete
     assert top.message.startswith("more than 3 placements")
@@ -166,7 +166,7 @@ def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: 
     problem, _ = random_problem(seed)
     best = finish(solve(problem))
     every = without_padding(finish(near_optimal_set(problem, best.chosen, 0.3)).placements)
-    with patch.object(near_optimal, "MOST_BRANCHES", 0):
+    with patch.object(near_optimal, "MAX_BRANCHES", 0):
         top = finish(near_optimal_set(problem, best.chosen, 0.3))
     found = without_padding(top.placements)
     chosen = set(best.chosen.tolist())
@@ -178,7 +178,7 @@ def test_a_search_cut_short_lists_the_best_and_what_differs_in_one_sensor(seed: 
 
 def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     tie, time = TieCheck(1e-6, Share(0, 5), 0.0), TimeCheck("plane", 1.0, 1.1, 0.05, proven=False)
-    with patch("headless.lab.stability.solver_limits.ORDERS", (2, 3, 5)):
+    with patch("headless.lab.stability.solver_limits.PLANE_ORDERS", (2, 3, 5)):
         study = finish(solver_study(1, limit=0.2))
     (greedy,) = (check for check in study.greedy if check.count == 4)
     rows = solver_rows(SolverStudy((), (tie,), (greedy,), (time,)))

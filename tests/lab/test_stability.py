@@ -44,7 +44,7 @@ def run(folder):
     with (
         patch.object(stability_chapters, "DETECTOR_RUNS", 99),  # test_detector_limits.py looks at that chapter
         patch.multiple(criterion, DELTAS=(4.0, 6.0), **spacings),
-        patch.multiple("headless.convergence", COARSE_CANDIDATES=25.0, JUDGED_ON=4.0, **spacings),
+        patch.multiple("headless.convergence", COARSE_CANDIDATE_SPACING=25.0, EVALUATION_SPACING=4.0, **spacings),
     ):
         stability.main([str(SCENE), "-o", str(folder / "docs"), "--work", str(folder / "work"), *COARSE], LITTLE)
     return (folder / "docs" / "stability.md").read_text(encoding="utf-8")

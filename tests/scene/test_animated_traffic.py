@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic import CATEGORIES, RoadUser, Trajectories
-from seip_addon.core.traffic.bodies import COLOURS, fitted_body
+from seip_addon.core.traffic.bodies import PAINT_COLOURS, fitted_body
 from seip_addon.scene import contract, materials
 from seip_addon.scene.traffic import LAST_FRAME, animate, clear_traffic, read_traffic
 
@@ -125,7 +125,7 @@ def test_objects_have_bodies_names_and_properties(scene):
 
 def test_every_material_of_every_body_has_a_colour():
     for category, size in SIZES.items():
-        for paint, _ in COLOURS:
+        for paint, _ in PAINT_COLOURS:
             names = set(fitted_body(RoadUser("u", category, *size, paint)).material.tolist())
             assert names <= materials.COLOURS.keys()
 

@@ -18,7 +18,7 @@ from seip_addon.core.site.site import Site, make_site
 
 @dataclass(frozen=True, eq=False)
 class Approximation:
-    """A simpler question than the one asked.
+    """A simplification of scans or scene.
 
     Parameters
     ----------

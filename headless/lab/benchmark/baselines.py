@@ -23,7 +23,7 @@ from seip_addon.core.progress import finish
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a way found within its time.
+    """What a method found within its time limit.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def spopt_mclp(problem: PlacementProblem, seconds: float) -> Found:
     return found
 
 
-RIVALS: dict[str, Callable[[PlacementProblem, float], Found]] = {
+BASELINES: dict[str, Callable[[PlacementProblem, float], Found]] = {
     "greedy": plain_greedy,
     "lazy greedy": lazy_greedy,
     "local search": local_search,

@@ -12,7 +12,7 @@ from headless.lab.benchmark.placement import SolverRun
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.visibility import ENGINES, Cost, Degradation
 
-DEFAULT_WAY = "lazy embree"
+DEFAULT_ENGINE = "lazy embree"
 ENGINE_NAMES = {"bvh": "BVHTree", "embree": "Embree"}
 
 
@@ -58,7 +58,7 @@ def save_charts(pictures: Path, findings: Findings) -> None:
 def _way(name: str, cost: Cost, error: float) -> Method:
     scan, _, what = name.partition(" ")
     family = f"{'exact' if what in ENGINES else 'simplified, Embree'}, {scan}"
-    return Method(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_WAY)
+    return Method(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_ENGINE)
 
 
 def _harm(harm: Mapping[str, Degradation], way: str) -> Degradation:

@@ -81,7 +81,7 @@ class Scaled:
 
 
 def repeated(site: Site, copies: int) -> Site:
-    """Set copies of a site side by side along x."""
+    """Repeat a site side by side along x."""
     corners = site.triangles.reshape(-1, 3)
     pitch = float(np.ptp(corners[:, 0]))
     shift = np.arange(copies) * pitch
@@ -99,7 +99,9 @@ def repeated(site: Site, copies: int) -> Site:
     )
 
 
-def look(scaled: Scaled, models: dict[str, LidarModel], settings: VisibilitySettings) -> tuple[float, float | None]:
+def visibility_cost(
+    scaled: Scaled, models: dict[str, LidarModel], settings: VisibilitySettings
+) -> tuple[float, float | None]:
     """Compute visibility from places of a site; return the processor seconds and MB of it.
 
     What is done once for a site counts once, the places count for those they stand for.
@@ -136,7 +138,7 @@ def visibility_growth(
     what: str, size_of: str, steps: Sequence[Scaled], models: dict[str, LidarModel], settings: VisibilitySettings
 ) -> Growth:
     """Measure visibility at each size."""
-    found = [alone(partial(look, step, models, settings)) for step in steps]
+    found = [alone(partial(visibility_cost, step, models, settings)) for step in steps]
     return _growth(what, size_of, [step.size for step in steps], found)
 
 

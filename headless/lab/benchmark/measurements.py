@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from headless.lab.benchmark.approximations import approximations
-from headless.lab.benchmark.baselines import RIVALS, can_run
+from headless.lab.benchmark.baselines import BASELINES, can_run
 from headless.lab.benchmark.fresh_process import alone
 from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
 from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.scans import scan_costs
 from headless.lab.benchmark.street_visibility import street_problem
-from headless.lab.benchmark.visibility import COUNT, ENGINES, cast_rate, harms, sampled_places, visibility_costs
+from headless.lab.benchmark.visibility import ENGINES, SENSOR_COUNT, cast_rate, harms, sampled_places, visibility_costs
 
 import numpy as np
 
@@ -36,7 +36,7 @@ LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class BenchmarkScope:
-    """What is measured: how the scene is laid out, how large synthetic instances and the steps of growth are.
+    """Sizes of the benchmark: the scene's layout, synthetic instances and steps of growth.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def measure(
         "triangles": len(site.triangles),
         "places": len(sampled_places(site, samples)),
         "sensor": layout.sensors[0],
-        "count": COUNT,
+        "count": SENSOR_COUNT,
         "scanned_by": scope.scanned_by,
         "time_limit": time_limit,
         "cores": os.cpu_count(),
@@ -114,7 +114,7 @@ def placements(
     """Compare ways to place sensors at the scene's site and in synthetic streets."""
     own = site.candidates.sensor == site.candidates.sensor[0]
     visible = finish(compute_visibility(site, models, settings)).visible
-    problem = placement_problem(site, visible, models, Objective(count=COUNT))
+    problem = placement_problem(site, visible, models, Objective(count=SENSOR_COUNT))
     problem = replace(
         problem,
         visible=visible[own],
@@ -126,10 +126,10 @@ def placements(
         mandatory_names=None,
         forbidden=None,
     )
-    ways = [way for way in RIVALS if can_run(way)]
-    for way in set(RIVALS).difference(ways):
+    ways = [way for way in BASELINES if can_run(way)]
+    for way in set(BASELINES).difference(ways):
         LOG.info(f"{way} is left out: the group 'benchmark' of pyproject.toml is not installed")
-    runs = _told(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {COUNT}", problem, ways, time_limit))
+    runs = _told(compare(f"{site.name}, {site.candidates.sensor[0]}, N = {SENSOR_COUNT}", problem, ways, time_limit))
     names = []
     for count in scope.counts:
         names.append(_street_name(scope.street, count))
@@ -148,7 +148,7 @@ def placements(
 def growth(
     geometry: SceneGeometry, settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
 ) -> list[Growth]:
-    """Let one thing grow at a time, then all together: the scene set side by side to a corridor."""
+    """Measure growth with one size at a time, then with all: copies of the scene side by side."""
     LOG.info("growth, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
     site = make_site(geometry, scope.layout)

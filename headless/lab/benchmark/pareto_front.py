@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Method:
-    """One way to an answer.
+    """A method with its run time and error.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from headless.lab.benchmark.baselines import RIVALS
+from headless.lab.benchmark.baselines import BASELINES
 from headless.lab.benchmark.resource_usage import Expense, peak_memory
 
 from seip_addon.core.placement import PlacementProblem
@@ -15,7 +15,7 @@ from seip_addon.core.placement import PlacementProblem
 
 @dataclass(frozen=True, eq=False)
 class SolverRun:
-    """What one way did with one instance.
+    """Run of one method on one instance.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
     name : str
         Of the instance.
     ways : sequence of str
-        Keys of `RIVALS`.
+        Keys of `BASELINES`.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: 
     rows = []
     for way in ways:
         expense = Expense()
-        found, memory = peak_memory(partial(expense.time, partial(RIVALS[way], problem, seconds)))
+        found, memory = peak_memory(partial(expense.time, partial(BASELINES[way], problem, seconds)))
         seen = problem.visible[found.chosen].any(axis=0) if found.chosen is not None else problem.weights < 0
         objective = float(problem.weights[seen].sum())
         rows.append((way, expense, memory, objective, found))

@@ -19,7 +19,7 @@ from seip_addon.core.storage.files import whole_file
 
 @dataclass(frozen=True)
 class Bar:
-    """What the project holds itself to."""
+    """A requirement of the project and the figure measured for it."""
 
     what: str
     asked: str
@@ -51,7 +51,7 @@ class Findings:
 def bars(
     costs: Mapping[str, Cost], runs: Sequence[SolverRun], names: Sequence[str], scans: Mapping[str, ScanCost]
 ) -> list[Bar]:
-    """Hold the measurements against what was asked for.
+    """Compare the measurements with the requirements.
 
     Parameters
     ----------
@@ -59,25 +59,33 @@ def bars(
         Instances: the one with few sensors, the one with many, the largest.
     """
     pairs = (("lazy bvh", "full bvh", 20), ("lazy embree", "full bvh", 100), ("lazy embree", "full embree", 10))
-    held = [_ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs]
+    requirements = [
+        _ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs
+    ]
     by_name = {(run.instance, run.way): run for run in runs}
     few, many, largest = names
     us, cbc = by_name[few, "ours"], by_name[few, "PuLP + CBC"]
     same = us.proven and us.objective >= cbc.objective
     ratio = cbc.expense.cpu / us.expense.cpu
     stopped = "" if cbc.proven else ", CBC stopped at the time limit"
-    held.append(_ratio(f"ours against plain PuLP + CBC, {few}", ratio, 20, holds=same, note=stopped))
-    held += [_small_gap(by_name[many, "ours"], 0.01, 60, None), _small_gap(by_name[largest, "ours"], 0.015, 120, 4096)]
+    requirements.append(_ratio(f"ours against plain PuLP + CBC, {few}", ratio, 20, holds=same, note=stopped))
+    requirements += [
+        _small_gap(by_name[many, "ours"], 0.01, 60, None),
+        _small_gap(by_name[largest, "ours"], 0.015, 120, 4096),
+    ]
     plain = scans["anew bvh"]
     for engine in ENGINES:
         times = scans[f"kept {engine}"].rate / plain.rate
-        held.append(_ratio(f"frames of scans, {engine} against the whole scene anew with bvh", times, 15))
+        requirements.append(_ratio(f"frames of scans, {engine} against the whole scene anew with bvh", times, 15))
     most = max(cost.differing / cost.rays for cost in scans.values())
     few_differ = f"{most * 1e6:.2g} in a million, each grazes something"
-    return [*held, Bar("returns of scans elsewhere than the full scan's", "1 in a million", few_differ, most <= 1e-6)]
+    return [
+        *requirements,
+        Bar("returns of scans elsewhere than the full scan's", "1 in a million", few_differ, most <= 1e-6),
+    ]
 
 
-def save_json(path: str | os.PathLike[str], findings: Findings, held: Sequence[Bar]) -> None:
+def save_json(path: str | os.PathLike[str], findings: Findings, requirements: Sequence[Bar]) -> None:
     """Write all figures; what is not finite is null."""
     runs = [asdict(run) | {"gap": run.gap, "own_gap": run.own_gap, "proven": run.proven} for run in findings.runs]
     growths = [
@@ -85,7 +93,7 @@ def save_json(path: str | os.PathLike[str], findings: Findings, held: Sequence[B
     ]
     record = {
         "setting": findings.setting,
-        "bars": [asdict(bar) for bar in held],
+        "bars": [asdict(bar) for bar in requirements],
         "visibility": {way: asdict(cost) for way, cost in findings.costs.items()},
         "harm": {name: asdict(harm) for name, harm in findings.harms.items()},
         "times_the_limit": dict(findings.limits),
@@ -97,10 +105,10 @@ def save_json(path: str | os.PathLike[str], findings: Findings, held: Sequence[B
         temporary.write_text(json.dumps(_finite(record), indent=1) + "\n", encoding="utf-8")
 
 
-def save_page(path: str | os.PathLike[str], findings: Findings, held: Sequence[Bar], pictures: str) -> None:
+def save_page(path: str | os.PathLike[str], findings: Findings, requirements: Sequence[Bar], pictures: str) -> None:
     """Write the page; ``pictures`` is the folder of the charts, as seen from the page."""
     parts = [
-        *_summary(findings.setting, held),
+        *_summary(findings.setting, requirements),
         *_about_visibility(findings, pictures),
         *_about_placement(findings, pictures),
         *_about_growth(findings, pictures),
@@ -110,14 +118,14 @@ def save_page(path: str | os.PathLike[str], findings: Findings, held: Sequence[B
         temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
-def _summary(setting: Mapping[str, Any], held: Sequence[Bar]) -> list[str]:
+def _summary(setting: Mapping[str, Any], requirements: Sequence[Bar]) -> list[str]:
     versions = ", ".join(f"{name} {version}" for name, version in setting["versions"].items())
     text = (
         "Written by `make benchmark`. Seconds are of processor time and differ from machine to machine; ratios hardly "
         "do: what is compared ran in turn in one process. "
         f"Here: {setting['cores']} cores, {versions}."
     )
-    rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in held]
+    rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in requirements]
     return ["# Benchmark", text, _table(("", "asked", "measured", ""), rows)]
 
 

@@ -16,7 +16,7 @@ _PROCESS = Path("/proc/self")
 
 @dataclass
 class Expense:
-    """What work took, summed over its parts.
+    """Processor and wall-clock time of work, summed over its parts.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Expense:
     wall: float = 0.0
 
     def time(self, work: Callable[[], Result]) -> Result:
-        """Return what ``work`` returns and add what it took."""
+        """Return what ``work`` returns and add its cost."""
         cpu, wall = _processor_seconds(), time.perf_counter()
         result = work()
         self.cpu += _processor_seconds() - cpu

@@ -25,7 +25,7 @@ from seip_addon.core.scans import (
     level_orientation,
     prepare,
 )
-from seip_addon.core.scans.frame import STATIC
+from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.scans.motion import rotations
 from seip_addon.core.scans.scanner import ReflectiveSurface, Scan, Scanner
 from seip_addon.core.site.site import Site
@@ -34,17 +34,17 @@ from seip_addon.core.traffic.bodies import Body, fitted_body
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 
 SENSORS, ROAD_USERS = 4, 40
-SAME = 1e-4
+SLACK = 1e-4
 """Metres by which the same return may differ, and by which a ray may pass an edge to graze it."""
 
 _RAYS_AT_ONCE = 1 << 17
 _SIZES = (("car", 4.5, 1.8, 1.5), ("car", 3.9, 1.7, 1.5), ("van", 5.6, 2.0, 2.4), ("truck", 9.0, 2.5, 3.5))
-_SPEED, _SECONDS, _APART = 8.0, 10.0, 6.0  # metres per second, seconds, metres
+_SPEED, _SECONDS, _GAP = 8.0, 10.0, 6.0  # metres per second, seconds, metres
 
 
 @dataclass
 class ScanCost:
-    """What frames of scans took.
+    """Cost of simulated frames.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def driving(site: Site) -> Trajectories:
     random = np.random.default_rng(0)
     start: list[Float] = []
     for xyz in random.permutation(site.targets.xyz):
-        if len(start) < ROAD_USERS and all(math.dist(xyz[:2], other[:2]) > _APART for other in start):
+        if len(start) < ROAD_USERS and all(math.dist(xyz[:2], other[:2]) > _GAP for other in start):
             start.append(xyz)
     yaw = random.uniform(-math.pi, math.pi, len(start))
     way = _SPEED * _SECONDS * np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
@@ -176,7 +176,7 @@ def combined(
             snapshot.user, snapshot.position, rotations(snapshot.yaw, snapshot.pitch), strict=True
         )
     ]
-    owner = [np.full(len(static.triangles), STATIC)]
+    owner = [np.full(len(static.triangles), STATIC_INSTANCE)]
     owner += [np.full(len(bodies[user].triangles), user) for user in snapshot.user]
     reflectivity = [static.reflectivity, *(bodies[user].reflectivity for user in snapshot.user)]
     caster = make_ray_caster(np.concatenate([static.triangles, *placed]), engine)
@@ -187,7 +187,7 @@ def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, user
     """Cast every ray of a sensor against everything."""
     model, rays = scanner.sensor.model, len(scanner.directions)
     distance, intensity = np.full(rays, np.inf), np.zeros(rays)
-    instance = np.full(rays, STATIC, dtype=np.int32)
+    instance = np.full(rays, STATIC_INSTANCE, dtype=np.int32)
     for begin in range(0, rays, _RAYS_AT_ONCE):
         directions = scanner.directions[begin : begin + _RAYS_AT_ONCE]
         far, triangle = surface.caster.cast(scanner.sensor.xyz, directions, model.max_range)
@@ -206,7 +206,7 @@ def differing(one: Scan, other: Scan) -> Integer:
     hit, there = np.isfinite(one.distance), np.isfinite(other.distance)
     both = hit & there
     apart = hit != there
-    apart[both] = np.abs(one.distance[both] - other.distance[both]) > SAME
+    apart[both] = np.abs(one.distance[both] - other.distance[both]) > SLACK
     return np.flatnonzero(apart | (one.instance != other.instance))
 
 
@@ -217,7 +217,7 @@ def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -
     corners moves the full scan's return, while double precision agrees with this one.
     """
     return (
-        passes_an_edge(origin, direction, triangles) or abs(exact_hit(origin, direction, triangles) - distance) < SAME
+        passes_an_edge(origin, direction, triangles) or abs(exact_hit(origin, direction, triangles) - distance) < SLACK
     )
 
 
@@ -241,4 +241,4 @@ def passes_an_edge(origin: Float, direction: Float, triangles: Float) -> bool:
     aside, across = (part - np.outer(part @ direction, direction) for part in (start, edge))
     length = np.maximum((across**2).sum(axis=1), np.finfo(float).tiny)
     share = np.clip(-(aside * across).sum(axis=1) / length, 0, 1)
-    return bool(np.linalg.norm(aside + share[:, None] * across, axis=1).min() < SAME)
+    return bool(np.linalg.norm(aside + share[:, None] * across, axis=1).min() < SLACK)

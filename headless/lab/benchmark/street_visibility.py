@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seip_addon.core.placement import PlacementProblem
 
-SIGHT = 110.0
+MAX_RANGE = 110.0
 """Metres beyond which no sensor of these streets sees."""
 
 
@@ -74,10 +74,10 @@ def _buildings(rng: np.random.Generator, blocks: int, pitch: float, width: float
 
 
 def _hidden(posts: NDArray[Any], points: NDArray[Any], boxes: NDArray[Any], discs: NDArray[Any]) -> NDArray[Any]:
-    """Return whether a building or a tree stands between post and point; beyond `SIGHT` everything is hidden."""
+    """Return whether a building or a tree stands between post and point; beyond `MAX_RANGE` everything is hidden."""
     hidden = np.ones((len(posts), len(points)), bool)
     for index, post in enumerate(posts):
-        near = np.flatnonzero(np.hypot(*(points - post).T) < SIGHT)
+        near = np.flatnonzero(np.hypot(*(points - post).T) < MAX_RANGE)
         step = points[near] - post
         step[np.abs(step) < 1e-9] = 1e-9
         hidden[index, near] = _behind_boxes(step, boxes - np.tile(post, 2)) | _behind_discs(step, discs - [*post, 0.0])
@@ -86,7 +86,7 @@ def _hidden(posts: NDArray[Any], points: NDArray[Any], boxes: NDArray[Any], disc
 
 def _behind_boxes(step: NDArray[Any], boxes: NDArray[Any]) -> NDArray[Any]:
     hidden = np.zeros(len(step), bool)
-    for box in boxes[(np.minimum(np.abs(boxes[:, :2]), np.abs(boxes[:, 2:])) < SIGHT).all(axis=1)]:
+    for box in boxes[(np.minimum(np.abs(boxes[:, :2]), np.abs(boxes[:, 2:])) < MAX_RANGE).all(axis=1)]:
         first, second = box[:2] / step, box[2:] / step
         enter = np.minimum(first, second).max(axis=1)
         leave = np.maximum(first, second).min(axis=1)
@@ -98,7 +98,7 @@ def _behind_discs(step: NDArray[Any], discs: NDArray[Any]) -> NDArray[Any]:
     hidden = np.zeros(len(step), bool)
     length = (step**2).sum(axis=1)
     distance = np.hypot(discs[:, 0], discs[:, 1])
-    for x, y, radius in discs[(distance > discs[:, 2] + 0.5) & (distance < SIGHT)]:
+    for x, y, radius in discs[(distance > discs[:, 2] + 0.5) & (distance < MAX_RANGE)]:
         share = np.clip(step @ [x, y] / length, 0, 1)
         hidden |= np.hypot(*(share[:, None] * step - [x, y]).T) < radius
     return hidden

@@ -27,16 +27,16 @@ from seip_addon.core.visibility.visibility_model import VisibilityModel, seen_by
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
-PROVEN = 1e-6
+PROVEN_GAP = 1e-6
 """Gap below which nothing is better."""
 
-COUNT = 4
-"""Sensors of the placement by which the harm of an error is judged."""
+SENSOR_COUNT = 4
+"""Sensors of the placement by which the harm of an error is evaluated."""
 
 
 @dataclass
 class Cost:
-    """What a way to compute visibility took, summed over places.
+    """Cost of a method to compute visibility, summed over positions.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Cost:
 
 @dataclass(frozen=True, eq=False)
 class Degradation:
-    """What a simplification does to the answer.
+    """Degradation of coverage and placement by a simplification.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def harms(
     simpler: Sequence[Approximation],
     time_limit: float,
 ) -> dict[str, Degradation]:
-    """Tell what each simplification does to the whole grid, and to the placement of four sensors of the first type.
+    """Compute the degradation of grid and placement by each simplification, for four sensors of the first type.
 
     The grids are computed lazily: they are the full scans', as `visibility_costs` checks on a sample.
 
@@ -171,7 +171,7 @@ def harms(
     exact = finish(compute_visibility(site, models, settings)).visible
     best = placed(site, models, exact, time_limit)
     own = best.objective / len(site.targets)
-    found = {"exact": Degradation(0.0, own, own, len(best.chosen), best.gap < PROVEN)}
+    found = {"exact": Degradation(0.0, own, own, len(best.chosen), best.gap < PROVEN_GAP)}
     for one in simpler:
         visible = finish(compute_visibility(one.site, one.models, settings)).visible
         placement = placed(one.site, models, visible, time_limit)
@@ -180,7 +180,7 @@ def harms(
             claimed=placement.objective / len(one.site.targets),
             coverage=float(exact[placement.chosen].any(axis=0).mean()),
             kept=len(np.intersect1d(placement.chosen, best.chosen)),
-            proven=placement.gap < PROVEN,
+            proven=placement.gap < PROVEN_GAP,
         )
     return found
 
@@ -188,7 +188,7 @@ def harms(
 def placed(site: Site, models: Mapping[str, LidarModel], visible: Boolean, time_limit: float) -> Placement:
     """Return the best placement of four sensors of the site's first type, the vanilla problem."""
     sensor = site.candidates.sensor
-    problem = placement_problem(site, visible, models, Objective(count=COUNT))
+    problem = placement_problem(site, visible, models, Objective(count=SENSOR_COUNT))
     return finish(solve(replace(problem, forbidden=sensor != sensor[0]), SolverLimits(time_limit=time_limit)))
 
 

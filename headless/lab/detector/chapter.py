@@ -25,10 +25,10 @@ from seip_addon.core.scans import ScanSettings, static_scene
 from seip_addon.core.workflows.survey import Layout, lay_out, see
 from seip_addon.scene.read import read_scene
 
-EVERY = 2.5
+TRAINING_INTERVAL = 2.5
 """Seconds between frames to learn from."""
 
-TRIED = 2
+TEST_STRIDE = 2
 """Of the test frames every so many-th is tried: neighbouring ones show nearly the same."""
 
 
@@ -41,7 +41,7 @@ def detector_limits(
     seeds: int = 3,
     steps: int = TrainingSettings().steps,
 ) -> Generator[Progress, None, LimitsStudy]:
-    """Train detectors on a scene and try them until they fail.
+    """Train detectors on a scene, and evaluate them under growing disturbances.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def detector_limits(
     """
     layout, network = surveyed.layout, NetworkSettings()
     origin = layout.geometry.origin
-    traffic = case_study.read_traffic(survey.runs_beside(scene), origin, EVERY)
+    traffic = case_study.read_traffic(survey.runs_beside(scene), origin, TRAINING_INTERVAL)
     configurations = yield from _placed(surveyed)
     simulator = _studio(layout)
     asked = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
@@ -78,7 +78,7 @@ def detector_limits(
     practice = TrialSite(simulator.site, simulator, _thinned(traffic.validation))
     (tried,) = yield from trials(practice, main, Disturbance(), candidates.tested[:1], folder)
     elsewhere = []
-    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, EVERY)
+    dense = case_study.read_runs(survey.runs_beside(scene, "_dense"), origin, TRAINING_INTERVAL)
     if dense:
         elsewhere.append(OtherSite(TrialSite("denser traffic", simulator, _thinned(dense)), (main,), candidates.tested))
     for other in others:
@@ -116,7 +116,7 @@ def _on_other_scene(
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     grid = yield from see(layout, folder / f"visibility_{scene.stem}.npz")
     there = yield from _placed(survey.Survey(layout, grid, surveyed.stopwatch))
-    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, EVERY)
+    runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TRAINING_INTERVAL)
     pillars = grid_of(layout.geometry, tested[0].detector.grid.pillar)
     moved = tuple(EvaluatedDetector(one.name, on_grid(one.detector, pillars)) for one in tested)
     return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
@@ -145,4 +145,4 @@ def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:
 
 
 def _thinned(runs: Sequence[SampledRun]) -> tuple[SampledRun, ...]:
-    return tuple(replace(run, times=run.times[::TRIED]) for run in runs)
+    return tuple(replace(run, times=run.times[::TEST_STRIDE]) for run in runs)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import DASHED, MARKS, SERIES, colour, mark, new_figure, save_chart, style_axes
+from headless.charts.style import COLOURS, DASHED, MARKERS, colour, mark, new_figure, save_chart, style_axes
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,10 +17,10 @@ from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 from .disturbances import CappedPillars, SensorFailure
 from .study import DisturbanceCurve, LimitsStudy, TransferResult
 
-ACROSS = 4
+COLUMNS = 4
 """Panels in a row."""
 
-PANEL = (3.6, 3.0)  # inches
+PANEL_SIZE = (3.6, 3.0)  # inches
 
 
 def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
@@ -28,10 +28,10 @@ def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
     if not study.curves:
         raise SeipError("there is no disturbance to draw: try some first")
     names = list(dict.fromkeys(curve.name for curve in study.curves))
-    rows = -(-len(names) // ACROSS)
-    size = (PANEL[0] * min(ACROSS, len(names)), PANEL[1] * rows + 0.7)
+    rows = -(-len(names) // COLUMNS)
+    size = (PANEL_SIZE[0] * min(COLUMNS, len(names)), PANEL_SIZE[1] * rows + 0.7)
     figure = Figure(size, dpi=150, facecolor=PAPER, layout="constrained")
-    panels = figure.subplots(rows, min(ACROSS, len(names)), squeeze=False).ravel().tolist()
+    panels = figure.subplots(rows, min(COLUMNS, len(names)), squeeze=False).ravel().tolist()
     configurations = list(dict.fromkeys(curve.configuration for curve in study.curves))
     for panel, name in zip(panels, names, strict=False):
         own = [curve for curve in study.curves if curve.name == name]
@@ -50,8 +50,8 @@ def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None
     figure, (panel,) = new_figure(9.0, 1.2 + 0.42 * len(changes), dpi=150)
     for row, one in enumerate(changes):
         low, high = one.change.low * 100, one.change.high * 100
-        panel.plot((low, high), (row, row), color=SERIES[0], linewidth=1.2, marker="|")
-        panel.plot(one.change.value * 100, row, color=SERIES[0], marker=MARKS[0], mec=PAPER)
+        panel.plot((low, high), (row, row), color=COLOURS[0], linewidth=1.2, marker="|")
+        panel.plot(one.change.value * 100, row, color=COLOURS[0], marker=MARKERS[0], mec=PAPER)
     panel.axvline(0.0, color=SOFT_INK, linewidth=1.0, linestyle=DASHED)
     panel.set_yticks(range(len(changes)), [_in_words(one) for one in changes], fontsize=8.5, parse_math=False)
     panel.invert_yaxis()

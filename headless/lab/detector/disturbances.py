@@ -21,13 +21,13 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.scans import Frame, MountedSensor, Simulation
-from seip_addon.core.scans.frame import STATIC
+from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.traffic import Trajectories
 
-DIAGONAL = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
+ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
 """Unit vector along which a sensor is misplaced and about which it is tilted: no street's own direction."""
 
-NEAR = 10.0
+DROP_RANGE = 10.0
 """Metres from a sensor within which a drop may return enough to be taken for something."""
 
 DROP_INTENSITY = 0.05
@@ -36,7 +36,7 @@ DROP_INTENSITY = 0.05
 
 @dataclass(frozen=True)
 class Disturbance:
-    """Nothing is wrong; what is, overrides one of these methods.
+    """Base class of disturbances, without any: each overrides one of these methods.
 
     Parameters
     ----------
@@ -48,24 +48,24 @@ class Disturbance:
     name: ClassVar[str] = "undisturbed"
     unit: ClassVar[str] = ""
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
-        """Return the sensors as they are instead."""
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+        """Return the disturbed sensors."""
         return tuple(sensors)
 
-    def on_the_road(self, trajectories: Trajectories) -> Trajectories:
-        """Return the traffic as it is instead."""
+    def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
+        """Return the disturbed traffic."""
         return trajectories
 
-    def taken(self, simulation: Simulation, number: int, time: float) -> Frame:
-        """Return a frame as it is taken instead."""
+    def disturbed_scan(self, simulation: Simulation, number: int, time: float) -> Frame:
+        """Return a frame of a disturbed scan."""
         return simulation.frame(number, time)
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
-        """Return what the frame shows instead."""
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # for those who override it
+        """Return the disturbed frame."""
         return frame
 
-    def looked_at(self, detector: Detector) -> Detector:
-        """Return the detector as it looks at frames instead."""
+    def disturbed_detector(self, detector: Detector) -> Detector:
+        """Return the disturbed detector."""
         return detector
 
 
@@ -76,7 +76,7 @@ class RangeNoise(Disturbance):
     name: ClassVar[str] = "more range noise"
     unit: ClassVar[str] = "m"
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors with both errors: independent, so their variances add."""
 
         def noisier(model: LidarModel) -> LidarModel:
@@ -92,7 +92,7 @@ class DropOff(Disturbance):
     name: ClassVar[str] = "returns lost"
     unit: ClassVar[str] = "of the returns"
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors with a larger general drop-off."""
 
         def lossy(model: LidarModel) -> LidarModel:
@@ -124,7 +124,7 @@ class Rain(Disturbance):
     name: ClassVar[str] = "rain or fog"
     unit: ClassVar[str] = "extinction per km"
 
-    def hung(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
+    def disturbed_sensors(self, sensors: Sequence[MountedSensor]) -> tuple[MountedSensor, ...]:
         """Return the sensors with what the air between takes from them."""
 
         def dimmed(model: LidarModel) -> LidarModel:
@@ -133,20 +133,20 @@ class Rain(Disturbance):
 
         return _with_models(sensors, dimmed)
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:
         """Return the frame with drops where rays ended on them."""
-        wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * NEAR)
+        wet = random.random(len(frame)) < -math.expm1(-self.size / 1000.0 * DROP_RANGE)
         near = random.random(len(frame))
         places = np.array([sensor.xyz for sensor in sensors])[frame.sensor]
         way = frame.points - places
         distance = np.linalg.norm(way, axis=1)
-        drop = places + way * (near * np.minimum(NEAR, distance) / np.maximum(distance, 1e-9))[:, None]
+        drop = places + way * (near * np.minimum(DROP_RANGE, distance) / np.maximum(distance, 1e-9))[:, None]
         return _recounted(
             replace(
                 frame,
                 points=np.where(wet[:, None], drop, frame.points).astype(np.float32),
                 intensity=np.where(wet, np.float32(DROP_INTENSITY), frame.intensity),
-                instance=np.where(wet, np.int32(STATIC), frame.instance),
+                instance=np.where(wet, np.int32(STATIC_INSTANCE), frame.instance),
             )
         )
 
@@ -170,7 +170,7 @@ def range_in(clear: float, lost: float) -> float:
 
 @dataclass(frozen=True)
 class OfOneSensor(Disturbance):
-    """Something is wrong with one sensor.
+    """A disturbance of one sensor.
 
     Parameters
     ----------
@@ -183,14 +183,14 @@ class OfOneSensor(Disturbance):
 
 @dataclass(frozen=True)
 class PositionError(OfOneSensor):
-    """A sensor is not where it is believed to be: its points lie beside what they are of, along `DIAGONAL`."""
+    """A sensor is not where it is believed to be: its points lie beside what they are of, along `ERROR_AXIS`."""
 
     name: ClassVar[str] = "sensor misplaced"
     unit: ClassVar[str] = "m"
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points moved."""
-        return _moved(frame, self.sensor, sensors[self.sensor].xyz, np.eye(3), self.size * DIAGONAL)
+        return _moved(frame, self.sensor, sensors[self.sensor].xyz, np.eye(3), self.size * ERROR_AXIS)
 
 
 @dataclass(frozen=True)
@@ -200,31 +200,31 @@ class YawError(OfOneSensor):
     name: ClassVar[str] = "yaw wrong"
     unit: ClassVar[str] = "°"
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
         return _turned(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True)
 class TiltError(OfOneSensor):
-    """A sensor leans where it is believed to be upright, in degrees about `DIAGONAL`."""
+    """A sensor leans where it is believed to be upright, in degrees about `ERROR_AXIS`."""
 
     name: ClassVar[str] = "tilt wrong"
     unit: ClassVar[str] = "°"
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
-        return _turned(frame, self, sensors, DIAGONAL)
+        return _turned(frame, self, sensors, ERROR_AXIS)
 
 
 @dataclass(frozen=True)
 class ClockOffset(OfOneSensor):
-    """A sensor's clock is late: its points are of the street so many seconds ago."""
+    """A sensor's clock is late: its points were measured so many seconds ago."""
 
     name: ClassVar[str] = "clock late"
     unit: ClassVar[str] = "s"
 
-    def taken(self, simulation: Simulation, number: int, time: float) -> Frame:
+    def disturbed_scan(self, simulation: Simulation, number: int, time: float) -> Frame:
         """Return the frame with this sensor's points from an earlier one."""
         now, before = simulation.frame(number, time), simulation.frame(number, time - self.size)
         return _merged(now, now.sensor != self.sensor, before, before.sensor == self.sensor)
@@ -232,7 +232,7 @@ class ClockOffset(OfOneSensor):
 
 @dataclass(frozen=True)
 class SensorFailure(OfOneSensor):
-    """A sensor is silent. Its number is the size, so that each in turn makes a series; they count from 1."""
+    """A sensor returns nothing. Its number is the size, so that each in turn makes a series; they count from 1."""
 
     name: ClassVar[str] = "sensor lost"
     unit: ClassVar[str] = "number of the sensor"
@@ -242,20 +242,20 @@ class SensorFailure(OfOneSensor):
         """Return the loss of a sensor by its number from 0."""
         return cls(sensor + 1.0, sensor)
 
-    def shown(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
+    def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame without this sensor's points."""
         return _recounted(_some(frame, frame.sensor != self.sensor))
 
 
 @dataclass(frozen=True)
 class Thinned(Disturbance):
-    """A share of the road users stays at home."""
+    """A share of the road users is left out."""
 
     seed: int = 0
     name: ClassVar[str] = "thinner traffic"
     unit: ClassVar[str] = "of the road users missing"
 
-    def on_the_road(self, trajectories: Trajectories) -> Trajectories:
+    def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
         """Return the motion of the others."""
         stays = np.random.default_rng(self.seed).random(len(trajectories)) >= self.size
         counts = np.diff(trajectories.first)
@@ -275,7 +275,7 @@ class CappedPillars(Disturbance):
     name: ClassVar[str] = "fuller pillars cut"
     unit: ClassVar[str] = "points that a pillar keeps"
 
-    def looked_at(self, detector: Detector) -> Detector:
+    def disturbed_detector(self, detector: Detector) -> Detector:
         """Return the detector with smaller pillars."""
         return keeping_at_most(detector, round(self.size)) if self.size else detector
 
@@ -308,11 +308,11 @@ def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> F
     return replace(frame, points=points)
 
 
-POINTS = ("points", "sensor", "delay", "intensity", "instance")
+POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance")
 
 
 def _some(frame: Frame, kept: Boolean) -> Frame:
-    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINTS})
+    return replace(frame, **{name: getattr(frame, name)[kept] for name in POINT_FIELDS})
 
 
 def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Frame:
@@ -320,7 +320,7 @@ def _merged(one: Frame, of_one: Boolean, other: Frame, of_other: Boolean) -> Fra
     kept = [_some(one, of_one), _some(other, of_other)]
     sensor = np.concatenate([part.sensor for part in kept])
     order = np.argsort(sensor, kind="stable")
-    points = {name: np.concatenate([getattr(part, name) for part in kept])[order] for name in POINTS}
+    points = {name: np.concatenate([getattr(part, name) for part in kept])[order] for name in POINT_FIELDS}
     return _recounted(replace(one, **points))
 
 
@@ -328,7 +328,7 @@ def _recounted(frame: Frame) -> Frame:
     """Return the frame with the labels' returns counted anew."""
     labels = frame.labels
     most = max(int(labels.user.max(initial=0)), int(frame.instance.max(initial=0))) + 1
-    on_users = frame.instance != STATIC
+    on_users = frame.instance != STATIC_INSTANCE
     sensors = labels.points.shape[1]
     cell = frame.instance[on_users].astype(np.int64) * sensors + frame.sensor[on_users]
     counts = np.bincount(cell, minlength=most * sensors).reshape(most, sensors)

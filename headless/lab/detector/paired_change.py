@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from headless.detection.average_precision import FEWEST_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
+from headless.detection.average_precision import MIN_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> I
     effect measures. Statistics in Medicine 27 (2008), 1693-1702).
     """
     value = float(np.mean(values))
-    if blocks < FEWEST_BLOCKS:
+    if blocks < MIN_BLOCKS:
         return IntervalEstimate(value, -math.inf, math.inf)
     low, high = percentiles(np.mean(draws, axis=0))
     reach = student_reach(values) if len(values) > 1 else 0.0

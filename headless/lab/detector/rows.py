@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from headless.detection.breakdown import Bin
-from headless.detection.suitability import MOST_OVER_FULL
+from headless.detection.suitability import MAX_OVERFULL_SHARE
 from headless.lab.stability.rows import Row
 
 import numpy as np
@@ -43,7 +43,7 @@ _RAIN = (
     "nothing notices: drops near the sensors harm first, not the light lost, so have the sensors filter them; for the "
     "light give attenuation_per_m the extinction there and back, and evaluate again"
 )
-ANSWERS: Mapping[str, str] = {
+REMEDIES: Mapping[str, str] = {
     RangeNoise.name: _CATALOGUE.format("range_noise_std_m"),
     DropOff.name: _CATALOGUE.format("dropoff_general_rate"),
     Rain.name: _RAIN,
@@ -53,7 +53,7 @@ ANSWERS: Mapping[str, str] = {
     ClockOffset.name: "one cloud does not tell: synchronise the sensors' clocks to better than that",
     SensorFailure.name: "headless.robust --failure places sensors for the loss of any one of them",
     Thinned.name: "nothing: thinner traffic hides less",
-    CappedPillars.name: f"a warning where more than {MOST_OVER_FULL:.0%} of the pillars with points are over-full",
+    CappedPillars.name: f"a warning where more than {MAX_OVERFULL_SHARE:.0%} of the pillars with points are over-full",
 }
 
 
@@ -102,7 +102,7 @@ def _of_curve(curve: DisturbanceCurve, study: LimitsStudy) -> Row:
         f"{detectors} detectors on the same {study.frames} frames with and without; 95 % interval of the paired "
         "difference, over blocks of traffic (bootstrap) and trainings (Student); half the resamples "
         + ("say the same" if curve.steady else "say something else: test on more traffic"),
-        ANSWERS[curve.name],
+        REMEDIES[curve.name],
     )
 
 
@@ -190,7 +190,7 @@ def _of_pillars(pillars: Sequence[PillarFilling]) -> Row:
         f"empty and over-full pillars ({own[0][1][0]} points kept)",
         "; ".join(each),
         "counted in undisturbed test frames",
-        "empty pillars cost nothing, as points alone are looked at; " + ANSWERS[CappedPillars.name],
+        "empty pillars cost nothing, as points alone are looked at; " + REMEDIES[CappedPillars.name],
     )
 
 

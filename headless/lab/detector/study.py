@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from headless.detection.average_precision import Evaluation
-from headless.detection.breakdown import ALONG_DISTANCE, ALONG_POINTS, Bin, false_by, recall_by
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, Bin, false_by, recall_by
 from headless.detection.case_study import ModelConfiguration, model_configurations, padded
 from headless.detection.detector import Detector
 from headless.detection.pillars import Filling, filling
@@ -44,10 +44,10 @@ from .trials import DisturbedTrial, EvaluatedDetector, TrialSite, trials
 Series = tuple[Disturbance, ...]
 """Disturbances of one kind, the mildest first."""
 
-ALONG_BORDER = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
+BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
 """Metres from the border of the region of interest, between which road users are counted."""
 
-LOOKED_AT = 8
+COUNTED_FRAMES = 8
 """Frames in which pillars are counted."""
 
 
@@ -79,7 +79,7 @@ def brief_series(sensor: int) -> tuple[Series, ...]:
 
 @dataclass(frozen=True, eq=False)
 class DisturbanceEffect:
-    """What a disturbance of one size does.
+    """Average precision under a disturbance of one size.
 
     Parameters
     ----------
@@ -121,18 +121,18 @@ class DisturbanceCurve:
 
     @property
     def begins(self) -> DisturbanceEffect | None:
-        """The mildest that lowers average precision by more than chance, or None."""
+        """The smallest size that lowers average precision by more than chance, or None."""
         return next((point for point in self.points if point.change.high < 0), None)
 
     @property
     def steady(self) -> bool:
-        """Whether half the resamples say the same of every size."""
+        """Whether half the resamples give the same result for every size."""
         return all((point.change.high < 0) == (point.change_by_half.high < 0) for point in self.points)
 
 
 @dataclass(frozen=True, eq=False)
 class SeedSpread:
-    """What trainings with other seeds make of the same placement.
+    """Spread of average precision over seeds of the training, with one placement.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class SeedSpread:
 
 @dataclass(frozen=True, eq=False)
 class TransferResult:
-    """What detectors are worth where they have not learnt.
+    """Average precision of detectors on types, traffic or sites that they were not trained on.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class TransferResult:
 
 @dataclass(frozen=True, eq=False)
 class BorderResults:
-    """Where in the region the undisturbed detectors fail, of one placement and the first detector.
+    """Recall by distance from the region's border, of the first detector with one placement.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ class BorderResults:
 
 @dataclass(frozen=True, eq=False)
 class PillarFilling:
-    """How full pillars are with a placement.
+    """Filling of pillars with one placement.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class PillarFilling:
 
 @dataclass(frozen=True, eq=False)
 class OtherSite:
-    """Another ground, on which detectors from home are tried.
+    """Another site, on which detectors are evaluated that were not trained there.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class OtherSite:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedDetectors:
-    """Detectors to be tried at home.
+    """Detectors to be evaluated on the site that they were trained on.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ class EvaluatedDetectors:
 
 @dataclass(frozen=True, eq=False)
 class TrainingPlan:
-    """Who has to be trained before the study.
+    """Detectors that have to be trained before the study.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def training_plan(
     seeds: int,
     padding: bool,
 ) -> TrainingPlan:
-    """Return who has to be trained; from one type's clouds for as large a part of the steps as they are of all clouds.
+    """Return the detectors to train; from one type's clouds for as large a part of the steps as they are of all clouds.
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ def limits_study(
     store: Path,
     score: float,
 ) -> Generator[Progress, None, LimitsStudy]:
-    """Try detectors until they fail.
+    """Evaluate detectors under growing disturbances.
 
     Parameters
     ----------
@@ -393,7 +393,7 @@ def limits_study(
 
 
 class _Desk:
-    """Hands out trials and counts them."""
+    """Runs trials, and counts them for progress."""
 
     def __init__(self, home: TrialSite, store: Path, total: int) -> None:
         self._home, self._store, self._total, self._done = home, store, total, 0
@@ -435,7 +435,7 @@ class _Desk:
         candidates: EvaluatedDetectors,
         elsewhere: Sequence[OtherSite],
     ) -> Generator[Progress, None, list[TransferResult]]:
-        """Try detectors of one type with the others, and all detectors on other grounds."""
+        """Evaluate detectors of one type on the others, and all detectors on other sites."""
         found = []
         for configuration in configurations:
             tried = {}
@@ -516,13 +516,13 @@ def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
         name,
         score,
         {
-            "points": recall(by_sensor, "points", ALONG_POINTS),
-            "sensor": recall(by_sensor, "distance", ALONG_DISTANCE),
-            "border": recall(by_border, "distance", ALONG_BORDER),
+            "points": recall(by_sensor, "points", POINT_EDGES),
+            "sensor": recall(by_sensor, "distance", DISTANCE_EDGES),
+            "border": recall(by_border, "distance", BORDER_EDGES),
         },
         {
-            "sensor": false_by(by_sensor, "distance", ALONG_DISTANCE, score),
-            "border": false_by(by_border, "distance", ALONG_BORDER, score),
+            "sensor": false_by(by_sensor, "distance", DISTANCE_EDGES, score),
+            "border": false_by(by_border, "distance", BORDER_EDGES, score),
         },
     )
 
@@ -532,7 +532,7 @@ def _pillars(ground: TrialSite, configuration: SensorConfiguration, detector: De
     caps = (detector.settings.most_points, 8, 4, 2, 1)
     frames = [
         ground.simulator.frame(configuration, ground.runs[0], number)
-        for number in range(min(LOOKED_AT, len(ground.runs[0].times)))
+        for number in range(min(COUNTED_FRAMES, len(ground.runs[0].times)))
     ]
     counted = {}
     for cap in dict.fromkeys(caps):

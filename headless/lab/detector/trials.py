@@ -14,7 +14,7 @@ from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
 from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
-from headless.detection.settings import GROUPS
+from headless.detection.settings import CLASS_CATEGORIES
 from headless.detection.training import deterministic
 
 import numpy as np
@@ -65,7 +65,7 @@ TABLES = {"detections": EvaluatedDetections, "wanted": CountedTruth}
 
 @dataclass(frozen=True, eq=False)
 class TrialSite:
-    """Where detectors are tried.
+    """A site with the test frames on which detectors are evaluated.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class TrialSite:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedDetector:
-    """A detector that is tried."""
+    """A trained detector to be evaluated."""
 
     name: str
     detector: Detector
@@ -112,7 +112,7 @@ class EvaluatedDetector:
 
 @dataclass(frozen=True, eq=False)
 class DisturbedTrial:
-    """What one detector made of the test frames.
+    """Results of one detector on disturbed test frames.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def trials(
     tested: Sequence[EvaluatedDetector],
     store: Path,
 ) -> Generator[Progress, None, list[DisturbedTrial]]:
-    """Try detectors with a placement under a disturbance; a frame is simulated once for all of them.
+    """Evaluate detectors with a placement under a disturbance; a frame is simulated once for all of them.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def trials(
     paths = [store / f"{digest(setting, one_tested.key)[:32]}.npz" for one_tested in tested]
     missing = [(one_tested, path) for one_tested, path in zip(tested, paths, strict=True) if not path.exists()]
     if missing:
-        detectors = [disturbance.looked_at(one_tested.detector) for one_tested, _ in missing]
+        detectors = [disturbance.disturbed_detector(one_tested.detector) for one_tested, _ in missing]
         results = yield from _results(ground, configuration, disturbance, detectors)
         for (one_tested, path), frames in zip(missing, results, strict=True):
             header = {"ground": ground.name, "configuration": configuration.name, "detector": one_tested.name}
@@ -160,7 +160,7 @@ def trials(
 
 
 def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTrial:
-    """Judge what a detector made of some frames."""
+    """Evaluate a detector's results on some frames."""
 
     def from_border(boxes: Float) -> Float:
         distance: Float = shapely.distance(region.boundary, shapely.points(boxes[:, :2]))
@@ -182,14 +182,17 @@ def disturbed_frames(
 ) -> Generator[tuple[SampledRun, Frame], None, None]:
     """Simulate the test frames as they are under a disturbance."""
     simulator = ground.simulator
-    sensors = disturbance.hung(configuration.sensors)
+    sensors = disturbance.disturbed_sensors(configuration.sensors)
     for run in ground.runs:
-        trajectories = disturbance.on_the_road(run.trajectories)
+        trajectories = disturbance.disturbed_traffic(run.trajectories)
         bodies = [fitted_body(user) for user in trajectories.users]
         simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
         for number, time in enumerate(run.times.tolist()):
             random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
-            yield run, disturbance.shown(disturbance.taken(simulation, number, time), sensors, random)
+            yield (
+                run,
+                disturbance.disturbed_frame(disturbance.disturbed_scan(simulation, number, time), sensors, random),
+            )
 
 
 def _results(
@@ -208,7 +211,7 @@ def _results(
                     frame,
                     cloud,
                     found,
-                    classes=tuple(GROUPS.values()),
+                    classes=tuple(CLASS_CATEGORIES.values()),
                     region=ground.simulator.static.region,
                     sensors=configuration.places,
                     run=run.name,

@@ -19,23 +19,23 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern, LidarModel
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Candidates, Site, Targets
-from seip_addon.core.visibility.float32_precision import NOTICEABLE, STEP
+from seip_addon.core.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.visibility.settings import WIDEST_DELTA, VisibilitySettings
+from seip_addon.core.visibility.settings import MAX_DELTA, VisibilitySettings
 
 from .float64_rays import FirstHits, first_hits
 from .hard_scenes import HardScene, far_away, hard_scenes, ordinary_scene, stored_far_away, with_stray
 from .rows import Row
 from .shares import Share
 
-ROUNDINGS = 64
+MAX_ROUNDINGS = 64
 """Steps of float32 at a scene's extent that explain a hit: what visibility allows for, too."""
 
 DISTANCES = tuple(10.0 ** (half / 2) for half in range(4, 15))
 """Metres to which an ordinary street is moved, or at which a stray mesh is left."""
 
-ENDLESS = 1e9
+RAY_LENGTH = 1e9
 """Metres that rays go."""
 
 DELTA = 0.5
@@ -142,7 +142,7 @@ def engines_here() -> tuple[Engine, ...]:
 def arithmetic_study(
     rays: int = 20_000, seed: int = 0, engines: Sequence[Engine] | None = None
 ) -> Generator[Progress, None, ArithmeticStudy]:
-    """Hold ray casters to float64 on scenes that are hard on them.
+    """Compare ray casters with float64 on numerically hard scenes.
 
     Parameters
     ----------
@@ -180,13 +180,13 @@ def check_hits(
     scene: HardScene, engine: Engine, truth: FirstHits, distance: float = 0.0, *, kept_at: float = 0.0
 ) -> HitCheck:
     """Compare a ray caster's hits with those of float64, of a scene that was kept in float32 so far from its origin."""
-    found, _ = make_ray_caster(scene.triangles, engine).cast(scene.origin, scene.directions, ENDLESS)
+    found, _ = make_ray_caster(scene.triangles, engine).cast(scene.origin, scene.directions, RAY_LENGTH)
     missed = np.isfinite(found) != np.isfinite(truth.distance)
     both = np.isfinite(found) & np.isfinite(truth.distance)
     along = np.zeros(len(found))
     along[both] = np.abs(found[both] - truth.distance[both])
     across = along * truth.slope
-    flipped = missed | (across > max(tolerance_of(scene), ROUNDINGS * STEP * kept_at))
+    flipped = missed | (across > max(tolerance_of(scene), MAX_ROUNDINGS * FLOAT32_STEP * kept_at))
     return HitCheck(
         scene=scene.name,
         engine=engine,
@@ -202,7 +202,7 @@ def check_hits(
 def check_grid(scene: HardScene, engine: Engine) -> GridCheck:
     """Compare the visibility of targets on a scene with what float64 says of it, and of what it may be."""
     site = _site(scene)
-    delta = min(DELTA * extent_of(scene) / 20.0, WIDEST_DELTA)
+    delta = min(DELTA * extent_of(scene) / 20.0, MAX_DELTA)
     settings = VisibilitySettings(delta)
     seen = finish(compute_visibility(site, {SENSOR.key: SENSOR}, settings, engine)).visible[0]
     exact, surely, maybe = _seen_in_float64(scene, site.targets.xyz, delta)
@@ -224,7 +224,7 @@ def extent_of(scene: HardScene) -> float:
 
 def tolerance_of(scene: HardScene) -> float:
     """Return by how much rounding may explain that a hit is off, in metres."""
-    return ROUNDINGS * STEP * extent_of(scene)
+    return MAX_ROUNDINGS * FLOAT32_STEP * extent_of(scene)
 
 
 def _truth(scene: HardScene) -> FirstHits:
@@ -243,7 +243,7 @@ def _seen_in_float64(scene: HardScene, targets: Float, delta: float) -> tuple[Bo
         aside = np.sqrt(np.maximum(target @ target - along**2, 0.0))
 
         def gap(distance: Float, along: Float = along, aside: Float = aside) -> Float:
-            return np.hypot(aside, np.where(np.isfinite(distance), distance, ENDLESS) - along)
+            return np.hypot(aside, np.where(np.isfinite(distance), distance, RAY_LENGTH) - along)
 
         exact[number] = _within(hits.distance, gap(hits.distance) < delta)
         ends = np.maximum(gap(hits.nearest), gap(hits.farthest))
@@ -319,7 +319,7 @@ def arithmetic_rows(study: ArithmeticStudy) -> list[Row]:
         ("far origin, stored by Blender", study.stored, "warns where the scene lies so far out"),
         ("stray mesh", study.stray, "leaves out what no sensor reaches, and warns of wider meshes by name"),
     ):
-        first, second = border(checks, NOTICEABLE), border(checks, 10 * NOTICEABLE)
+        first, second = border(checks, MAX_STEP), border(checks, 10 * MAX_STEP)
         rows.append(
             Row(
                 method="ray casters",

@@ -20,7 +20,7 @@ from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
 from seip_addon.core.robustness.traffic_instants import spread_instants
-from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study
+from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.workflows.survey import surroundings
 from seip_addon.core.workflows.traffic import split_runs
@@ -32,7 +32,7 @@ from .page import Chapter, Chart
 from .robustness_rows import pose_rows, robust_rows, traffic_rows
 from .solver_limits import solver_rows, solver_study
 
-FAILURES = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
+RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
 
 DETECTOR_RUNS = 3
@@ -41,7 +41,7 @@ DETECTOR_RUNS = 3
 
 @dataclass(frozen=True)
 class StabilityScope:
-    """How much is tried.
+    """Sizes of the studies.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class StabilityScope:
     instances : int
         Random placement problems of each kind.
     instants : tuple of int
-        Of traffic, to choose on and to judge by.
+        Of traffic, to choose on and to evaluate on.
     detector : mapping of str to int
         See `detector_limits`: seeds and steps of trainings.
     """
@@ -97,13 +97,13 @@ class StudiedScene:
 
     @property
     def sensor(self) -> str:
-        """The type in the middle of those that were named: it has something to lose, and something to win."""
+        """The middle one of the sensor types: neither its best nor its worst coverage is trivial."""
         sensors = list(self.surveyed.layout.models)
         return sensors[len(sensors) // 2]
 
     @property
     def placed(self) -> str:
-        """What is placed, for titles."""
+        """The placement, for titles."""
         return f"{DEFAULT_COUNT} × {self.sensor}"
 
     def problem(self, sensor: str) -> PlacementProblem:
@@ -118,28 +118,32 @@ class StudiedScene:
 Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 
-def chapters(stage: StudiedScene) -> Iterator[tuple[str, Work]]:
+def chapters(studied: StudiedScene) -> Iterator[tuple[str, Work]]:
     """Yield the chapters that a scene allows, by the names that they are kept under."""
     yield "criterion", criterion
     yield "arithmetic", arithmetic
     yield "solvers", solvers
     yield "poses", poses
     yield "failures", failures
-    if len(stage.runs) > 1:
+    if len(studied.runs) > 1:
         yield "traffic", traffic
-    if importlib.util.find_spec("torch") and len(stage.runs) > DETECTOR_RUNS:
+    if importlib.util.find_spec("torch") and len(studied.runs) > DETECTOR_RUNS:
         yield "detector", detector
 
 
-def criterion(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Vary what defines visibility."""
-    layout = stage.surveyed.layout
+def criterion(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Vary δ, grid spacings and beam azimuth."""
+    layout = studied.surveyed.layout
     delta = layout.settings.visibility.delta
-    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=stage.scope.grids)
-    limits_charts.save_ring_border_chart(stage.charts / "ring_borders.png", study, delta, f"{stage.name}: rings and δ")
-    limits_charts.save_border_check_chart(stage.charts / "beyond_border.png", study, f"{stage.name}: beyond the border")
-    limits_charts.save_delta_chart(stage.charts / "delta.png", study, delta, f"{stage.name}: coverage against δ")
-    limits_charts.save_convergence_chart(stage.charts / "convergence.png", study, f"{stage.name}: spacings")
+    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=studied.scope.grids)
+    limits_charts.save_ring_border_chart(
+        studied.charts / "ring_borders.png", study, delta, f"{studied.name}: rings and δ"
+    )
+    limits_charts.save_border_check_chart(
+        studied.charts / "beyond_border.png", study, f"{studied.name}: beyond the border"
+    )
+    limits_charts.save_delta_chart(studied.charts / "delta.png", study, delta, f"{studied.name}: coverage against δ")
+    limits_charts.save_convergence_chart(studied.charts / "convergence.png", study, f"{studied.name}: spacings")
     return Chapter(
         "The criterion of visibility",
         tuple(criterion_rows(study, delta)),
@@ -152,10 +156,10 @@ def criterion(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def arithmetic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Hold the ray casters to float64."""
-    study = yield from arithmetic_study(stage.scope.rays)
-    limits_charts.save_rounding_chart(stage.charts / "rounding.png", study, "Hits against float64")
+def arithmetic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Compare the ray casters with float64."""
+    study = yield from arithmetic_study(studied.scope.rays)
+    limits_charts.save_rounding_chart(studied.charts / "rounding.png", study, "Hits against float64")
     return Chapter(
         "Arithmetic",
         tuple(arithmetic_rows(study)),
@@ -163,18 +167,18 @@ def arithmetic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Drive the solvers to where they fail, and see how flat the top is."""
-    study = yield from solver_study(stage.scope.instances)
+def solvers(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Find the limits of the solvers, and the size of the near-optimal set."""
+    study = yield from solver_study(studied.scope.instances)
     tops: list[tuple[str, NearOptimalSet]] = []
-    for sensor in stage.surveyed.layout.models:
-        problem = stage.problem(sensor)
-        best = yield from solve(problem, SolverLimits(stage.surveyed.layout.settings.solver))
+    for sensor in studied.surveyed.layout.models:
+        problem = studied.problem(sensor)
+        best = yield from solve(problem, SolverLimits(studied.surveyed.layout.settings.solver))
         top = yield from near_optimal_set(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
-    limits_charts.save_solver_chart(stage.charts / "solvers.png", study, "Solvers at their limits")
-    limits_charts.save_flat_top_chart(stage.charts / "flat_top.png", tops, f"{stage.name}: how flat the top is")
+    limits_charts.save_solver_chart(studied.charts / "solvers.png", study, "Solvers at their limits")
+    limits_charts.save_flat_top_chart(studied.charts / "flat_top.png", tops, f"{studied.name}: how flat the top is")
     return Chapter(
         "Solvers",
         tuple(solver_rows(study, tops)),
@@ -185,23 +189,23 @@ def solvers(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Let the poses of a placement err."""
-    layout, around = stage.surveyed.layout, surroundings(stage.surveyed.layout)
+def poses(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study a placement under pose errors."""
+    layout, around = studied.surveyed.layout, surroundings(studied.surveyed.layout)
     study = yield from robust_study(
-        around, stage.problem(stage.sensor), stage.scope.robust, limits=layout.settings.limits
+        around, studied.problem(studied.sensor), studied.scope.robust, limits=layout.settings.limits
     )
     chosen = study.nominal[0].placement.chosen
-    deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
-    judged = yield from pose_study(around, deployment, stage.scope.poses)
-    robust_charts.save_spread_chart(stage.charts / "spread.png", study, f"{stage.placed} under pose errors")
-    robust_charts.save_blame_chart(stage.charts / "blame.png", judged, f"{stage.placed}: what costs coverage")
+    deployment = deploy(layout.site, layout.models, studied.surveyed.grid.visible, chosen)
+    under_errors = yield from pose_study(around, deployment, studied.scope.poses)
+    robust_charts.save_spread_chart(studied.charts / "spread.png", study, f"{studied.placed} under pose errors")
+    robust_charts.save_blame_chart(studied.charts / "blame.png", under_errors, f"{studied.placed}: what costs coverage")
     robust_charts.save_frontier_chart(
-        stage.charts / "frontier.png", study, f"{stage.placed}: what robustness costs and saves"
+        studied.charts / "frontier.png", study, f"{studied.placed}: what robustness costs and saves"
     )
     return Chapter(
-        f"Poses that err: {stage.placed}",
-        (*pose_rows(judged), *robust_rows(study)),
+        f"Poses that err: {studied.placed}",
+        (*pose_rows(under_errors), *robust_rows(study)),
         (
             Chart(
                 "spread.png", "Distribution of coverage over unseen draws: the nominal optimum and robust placements"
@@ -212,42 +216,42 @@ def poses(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def failures(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Let a sensor fail, and ask for more than one look."""
-    around, problem = surroundings(stage.surveyed.layout), stage.problem(stage.sensor)
+def failures(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study placements under sensor failures and multi-cover."""
+    around, problem = surroundings(studied.surveyed.layout), studied.problem(studied.sensor)
     study = yield from robust_study(
-        around, problem, stage.scope.robust, FAILURES, stage.surveyed.layout.settings.limits
+        around, problem, studied.scope.robust, RISKS, studied.surveyed.layout.settings.limits
     )
-    robust_charts.save_spread_chart(stage.charts / "failures.png", study, f"{stage.placed}: failures")
+    robust_charts.save_spread_chart(studied.charts / "failures.png", study, f"{studied.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
-    return Chapter(f"Failures: {stage.placed}", robust_rows(study), (Chart("failures.png", caption),))
+    return Chapter(f"Failures: {studied.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
-def traffic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Let vehicles stand in the way of a placement."""
-    layout = stage.surveyed.layout
-    around, problem, settings = surroundings(layout), stage.problem(stage.sensor), layout.settings
-    to_choose_on, to_judge_in = split_runs(stage.runs)
-    choose, judge = stage.scope.instants
-    scenarios = yield from look_at_traffic(around, problem, spread_instants(to_choose_on, choose, seed=0))
-    judged = spread_instants(to_judge_in, judge, seed=1)
+def traffic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study placements in traffic."""
+    layout = studied.surveyed.layout
+    around, problem, settings = surroundings(layout), studied.problem(studied.sensor), layout.settings
+    runs_to_choose, runs_to_evaluate = split_runs(studied.runs)
+    to_choose, to_evaluate = studied.scope.instants
+    scenarios = yield from traffic_scenarios(around, problem, spread_instants(runs_to_choose, to_choose, seed=0))
+    evaluation = spread_instants(runs_to_evaluate, to_evaluate, seed=1)
     steps = traffic_study(
         around,
         problem,
         scenarios,
-        judged,
+        evaluation,
         settings.limits,
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
-    deployment = deploy(layout.site, layout.models, stage.surveyed.grid.visible, chosen)
-    title = f"{stage.placed} in traffic"
+    deployment = deploy(layout.site, layout.models, studied.surveyed.grid.visible, chosen)
+    title = f"{studied.placed} in traffic"
     traffic_charts.save_time_map(
-        stage.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
+        studied.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
     )
-    traffic_charts.save_promise_chart(stage.charts / "promise.png", [(stage.placed, study)], title)
+    traffic_charts.save_traffic_chart(studied.charts / "promise.png", [(studied.placed, study)], title)
     return Chapter(
-        f"Traffic that hides things: {stage.placed}",
+        f"Traffic that hides things: {studied.placed}",
         traffic_rows(study),
         (
             Chart("time_seen.png", "Share of time for which each target, and the point above it, is seen in traffic"),
@@ -256,24 +260,26 @@ def traffic(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def detector(stage: StudiedScene) -> Generator[Progress, None, Chapter]:
-    """Train detectors, and try them until they fail."""
+def detector(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Train detectors, and evaluate them under growing disturbances."""
     from headless.lab.detector import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
     from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
     from headless.lab.detector.chapter import detector_limits  # noqa: PLC0415 -- as above
 
-    study = yield from detector_limits(stage.surveyed, stage.scene, stage.others, stage.work, **stage.scope.detector)
-    limit_charts.save_limits_chart(stage.charts / "detector.png", study)
+    study = yield from detector_limits(
+        studied.surveyed, studied.scene, studied.others, studied.work, **studied.scope.detector
+    )
+    limit_charts.save_limits_chart(studied.charts / "detector.png", study)
     charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
     if study.foreign:
-        limit_charts.save_foreign_chart(stage.charts / "detector_away.png", study)
+        limit_charts.save_foreign_chart(studied.charts / "detector_away.png", study)
         charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
 
 
-def introduction(stage: StudiedScene) -> str:
-    """Return what the page begins with."""
-    site = stage.surveyed.layout.site
+def introduction(studied: StudiedScene) -> str:
+    """Return the introduction of the page."""
+    site = studied.surveyed.layout.site
     return (
         "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
         f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "

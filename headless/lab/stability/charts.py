@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from headless.charts.style import DASHED, MARKS, new_figure, save_chart, style_axes
+from headless.charts.style import DASHED, MARKERS, new_figure, save_chart, style_axes
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,8 +15,8 @@ from matplotlib.ticker import FuncFormatter
 
 from seip_addon.core.pictures.palette import INK, SOFT_INK
 from seip_addon.core.placement.near_optimal import NearOptimalSet
-from seip_addon.core.placement.problem import TIE
-from seip_addon.core.visibility.float32_precision import NOTICEABLE, STEP
+from seip_addon.core.placement.problem import TIE_TOLERANCE
+from seip_addon.core.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy
@@ -25,7 +25,7 @@ from .solver_limits import SolverStudy
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Told apart by colour-blind people (Okabe and Ito 2008)."""
 
-LIMIT: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": DASHED}
+LIMIT_LINE: dict[str, Any] = {"color": SOFT_INK, "linewidth": 1.2, "linestyle": DASHED}
 
 
 def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, delta: float, title: str) -> None:
@@ -38,10 +38,10 @@ def save_ring_border_chart(path: str | os.PathLike[str], study: CriterionStudy, 
         for number, height in enumerate(sorted({border.height for border in own})):
             at = [border for border in own if border.height == height]
             deltas, radii = [border.delta for border in at], [border.radius for border in at]
-            style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
+            style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKERS[number], "markersize": 5}
             panel.plot(deltas, radii, label=f"{height:g} m high", **style)
             panel.fill_between(deltas, radii, top, color=COLOURS[number], alpha=0.07)
-        panel.axvline(delta, **LIMIT)
+        panel.axvline(delta, **LIMIT_LINE)
         _delta_axis(panel, study)
         panel.set_ylim(0, top)
         panel.set_title(f"{sensor}: above the line, coverage counts beams", fontsize=10, color=INK)
@@ -61,9 +61,9 @@ def save_border_check_chart(path: str | os.PathLike[str], study: CriterionStudy,
         ]
         at, value, low, high = np.array(points).T
         reach = [np.maximum(value - low, 0), np.maximum(high - value, 0)]
-        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "capsize": 3}
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKERS[number], "capsize": 3}
         panel.errorbar(at, value, reach, label=own.sensor, **style)
-    panel.axvline(1.0, **LIMIT)
+    panel.axvline(1.0, **LIMIT_LINE)
     panel.set_ylim(0, 1.03)
     _share_axis(panel)
     style_axes(panel, "distance in multiples of the border", "of the targets in view, share that counts as seen")
@@ -76,19 +76,19 @@ def save_delta_chart(path: str | os.PathLike[str], study: CriterionStudy, delta:
     figure, panels = _figure(2)
     for number, sensor in enumerate(dict.fromkeys(answer.sensor for answer in study.by_delta)):
         own = [answer for answer in study.by_delta if answer.sensor == sensor]
-        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKERS[number]}
         deltas = [answer.delta for answer in own]
         coverage, view = [answer.coverage for answer in own], [answer.view for answer in own]
         panels[0].plot(deltas, coverage, label=f"{sensor}, {own[0].height:g} m high", **style)
         panels[0].plot(deltas, view, color=COLOURS[number], linewidth=1.0, linestyle=":")
         panels[0].fill_between(deltas, coverage, view, color=COLOURS[number], alpha=0.06)
-        panels[1].plot(deltas, [answer.judged for answer in own], label=sensor, **style)
+        panels[1].plot(deltas, [answer.evaluated for answer in own], label=sensor, **style)
     for panel, what in zip(
         panels,
         ("coverage (dotted: what is in view; between them, beams)", f"coverage under δ = {delta:g} m"),
         strict=True,
     ):
-        panel.axvline(delta, **LIMIT)
+        panel.axvline(delta, **LIMIT_LINE)
         _delta_axis(panel, study)
         panel.set_ylim(0, 1.03)
         _share_axis(panel)
@@ -107,10 +107,10 @@ def save_convergence_chart(path: str | os.PathLike[str], study: CriterionStudy, 
     ):
         spacing = [a.grid_spacing if panel is panels[0] else a.candidate_spacing for a in answers]
         panel.plot(spacing, [a.own for a in answers], color=COLOURS[1], marker="s", label="on its own grid")
-        panel.plot(spacing, [a.judged for a in answers], color=COLOURS[0], marker="o", label="on the fine grid")
-        best = max(a.judged for a in answers)
+        panel.plot(spacing, [a.evaluated for a in answers], color=COLOURS[0], marker="o", label="on the fine grid")
+        best = max(a.evaluated for a in answers)
         panel.axhspan(best - study.convergence.tolerance, best, color=COLOURS[2], alpha=0.12, label="tolerance")
-        panel.axvline(at, **LIMIT)
+        panel.axvline(at, **LIMIT_LINE)
         panel.set_xscale("log", base=2)
         panel.invert_xaxis()
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -134,13 +134,13 @@ def save_rounding_chart(path: str | os.PathLike[str], study: ArithmeticStudy, ti
             own = [check for check in checks if check.engine == engine]
             style: dict[str, Any] = {
                 "color": COLOURS[number],
-                "marker": MARKS[number],
+                "marker": MARKERS[number],
                 "linestyle": dash,
                 "markersize": 5,
             }
             panel.plot([c.distance for c in own], [c.off for c in own], label=f"{name}, {engine}", **style)
-    panel.axhline(NOTICEABLE, **LIMIT)
-    panel.axvline(NOTICEABLE / STEP, **LIMIT)
+    panel.axhline(MAX_STEP, **LIMIT_LINE)
+    panel.axvline(MAX_STEP / FLOAT32_STEP, **LIMIT_LINE)
     panel.set_xscale("log")
     panel.set_yscale("log")
     style_axes(panel, "distance (m); dashed: where the tool warns", "hits off at most, across the surface (m)")
@@ -153,11 +153,11 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     figure, panels = _figure(3)
     for number, (what, method) in enumerate(dict.fromkeys((c.what, c.method) for c in study.spans)):
         own = [c for c in study.spans if (c.what, c.method) == (what, method)]
-        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number], "markersize": 5}
+        style: dict[str, Any] = {"color": COLOURS[number], "marker": MARKERS[number], "markersize": 5}
         panels[0].plot([c.decades for c in own], [c.lost for c in own], label=f"{what}, {method}", **style)
-    panels[0].axhline(TIE, **LIMIT)
+    panels[0].axhline(TIE_TOLERANCE, **LIMIT_LINE)
     panels[0].set_yscale("symlog", linthresh=1e-13)
-    panels[0].set_ylim(0, 10 * TIE)
+    panels[0].set_ylim(0, 10 * TIE_TOLERANCE)
     panels[0].set_xticks(sorted({check.decades for check in study.spans}))
     style_axes(panels[0], "powers of ten that they span", "largest loss; dashed: counts as equal")
     by = [check.by for check in study.ties]
@@ -165,7 +165,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     panels[1].errorbar(
         by, shares[0], np.maximum([shares[0] - shares[1], shares[2] - shares[0]], 0), color=COLOURS[0], marker="o"
     )
-    panels[1].axvline(TIE, **LIMIT)
+    panels[1].axvline(TIE_TOLERANCE, **LIMIT_LINE)
     panels[1].set_xscale("log")
     _share_axis(panels[1])
     style_axes(panels[1], "share by which equal weights are disturbed", "choices that change")
@@ -178,7 +178,7 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
         )
     ):
         dash = "--" if number == 2 else "-"
-        panels[2].plot(counts, values, color=COLOURS[number], marker=MARKS[number], linestyle=dash, label=name)
+        panels[2].plot(counts, values, color=COLOURS[number], marker=MARKERS[number], linestyle=dash, label=name)
     panels[2].set_ylim(0.5, 1.03)
     _share_axis(panels[2])
     style_axes(panels[2], "sensors", "coverage on the worst instance")

@@ -1,6 +1,6 @@
 """Sensitivity of coverage and placement to δ, grid spacings and beam azimuth.
 
-Each setting is varied alone. An answer is judged twice: as its own settings see it, and on
+Each setting is varied alone. An answer is evaluated twice: as its own settings see it, and on
 one fine grid of targets with the δ asked for, the same for all.
 """
 
@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 from headless.convergence import (
     CANDIDATE_SPACINGS,
+    EVALUATION_SPACING,
     GRID_SPACINGS,
-    JUDGED_ON,
     Answer,
     Convergence,
-    Judge,
+    Evaluator,
     coarsest_settings,
 )
 
@@ -24,7 +24,7 @@ import numpy as np
 import shapely
 
 from seip_addon.core.arrays import Boolean, Float
-from seip_addon.core.estimates import NORMAL, IntervalEstimate
+from seip_addon.core.estimates import NORMAL_QUANTILE, IntervalEstimate
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Deployment
@@ -45,13 +45,13 @@ from .shares import Share
 DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Metres."""
 
-RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
+BORDER_RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Distances in multiples of the border, between which targets are counted."""
 
-PLACES = 6
+POSITIONS_COUNTED = 6
 """Positions from which targets are counted for each sensor type and height."""
 
-CLEAR = 0.3
+SIGHT_CLEARANCE = 0.3
 """Metres before a target within which a line of sight may end on the road that the target lies on."""
 
 
@@ -98,7 +98,7 @@ class DeltaAnswer:
         Under this δ.
     view : float
         Share of the targets that its sensors have in view: what coverage would be if beams lay close.
-    judged : float
+    evaluated : float
         Its coverage on the fine grid, under the δ asked for.
     moved : float, metres
         Mean distance of its sensors to the nearest of the placement for the δ asked for.
@@ -109,7 +109,7 @@ class DeltaAnswer:
     delta: float
     coverage: float
     view: float
-    judged: float
+    evaluated: float
     moved: float
 
 
@@ -133,7 +133,7 @@ class Draws:
     @property
     def spread_interval(self) -> tuple[float, float]:
         """Its 95 % interval, by the normal approximation of its logarithm."""
-        reach = math.exp(NORMAL / math.sqrt(2 * (len(self.coverage) - 1)))
+        reach = math.exp(NORMAL_QUANTILE / math.sqrt(2 * (len(self.coverage) - 1)))
         return self.spread / reach, self.spread * reach
 
     @property
@@ -146,7 +146,7 @@ class Draws:
 
 @dataclass(frozen=True, eq=False)
 class CriterionStudy:
-    """How coverage and placement hang on the criterion.
+    """Sensitivity of coverage and placement to the criterion of visibility.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def criterion_study(
     draws: int = 40,
     seed: int = 0,
 ) -> Generator[Progress, None, CriterionStudy]:
-    """Vary what defines visibility, one thing at a time.
+    """Vary δ, grid spacings and beam azimuth, one at a time.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def criterion_study(
     draws : int
         Grids, and azimuths, that are drawn at random.
     """
-    goal, random = Objective(count=count), np.random.default_rng(seed)
+    objective, random = Objective(count=count), np.random.default_rng(seed)
     models = settings.models()
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     reach = float(np.hypot(*np.ptp(site.targets.xyz[:, :2], axis=0)))
@@ -203,21 +203,21 @@ def criterion_study(
     by_delta: list[DeltaAnswer] = []
     for key in models:
         candidates = replace(settings.candidates, sensors=(key,), heights=(heights[len(heights) // 2],))
-        by_delta += yield from _by_delta(geometry, replace(settings, candidates=candidates), goal)
+        by_delta += yield from _by_delta(geometry, replace(settings, candidates=candidates), objective)
 
-    judge = Judge(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, objective)
     by_grid = []
     for spacing in GRID_SPACINGS:
         tried = replace(settings, grid_spacing=spacing)
-        by_grid.append((yield from within(Progress(0, 0, f"targets {spacing:g} m apart"), judge.answer(tried))))
+        by_grid.append((yield from within(Progress(0, 0, f"targets {spacing:g} m apart"), evaluator.answer(tried))))
     by_candidates = []
     for spacing in CANDIDATE_SPACINGS:
         tried = replace(settings, candidates=replace(settings.candidates, spacing=spacing))
-        by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), judge.answer(tried))))
-    convergence = yield from coarsest_settings(geometry, settings, goal, tolerance)
+        by_candidates.append((yield from within(Progress(0, 0, f"posts {spacing:g} m apart"), evaluator.answer(tried))))
+    convergence = yield from coarsest_settings(geometry, settings, objective, tolerance)
 
-    best = yield from judge.plan(site, settings)
-    phase, rechosen = yield from _by_grid_laid(judge, site, settings, best, draws, random)
+    best = yield from evaluator.solve(site, settings)
+    phase, rechosen = yield from _by_grid_laid(evaluator, site, settings, best, draws, random)
     azimuth = yield from _by_azimuth(site, settings, best.deployment, draws, random)
     return CriterionStudy(
         borders=borders,
@@ -268,7 +268,7 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float
     distance = np.linalg.norm(way, axis=1)
     elevation = np.arcsin(np.clip(way @ orientation[:, 2] / distance, -1.0, 1.0))
     end, _ = caster.cast(xyz, way / distance[:, None], float(distance.max()) + 1.0)
-    free: Boolean = end >= distance - CLEAR
+    free: Boolean = end >= distance - SIGHT_CLEARANCE
     free &= (distance >= model.min_range) & (distance <= model.max_range)
     free &= (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
     return free
@@ -298,43 +298,45 @@ def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle:
 
 def _seen_by_ratio(site: Site, model: LidarModel, settings: VisibilitySettings) -> SeenByRatio:
     """Count targets in view, and those seen, from upright sensors, by distance in multiples of the border."""
-    caster, look, targets = make_ray_caster(site.triangles), visibility_model(site, settings), site.targets.xyz
+    caster, visibility, targets = make_ray_caster(site.triangles), visibility_model(site, settings), site.targets.xyz
     poses = site.candidates
-    total, seen = np.zeros(len(RATIOS) - 1, dtype=int), np.zeros(len(RATIOS) - 1, dtype=int)
+    total, seen = np.zeros(len(BORDER_RATIOS) - 1, dtype=int), np.zeros(len(BORDER_RATIOS) - 1, dtype=int)
     upright = (poses.sensor == model.key) & (poses.tilt == 0)
     for height in np.unique(poses.height[upright]):
         own = np.flatnonzero(upright & (poses.height == height))
-        for pose in own[np.linspace(0, len(own) - 1, PLACES).astype(int)]:
+        for pose in own[np.linspace(0, len(own) - 1, POSITIONS_COUNTED).astype(int)]:
             xyz, orientation = poses.xyz[pose], poses.orientation(pose)
             view = in_view(caster, model, xyz, orientation, targets)
-            sees = look.see(model, xyz, orientation) & view
+            sees = visibility.see(model, xyz, orientation) & view
             ratio = np.hypot(*(targets - xyz)[:, :2].T) / unresolved_from(model, height, settings.delta, math.inf)
-            total += np.histogram(ratio[view], RATIOS)[0]
-            seen += np.histogram(ratio[sees], RATIOS)[0]
+            total += np.histogram(ratio[view], BORDER_RATIOS)[0]
+            seen += np.histogram(ratio[sees], BORDER_RATIOS)[0]
     shares = (Share(int(s), int(t)) if t else None for s, t in zip(seen, total, strict=True))
-    return SeenByRatio(model.key, RATIOS, tuple(shares))
+    return SeenByRatio(model.key, BORDER_RATIOS, tuple(shares))
 
 
 def _by_delta(
-    geometry: SceneGeometry, settings: SurveySettings, goal: Objective
+    geometry: SceneGeometry, settings: SurveySettings, objective: Objective
 ) -> Generator[Progress, None, list[DeltaAnswer]]:
     """Vary δ for one sensor type at one height."""
-    judge = Judge(geometry, settings, goal)
+    evaluator = Evaluator(geometry, settings, objective)
     site = make_site(geometry, settings.candidates, settings.grid_spacing)
     caster = make_ray_caster(site.triangles, settings.engine)
     (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights
-    asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), judge.plan(site, settings))
+    asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), evaluator.solve(site, settings))
     answers = []
     for delta in DELTAS:
         tried = replace(settings, visibility=replace(settings.visibility, delta=delta))
-        plan = yield from within(Progress(0, 0, f"{sensor}: δ = {delta:g} m"), judge.plan(site, tried))
-        sensors = plan.deployment.sensors
+        solution = yield from within(Progress(0, 0, f"{sensor}: δ = {delta:g} m"), evaluator.solve(site, tried))
+        sensors = solution.deployment.sensors
         view = np.any([in_view(caster, s.model, s.xyz, s.orientation, site.targets.xyz) for s in sensors], axis=0)
-        seen = plan.deployment.seen_by > 0
-        moved = _moved(plan.deployment, asked.deployment)
-        coverage = plan.deployment.coverage
+        seen = solution.deployment.seen_by > 0
+        moved = _moved(solution.deployment, asked.deployment)
+        coverage = solution.deployment.coverage
         answers.append(
-            DeltaAnswer(sensor, height, delta, coverage, float((view | seen).mean()), judge.judge(plan), moved)
+            DeltaAnswer(
+                sensor, height, delta, coverage, float((view | seen).mean()), evaluator.evaluate(solution), moved
+            )
         )
     return answers
 
@@ -347,34 +349,34 @@ def _moved(deployment: Deployment, other: Deployment) -> float:
 
 
 def _by_grid_laid(
-    judge: Judge,
+    evaluator: Evaluator,
     site: Site,
     settings: SurveySettings,
     best: Solution,
     draws: int,
     random: np.random.Generator,
 ) -> Generator[Progress, None, tuple[Draws, Draws]]:
-    """Judge the best placement on grids that lie otherwise; choose anew on a quarter of them."""
+    """Evaluate the best placement on shifted and rotated grids; optimise anew on a quarter of them."""
     covered, rechosen = [], []
     for draw in range(draws):
         targets = turned_targets(
-            judge.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
+            evaluator.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
         )
         laid = replace(site, targets=targets)
         covered.append(_coverage(laid, settings, best.deployment))
         step = Progress(draw, draws, "grids of targets laid otherwise")
         yield step
         if draw % 4 == 0:
-            plan = yield from within(step, judge.plan(laid, settings))
-            rechosen.append(judge.judge(plan))
+            solution = yield from within(step, evaluator.solve(laid, settings))
+            rechosen.append(evaluator.evaluate(solution))
     return Draws("grid phase and angle", np.array(covered)), Draws("placements on such grids", np.array(rechosen))
 
 
 def _coverage(site: Site, settings: SurveySettings, deployment: Deployment, turn: Sequence[float] = ()) -> float:
-    look = visibility_model(site, settings.visibility, settings.engine)
+    visibility = visibility_model(site, settings.visibility, settings.engine)
     turns = turn or [0.0] * len(deployment.sensors)
     seen = [
-        look.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))
+        visibility.see(sensor.model, sensor.xyz, sensor.orientation @ level_orientation(by))
         for sensor, by in zip(deployment.sensors, turns, strict=True)
     ]
     return float(np.any(seen, axis=0).mean())
@@ -415,8 +417,9 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
                 method=f"coverage, {by_delta} at {least.height:g} m",
                 regime=f"δ from {least.delta:g} to {most.delta:g} m",
                 begins=f"coverage goes from {least.coverage:.1%} to {most.coverage:.1%} of the targets while "
-                f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at most "
-                f"{100 * (max(a.judged for a in answers) - min(a.judged for a in answers)):.1f} points of coverage",
+                f"{least.view:.1%} to {most.view:.1%} are in view; the placement loses at "
+                f"most {100 * (max(a.evaluated for a in answers) - min(a.evaluated for a in answers)):.1f} points of "
+                "coverage",
                 how="best placements under each δ, judged under the one asked for",
                 answer="the record holds δ; warns where it cannot resolve the rings",
             )
@@ -425,15 +428,15 @@ def criterion_rows(study: CriterionStudy, delta: float) -> list[Row]:
         ("grid spacing", study.by_grid, study.convergence.settings.grid_spacing),
         ("candidate spacing", study.by_candidates, study.convergence.settings.candidates.spacing),
     ):
-        finest = max(answer.judged for answer in tried)
-        worst = min(tried, key=lambda answer: answer.judged)
+        finest = max(answer.evaluated for answer in tried)
+        worst = min(tried, key=lambda answer: answer.evaluated)
         spacing = worst.grid_spacing if what == "grid spacing" else worst.candidate_spacing
         rows.append(
             Row(
                 method="placement",
                 regime=what,
-                begins=f"loses up to {100 * (finest - worst.judged):.2f} points of coverage ({spacing:g} m)",
-                how=f"best placements under each spacing, judged on targets {JUDGED_ON:g} m apart",
+                begins=f"loses up to {100 * (finest - worst.evaluated):.2f} points of coverage ({spacing:g} m)",
+                how=f"best placements under each spacing, judged on targets {EVALUATION_SPACING:g} m apart",
                 answer=f"--tolerance {study.convergence.tolerance:g} picks {picked:g} m",
             )
         )

@@ -23,7 +23,7 @@ _PAIRS_AT_ONCE = 1 << 19  # of rays and triangles, bounds the memory
 
 @dataclass(frozen=True, eq=False)
 class Meetings:
-    """How r rays meet n triangles.
+    """Intersections of r rays with n triangles.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Meetings:
 
 
 def meet(origin: Float, directions: Float, triangles: Float) -> Meetings:
-    """Meet rays with triangles.
+    """Intersect rays with triangles.
 
     Parameters
     ----------

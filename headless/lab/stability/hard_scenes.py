@@ -8,16 +8,16 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 
-HALF = 10.0
+HALF_SIDE = 10.0
 """Metres: the street of most scenes reaches so far each way."""
 
 GROUND = 128
 """The first so many triangles of the street are its ground."""
 
-TURN = 0.37
+STREET_YAW = 0.37
 """Radians by which the street is turned about z."""
 
-EYE = np.array([0.3, -0.2, 5.0])
+ORIGIN = np.array([0.3, -0.2, 5.0])
 """Where rays start in most scenes."""
 
 
@@ -43,26 +43,26 @@ def hard_scenes(rays: int, random: np.random.Generator) -> list[HardScene]:
     """Return one scene of each kind that scenes made by hand or read from a map may hold."""
     street = _street()
     everywhere = _everywhere(rays, random)
-    plain = HardScene("an ordinary street", street, EYE, everywhere)
+    plain = HardScene("an ordinary street", street, ORIGIN, everywhere)
     doubled = np.concatenate([street, street])
-    pavement = _square(HALF, 5) + np.array([0.31, -0.17, 0.0])
+    pavement = _square(HALF_SIDE, 5) + np.array([0.31, -0.17, 0.0])
     needles = _needles(120, random)
     gaps = street[random.random(len(street)) < 0.5]
     other_way = np.where((np.arange(len(street)) % 2 == 0)[:, None, None], street[:, ::-1], street)
     skewed = street * (-1.0, 1.0, 1e-3)
     return [
         plain,
-        HardScene("rays along shared edges", street, EYE, _towards(_on_inner_edges(street[:GROUND], rays, random))),
-        HardScene("rays through vertices", street, EYE, _towards(_inner_vertices(street[:GROUND], rays, random))),
+        HardScene("rays along shared edges", street, ORIGIN, _towards(_on_inner_edges(street[:GROUND], rays, random))),
+        HardScene("rays through vertices", street, ORIGIN, _towards(_inner_vertices(street[:GROUND], rays, random))),
         _grazing(rays, random),
-        HardScene("duplicate faces", doubled, EYE, everywhere),
-        HardScene("coplanar faces", np.concatenate([street, pavement]), EYE, everywhere),
-        HardScene("slivers", needles, EYE, _towards(needles[random.integers(0, len(needles), rays)].mean(axis=1))),
-        HardScene("open meshes", gaps, EYE, everywhere),
-        HardScene("inside-out normals", other_way, EYE, everywhere),
-        HardScene("mirrored and badly scaled", skewed, EYE * (-1.0, 1.0, 1e-3), everywhere),
-        HardScene("tiny (20 mm wide)", street * 1e-3, EYE * 1e-3, everywhere),
-        HardScene("huge (20 km wide)", street * 1e3, EYE * 1e3, everywhere),
+        HardScene("duplicate faces", doubled, ORIGIN, everywhere),
+        HardScene("coplanar faces", np.concatenate([street, pavement]), ORIGIN, everywhere),
+        HardScene("slivers", needles, ORIGIN, _towards(needles[random.integers(0, len(needles), rays)].mean(axis=1))),
+        HardScene("open meshes", gaps, ORIGIN, everywhere),
+        HardScene("inside-out normals", other_way, ORIGIN, everywhere),
+        HardScene("mirrored and badly scaled", skewed, ORIGIN * (-1.0, 1.0, 1e-3), everywhere),
+        HardScene("tiny (20 mm wide)", street * 1e-3, ORIGIN * 1e-3, everywhere),
+        HardScene("huge (20 km wide)", street * 1e3, ORIGIN * 1e3, everywhere),
     ]
 
 
@@ -86,16 +86,16 @@ def with_stray(scene: HardScene, distance: float) -> HardScene:
 
 
 def ordinary_scene(rays: int, random: np.random.Generator) -> HardScene:
-    """Return the street that nothing is wrong with."""
-    return HardScene("an ordinary street", _street(), EYE, _everywhere(rays, random))
+    """Return a plain street without numerical difficulties."""
+    return HardScene("an ordinary street", _street(), ORIGIN, _everywhere(rays, random))
 
 
 def _street() -> Float:
     """Return a square of 128 triangles with four boxes on it, turned so that no coordinate is round."""
     boxes = [_box((x, y), size) for x, y, size in ((4, 5, 2.0), (-6, 3, 1.0), (5, -6, 3.0), (-4, -5, 0.5))]
-    cos, sin = np.cos(TURN), np.sin(TURN)
+    cos, sin = np.cos(STREET_YAW), np.sin(STREET_YAW)
     turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    street: Float = np.concatenate([_square(HALF, 8), *boxes]) @ turn
+    street: Float = np.concatenate([_square(HALF_SIDE, 8), *boxes]) @ turn
     return street
 
 
@@ -117,7 +117,7 @@ def _box(place: tuple[float, float], size: float) -> Float:
 
 def _needles(count: int, random: np.random.Generator) -> Float:
     """Triangles some metres long and a millimetre to a hundredth of one wide."""
-    start = random.uniform((-HALF, -HALF, 0), (HALF, HALF, 3), (count, 3))
+    start = random.uniform((-HALF_SIDE, -HALF_SIDE, 0), (HALF_SIDE, HALF_SIDE, 3), (count, 3))
     along = random.normal(0, 3, (count, 3))
     width = 10 ** random.uniform(-5, -3, (count, 1)) * random.normal(0, 1, (count, 3))
     return np.stack([start, start + along, start + along / 2 + width], axis=1)
@@ -125,10 +125,10 @@ def _needles(count: int, random: np.random.Generator) -> Float:
 
 def _grazing(rays: int, random: np.random.Generator) -> HardScene:
     """Rays that meet a level road at 0.06° to 6°."""
-    road = _square(HALF, 8) * (50.0, 1.0, 1.0)
+    road = _square(HALF_SIDE, 8) * (50.0, 1.0, 1.0)
     eye = np.array([-490.0, 0.1, 0.5])
     reach = np.minimum(eye[2] / np.tan(10 ** random.uniform(-3, -1, rays)), 950.0)
-    aim = np.column_stack([eye[0] + reach, random.uniform(-HALF, HALF, rays), np.zeros(rays)])
+    aim = np.column_stack([eye[0] + reach, random.uniform(-HALF_SIDE, HALF_SIDE, rays), np.zeros(rays)])
     return HardScene("grazing rays", road, eye, _towards(aim, eye))
 
 
@@ -149,12 +149,12 @@ def _on_inner_edges(ground: Float, count: int, random: np.random.Generator) -> F
 def _inner_vertices(ground: Float, count: int, random: np.random.Generator) -> Float:
     """Corners off the ground's border, (count, 3)."""
     corners = np.unique(ground.reshape(-1, 3), axis=0)
-    inner = corners[np.linalg.norm(corners, axis=1) < HALF * 0.99]
+    inner = corners[np.linalg.norm(corners, axis=1) < HALF_SIDE * 0.99]
     picked: Float = inner[random.integers(0, len(inner), count)]
     return picked
 
 
-def _towards(points: Float, eye: Float = EYE) -> Float:
+def _towards(points: Float, eye: Float = ORIGIN) -> Float:
     way = points - eye
     unit: Float = way / np.linalg.norm(way, axis=1, keepdims=True)
     return unit

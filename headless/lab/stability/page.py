@@ -33,7 +33,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one study found."""
+    """A chapter of the page: rows and charts of one study."""
 
     title: str
     rows: tuple[Row, ...]

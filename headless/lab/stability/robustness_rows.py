@@ -5,7 +5,7 @@ import numpy as np
 from seip_addon.core.estimates import mean_of
 from seip_addon.core.robustness.pose_study import PoseStudy
 from seip_addon.core.robustness.robust_study import RobustStudy
-from seip_addon.core.robustness.traffic_study import MOSTLY, NOTABLE, WHAT, TrafficStudy
+from seip_addon.core.robustness.traffic_study import LAYER_NAMES, MOSTLY_SEEN_SHARE, NOTABLE_LOSS, TrafficStudy
 
 from .rows import Row
 
@@ -61,7 +61,7 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
             f"placement for {contender.name}",
             regime,
             f"gives away {100 * study.price(contender):.2f} points of planned coverage; 5 % quantile of "
-            f"{contender.judged_by.describe_outcome()} {contender.low.describe()} against "
+            f"{contender.evaluated_by.describe_outcome()} {contender.low.describe()} against "
             f"{study.beside(contender).low.describe()} of the nominal optimum: "
             f"{study.saving(contender).as_points()} more",
             f"{settings.draws} draws that nothing was chosen on; half of them "
@@ -75,29 +75,29 @@ def robust_rows(study: RobustStudy) -> tuple[Row, ...]:
 def traffic_rows(study: TrafficStudy) -> tuple[Row, ...]:
     """Return what the study says as rows of the page of stability."""
     regime = f"{study.road_users:.0f} road users at a time"
-    stretch = study.empty.seen[study.layer].stretch
+    batch = study.empty.seen[study.layer].batch
     how = (
-        f"{len(stretch)} instants in {len(np.unique(stretch))} stretches of time, of runs that nothing was chosen on; "
+        f"{len(batch)} instants in {len(np.unique(batch))} stretches of time, of runs that nothing was chosen on; "
         f"every other one {'says the same' if study.is_converged() else 'says something else: take more'}"
     )
     losses = tuple(
         Row(
-            f"view of the {WHAT[layer]}",
+            f"view of the {LAYER_NAMES[layer]}",
             regime,
             f"of the targets' weight the empty road promises {seen.empty:.2%} and traffic leaves "
-            f"{seen.held.describe()} on average over time; of what the empty road promises vehicles hide "
-            f"{seen.hidden.describe()}, and {seen.rarely:.1%} of its targets are seen less than {MOSTLY:.0%} of the "
-            "time",
+            f"{seen.mean.describe()} on average over time; of what the empty road promises vehicles hide "
+            f"{seen.hidden.describe()}, and {seen.rarely_seen:.1%} of its targets are seen less than "
+            f"{MOSTLY_SEEN_SHARE:.0%} of the time",
             how,
-            f"a warning where {NOTABLE:.0%} of the weight or more is lost, and a map of the share of time",
+            f"a warning where {NOTABLE_LOSS:.0%} of the weight or more is lost, and a map of the share of time",
         )
         for layer, seen in study.empty.seen.items()
     )
     gain = Row(
-        f"placement for the empty road, to see the {WHAT[study.layer]}",
+        f"placement for the empty road, to see the {LAYER_NAMES[study.layer]}",
         regime,
-        f"placing on traffic holds {study.traffic.seen[study.layer].held.describe()}, "
-        f"{study.won(study.layer).as_points()} more",
+        f"placing on traffic holds {study.traffic.seen[study.layer].mean.describe()}, "
+        f"{study.gain(study.layer).as_points()} more",
         f"chosen on {study.chosen_at} instants; {how}",
         f"placement over instants of traffic; certificate: within {study.traffic.placement.gap:.2%} of the best",
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """Where one method begins to fail.
+    """One regime in which a method begins to fail.
 
     Parameters
     ----------

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from seip_addon.core.estimates import NORMAL
+from seip_addon.core.estimates import NORMAL_QUANTILE
 
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many independent trials."""
+    """A number of successes among independent trials."""
 
     count: int
     trials: int
@@ -23,7 +23,7 @@ class Share:
     @property
     def interval(self) -> tuple[float, float]:
         """The 95 % interval of the probability, by the score test (Wilson 1927): it holds for none of many, too."""
-        n, p, z = self.trials, self.value, NORMAL
+        n, p, z = self.trials, self.value, NORMAL_QUANTILE
         middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
         reach = z / (1 + z**2 / n) * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
         low = 0.0 if self.count == 0 else max(0.0, middle - reach)

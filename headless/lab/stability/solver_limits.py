@@ -13,7 +13,7 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.placement import Placement, PlacementProblem, SolverLimits, solve, solve_greedy
 from seip_addon.core.placement.integer_program import is_available, reaching
 from seip_addon.core.placement.near_optimal import NearOptimalSet
-from seip_addon.core.placement.problem import TIE
+from seip_addon.core.placement.problem import TIE_TOLERANCE
 from seip_addon.core.placement.reduced_problem import make_instance
 from seip_addon.core.placement.search_limits import Clock
 from seip_addon.core.progress import Progress, finish
@@ -27,10 +27,10 @@ DECADES = (0, 3, 6, 9, 12, 15, 18)
 PERTURBATIONS = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Shares by which equal weights are disturbed."""
 
-EXACT = 1e-12
+SUM_TOLERANCE = 1e-12
 """Share by which a covered weight may be off that was summed in float64."""
 
-ORDERS = (2, 3, 5, 7, 11, 13, 17)
+PLANE_ORDERS = (2, 3, 5, 7, 11, 13, 17)
 """Of projective planes: as symmetric as instances get, every linear program over them degenerate."""
 
 GREEDY_COUNTS = (2, 3, 4, 5, 6, 8, 10)
@@ -38,7 +38,7 @@ GREEDY_COUNTS = (2, 3, 4, 5, 6, 8, 10)
 
 @dataclass(frozen=True)
 class SpanCheck:
-    """Answers on random instances against exhaustive search.
+    """Solutions of random instances compared with exhaustive search.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class SpanCheck:
 
 @dataclass(frozen=True)
 class TieCheck:
-    """What a disturbance of equal weights does to the choice.
+    """Change of the choice under perturbations of equal weights.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class TieCheck:
 
 @dataclass(frozen=True)
 class GreedyCheck:
-    """Greedy on the instance that is worst for it.
+    """Greedy selection on its worst-case instance.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class TimeCheck:
 
 @dataclass(frozen=True)
 class SolverStudy:
-    """Where solvers fail."""
+    """Results of the checks of the solvers."""
 
     spans: tuple[SpanCheck, ...]
     ties: tuple[TieCheck, ...]
@@ -133,7 +133,7 @@ class SolverStudy:
 
 
 def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Generator[Progress, None, SolverStudy]:
-    """Drive the solvers to where they fail.
+    """Find the limits of the solvers.
 
     Parameters
     ----------
@@ -154,9 +154,9 @@ def solver_study(instances: int = 60, seed: int = 0, limit: float = 1.0) -> Gene
     yield Progress(total - 2, total, "greedy's worst case")
     greedy = tuple(_check_greedy(count) for count in GREEDY_COUNTS)
     yield Progress(total - 1, total, "symmetric instances against the clock")
-    times = [_check_time(f"projective plane of order {order}", plane(order), limit) for order in ORDERS]
-    uneven = _uneven(plane(ORDERS[-1]), 1e-7, np.random.default_rng(seed))
-    times.append(_check_time(f"projective plane of order {ORDERS[-1]}, near-ties", uneven, limit))
+    times = [_check_time(f"projective plane of order {order}", plane(order), limit) for order in PLANE_ORDERS]
+    uneven = _uneven(plane(PLANE_ORDERS[-1]), 1e-7, np.random.default_rng(seed))
+    times.append(_check_time(f"projective plane of order {PLANE_ORDERS[-1]}, near-ties", uneven, limit))
     return SolverStudy(tuple(spans), tuple(ties), greedy, tuple(times))
 
 
@@ -216,7 +216,7 @@ def covered(problem: PlacementProblem, choice: Integer) -> float:
 
 def _allowed(problem: PlacementProblem) -> list[tuple[int, ...]]:
     number, most = len(problem.visible), problem.count or len(problem.visible)
-    budget = math.inf if problem.budget is None else problem.budget * (1 + EXACT)
+    budget = math.inf if problem.budget is None else problem.budget * (1 + SUM_TOLERANCE)
     return [
         choice
         for size in range(1, most + 1)
@@ -255,7 +255,7 @@ def _span_check(
     for problem, choice in zip(problems, choices, strict=True):
         best = best_covered(problem)
         lost.append((best - covered(problem, choice)) / best)
-    worse = sum(share > EXACT for share in lost)
+    worse = sum(share > SUM_TOLERANCE for share in lost)
     return SpanCheck(what, method, decades, Share(worse, len(lost)), max(lost))
 
 
@@ -315,8 +315,9 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
                 if worst is None
                 else f"at 1e{worst.decades}: {worst.worse.value:.0%} of answers lose, at most {worst.lost:.1g}",
                 how=f"{trials} random instances a span, against all placements",
-                answer=f"what differs by less than {TIE:g} of the {'whole' if what == 'weights' else 'dearest'} counts "
-                "as equal; a note where that leaves something without a say",
+                answer=f"what differs by less than {TIE_TOLERANCE:g} of the "
+                f"{'whole' if what == 'weights' else 'dearest'} counts as equal; a note where that "
+                "leaves something without a say",
             )
         )
     free = max((check.by for check in study.ties if check.changed.count == 0), default=0.0)
@@ -327,7 +328,7 @@ def solver_rows(study: SolverStudy, tops: Sequence[tuple[str, NearOptimalSet]] =
             begins=f"choice unmoved by disturbances up to {free:g} of the weights; beyond, a changed choice misses "
             f"at most {max(check.lost for check in study.ties):.1g} of the optimum",
             how=f"{study.ties[0].changed.trials} random instances full of ties, a disturbance each",
-            answer=f"breaks ties within {TIE:g} by number, price, double coverage and order",
+            answer=f"breaks ties within {TIE_TOLERANCE:g} by number, price, double coverage and order",
         )
     )
     last = study.greedy[-1]

@@ -15,7 +15,7 @@ from ..results.placement_record import versions
 from ..scans.frame import Frame
 from ..storage.files import digest, save_json, whole_file
 from .format_interface import Format
-from .sample import FATES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
+from .sample import OUTCOMES, SPLITS, Sample, SensorPose, TrafficRun, make_sample, require_file_name
 
 SCHEMA = "seip-dataset/1"
 MANIFEST = "manifest.json"
@@ -63,7 +63,7 @@ def write_dataset(
     entry = _entry_of(manifest, run, kind, folder)
     if entry["finished"] and _all_there(folder, manifest, entry):
         return entry
-    entry.update(finished=False, samples=[], labels=dict.fromkeys(FATES, 0) if kind.classes else {}, classes={})
+    entry.update(finished=False, samples=[], labels=dict.fromkeys(OUTCOMES, 0) if kind.classes else {}, classes={})
     save_json(folder / MANIFEST, manifest)
     for done, (frame_id, frame) in enumerate(frames):
         _check(frame_id, frame, run, entry["samples"])

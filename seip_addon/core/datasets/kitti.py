@@ -52,7 +52,7 @@ CALIBRATION = "".join(
     }.items()
 )
 
-FULLY, PARTLY = 0.8, 0.4
+FULLY_VISIBLE, PARTLY_VISIBLE = 0.8, 0.4
 """Visibility from which an object counts as fully visible (0) and as partly occluded (1) and not largely (2)."""
 
 
@@ -80,7 +80,7 @@ def _label_file(sample: Sample) -> bytes:
     rotation = _wrapped(-boxes.yaw - np.pi / 2)
     # rounded: numpy's versions differ in the last digit of an arctangent
     alpha = np.round(_wrapped(rotation - np.arctan2(camera[:, 0], camera[:, 2])), 6)
-    occluded = np.where(boxes.visibility >= FULLY, 0, np.where(boxes.visibility >= PARTLY, 1, 2))
+    occluded = np.where(boxes.visibility >= FULLY_VISIBLE, 0, np.where(boxes.visibility >= PARTLY_VISIBLE, 1, 2))
     numbers = np.column_stack([height, width, length, camera, rotation])
     lines = "".join(
         f"{name} 0 {hidden} {shortest(angle)} 0 0 {PIXELS} {PIXELS} {' '.join(shortest(number) for number in row)}\n"

@@ -21,7 +21,7 @@ from .sample import Sample, TrafficRun
 RESOLUTION = 0.001
 """Of coordinates, metres."""
 
-CREATED = range(90, 94)
+CREATION_DATE_BYTES = range(90, 94)
 """The bytes of the header in which laspy puts the day of writing; zeros, for not known, keep them out of the file."""
 
 
@@ -64,7 +64,7 @@ def _laz(sample: Sample) -> bytes:
     buffer = io.BytesIO()
     points.write(buffer, do_compress=True, laz_backend=laspy.LazBackend.Lazrs)
     content = buffer.getvalue()
-    return content[: CREATED.start] + bytes(len(CREATED)) + content[CREATED.stop :]
+    return content[: CREATION_DATE_BYTES.start] + bytes(len(CREATION_DATE_BYTES)) + content[CREATION_DATE_BYTES.stop :]
 
 
 FORMAT = Format("las", "LAZ clouds", {}, sample_files, notes=notes)

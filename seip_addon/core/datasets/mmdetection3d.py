@@ -21,7 +21,7 @@ from .format_interface import Format
 from .label_files import CLASSES, image_sets, label_lines, read_labels
 from .sample import Sample, cloud
 
-NUMBERS = {name: number for number, name in enumerate(CLASSES.values())}
+LABELS = {name: number for number, name in enumerate(CLASSES.values())}
 PICKLE_PROTOCOL = 4  # whichever Python writes it, the bytes are the same
 
 
@@ -43,7 +43,7 @@ def index_files(folder: Path, splits: Mapping[str, Sequence[str]]) -> dict[str, 
 
 def _information(folder: Path, names: Sequence[str]) -> bytes:
     value = {
-        "metainfo": {"categories": NUMBERS, "dataset": "custom", "info_version": "1.1"},
+        "metainfo": {"categories": LABELS, "dataset": "custom", "info_version": "1.1"},
         "data_list": [
             {
                 "sample_idx": int(name),
@@ -58,7 +58,7 @@ def _information(folder: Path, names: Sequence[str]) -> bytes:
 
 def _instances(path: Path) -> list[dict[str, Any]]:
     boxes, classes = read_labels(path)
-    return [{"bbox_3d": box, "bbox_label_3d": NUMBERS[name]} for box, name in zip(boxes.tolist(), classes, strict=True)]
+    return [{"bbox_3d": box, "bbox_label_3d": LABELS[name]} for box, name in zip(boxes.tolist(), classes, strict=True)]
 
 
 FORMAT = Format("mmdetection3d", "mmdetection3d's format", CLASSES, sample_files, index_files)

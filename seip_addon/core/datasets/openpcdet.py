@@ -23,7 +23,7 @@ from .format_interface import Format
 from .label_files import CLASSES, image_sets, label_lines, read_labels
 from .sample import Sample, cloud
 
-IN_KITTI = {
+KITTI_CLASS = {
     "Car": "Car",
     "Van": "Van",
     "Truck": "Truck",
@@ -38,16 +38,16 @@ IN_KITTI = {
 NO_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"
 """The label of a frame without any."""
 
-STEP = 6.4
+PLAN_STEP = 6.4
 """What the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m."""
 
-STEP_UP = 2.0
+HEIGHT_STEP = 2.0
 """What the range is a multiple of in height, metres: 40 voxels, as networks of voxels ask for, of 0.05 m each."""
 
 MARGIN = 0.5
 """Between the boxes and the range, metres."""
 
-PILLAR = 0.2
+PILLAR_SIZE = 0.2
 
 
 def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
@@ -64,7 +64,7 @@ def index_files(folder: Path, splits: Mapping[str, Sequence[str]]) -> dict[str, 
 
 
 def point_cloud_range(boxes: Float) -> Float:
-    """Return x, y, z from and to, (6,) float64 in metres, that hold all boxes, in multiples of `STEP` and `STEP_UP`.
+    """Return x, y, z from and to, (6,) float64 in metres, that hold all boxes, multiples of `PLAN_STEP`, `HEIGHT_STEP`.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ def point_cloud_range(boxes: Float) -> Float:
     middle = np.column_stack([x, y, z])
     low, high = (middle - reach).min(axis=0), (middle + reach).max(axis=0)
     centre = np.round((low[:2] + high[:2]) / 2, 1)
-    half = STEP / 2 * np.ceil(np.maximum(high[:2] - centre, centre - low[:2]) / (STEP / 2))
+    half = PLAN_STEP / 2 * np.ceil(np.maximum(high[:2] - centre, centre - low[:2]) / (PLAN_STEP / 2))
     bottom = math.floor(low[2] * 10) / 10
-    top = bottom + STEP_UP * math.ceil((high[2] - bottom) / STEP_UP)
+    top = bottom + HEIGHT_STEP * math.ceil((high[2] - bottom) / HEIGHT_STEP)
     return np.round([*(centre - half), bottom, *(centre + half), top], 1)
 
 
@@ -106,7 +106,7 @@ def _configuration(boxes: Float) -> str:
         "DATA_PATH": "../data/custom",
         "CLASS_NAMES": list(CLASSES.values()),
         "POINT_CLOUD_RANGE": extent.tolist(),
-        "MAP_CLASS_TO_KITTI": IN_KITTI,
+        "MAP_CLASS_TO_KITTI": KITTI_CLASS,
         "DATA_SPLIT": {"train": "train", "test": "val"},
         "INFO_PATH": {"train": ["custom_infos_train.pkl"], "test": ["custom_infos_val.pkl"]},
         "POINT_FEATURE_ENCODING": {
@@ -127,7 +127,7 @@ def _configuration(boxes: Float) -> str:
             {"NAME": "shuffle_points", "SHUFFLE_ENABLED": {"train": True, "test": False}},
             {
                 "NAME": "transform_points_to_voxels",
-                "VOXEL_SIZE": [PILLAR, PILLAR, round(float(extent[5] - extent[2]), 1)],
+                "VOXEL_SIZE": [PILLAR_SIZE, PILLAR_SIZE, round(float(extent[5] - extent[2]), 1)],
                 "MAX_POINTS_PER_VOXEL": 32,
                 "MAX_NUMBER_OF_VOXELS": {"train": 40000, "test": 40000},
             },

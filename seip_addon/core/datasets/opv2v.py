@@ -35,8 +35,8 @@ CLASSES = {"car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus"}
 """OpenCOOD knows one class, the vehicle; two-wheelers and pedestrians are none."""
 
 SPLIT_FOLDERS = {"train": "train", "val": "validate", "test": "test"}
-MOST_AGENTS = 7
-FARTHEST_AGENT = 70.0
+MAX_AGENTS = 7
+MAX_AGENT_DISTANCE = 70.0
 """What OpenCOOD takes by default: agents, and metres from the ego in plan."""
 
 FIELDS = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4")])
@@ -76,14 +76,14 @@ def left_handed_pose(xyz: Float, orientation: Float) -> list[float]:
 def notes(run: TrafficRun) -> tuple[str, ...]:
     """Name the agents that OpenCOOD would leave out."""
     ego = run.sensors[0]
-    far = [sensor.label for sensor in run.sensors if _distance(sensor, ego) > FARTHEST_AGENT]
+    far = [sensor.label for sensor in run.sensors if _distance(sensor, ego) > MAX_AGENT_DISTANCE]
     found = []
-    if len(run.sensors) > MOST_AGENTS:
-        found.append(f"there are {len(run.sensors)} agents; set max_cav to that, or OpenCOOD takes {MOST_AGENTS} alone")
+    if len(run.sensors) > MAX_AGENTS:
+        found.append(f"there are {len(run.sensors)} agents; set max_cav to that, or OpenCOOD takes {MAX_AGENTS} alone")
     if far:
         found.append(
-            f"{', '.join(far)}: farther than {FARTHEST_AGENT:g} m from {ego.label}, the ego; OpenCOOD leaves them out "
-            "unless COM_RANGE is raised"
+            f"{', '.join(far)}: farther than {MAX_AGENT_DISTANCE:g} m from {ego.label}, the ego; OpenCOOD leaves them "
+            "out unless COM_RANGE is raised"
         )
     return tuple(found)
 

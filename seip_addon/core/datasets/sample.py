@@ -21,7 +21,7 @@ WRITTEN = "written"
 OUTSIDE = "outside_region"
 NO_CLASS = "no_class"
 TOO_FEW = "too_few_points"
-FATES = (WRITTEN, OUTSIDE, NO_CLASS, TOO_FEW)
+OUTCOMES = (WRITTEN, OUTSIDE, NO_CLASS, TOO_FEW)
 """What can become of a label, as the manifest counts it; the first that applies of those after `WRITTEN`."""
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
@@ -29,7 +29,7 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
 
 @dataclass(frozen=True, eq=False)
 class SensorPose:
-    """A sensor as a dataset describes it.
+    """A sensor of a dataset: type and pose.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Sample:
     frame : Frame
         With all its labels.
     fates : tuple of str
-        What becomes of each of them, one of `FATES`.
+        What becomes of each of them, one of `OUTCOMES`.
     boxes : Labels
         Those that are to be written.
     classes : tuple of str

@@ -1,4 +1,4 @@
-r"""How a sensor is turned: from its own axes (x along azimuth zero, z up along its axis) to the site's.
+r"""Orientation of sensors: rotation from a sensor's axes (x along azimuth zero, z up) to the site's.
 
 A sensor of yaw ψ, tilt θ and roll φ is turned as
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Float
 
-STRAIGHT = 1 - 1e-12
+VERTICAL_SINE = 1 - 1e-12
 """Sine of the tilt from which a sensor looks straight down, or up."""
 
 
@@ -61,7 +61,7 @@ def orientation(yaw: float, tilt: float, roll: float = 0.0) -> Float:
 def angles_of(matrix: Float) -> tuple[float, float, float]:
     """Return yaw, tilt and roll (radians) of a rotation (3, 3) from a sensor's axes to the site's."""
     tilt = math.atan2(-matrix[2, 0], math.hypot(matrix[0, 0], matrix[1, 0]))
-    if abs(matrix[2, 0]) > STRAIGHT:  # straight down or up: yaw and roll turn about one axis
+    if abs(matrix[2, 0]) > VERTICAL_SINE:  # straight down or up: yaw and roll turn about one axis
         return math.atan2(-matrix[0, 1], matrix[1, 1]), tilt, 0.0
     return math.atan2(matrix[1, 0], matrix[0, 0]), tilt, math.atan2(matrix[2, 1], matrix[2, 2])
 

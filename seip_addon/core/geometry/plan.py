@@ -8,12 +8,12 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer
 
-LEAST_AREA = 1e-9
+MIN_AREA = 1e-9
 """Square metres in plan below which a triangle stands on edge and covers nothing."""
 
 _OVERLAY_GRID = 1e-4
 
-_SEAM = 1e-6
+_BARYCENTRIC_SLACK = 1e-6
 """Slack in barycentric coordinates, so that no point falls between two triangles."""
 
 
@@ -26,7 +26,7 @@ def signed_area(triangles: Float) -> Float:
 
 def outline(triangles: Float, grid: float = 1e-3) -> BaseGeometry:
     """Return the union in plan of triangles (n, 3, 2 or 3), corners rounded to a grid in metres."""
-    lying = triangles[np.abs(signed_area(triangles)) > LEAST_AREA, :, :2]
+    lying = triangles[np.abs(signed_area(triangles)) > MIN_AREA, :, :2]
     return shapely.union_all(shapely.polygons(lying), grid_size=grid)
 
 
@@ -87,7 +87,7 @@ def heights_over(plan: Float, triangles: Float) -> tuple[Integer, Float]:
     height : (k,) float64, metres
         Of a surface there.
     """
-    lying = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
+    lying = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
     low, high = lying[:, :, :2].min(axis=1), lying[:, :, :2].max(axis=1)
     tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
     point, near = tree.query(shapely.points(plan), predicate="intersects")
@@ -99,5 +99,5 @@ def _covers(triangles: Float, plan: Float) -> Boolean:
     """Whether each triangle (n, 3, 3) lies over or under its point (n, 2), by barycentric coordinates."""
     corners = triangles[:, :, :2]
     opposite = [signed_area(np.stack([corners[:, i], corners[:, i - 2], plan], axis=1)) for i in range(3)]
-    inside: Boolean = (np.stack(opposite) / signed_area(triangles) >= -_SEAM).all(axis=0)
+    inside: Boolean = (np.stack(opposite) / signed_area(triangles) >= -_BARYCENTRIC_SLACK).all(axis=0)
     return inside

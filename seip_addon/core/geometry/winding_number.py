@@ -9,9 +9,9 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 
-_BITS = 16
+_COORDINATE_BITS = 16
 """Of each coordinate, for the order of triangles in space."""
-_SMALLEST = 16
+_MIN_BLOCK_TRIANGLES = 16
 """Triangles of a block at least."""
 _TOLERANCES = (0.1, 0.01, 0.001, 0.0)
 """Of the errors of all far blocks together; a point that the first leaves in doubt is looked at with the next."""
@@ -118,7 +118,7 @@ class Blocks:
     @classmethod
     def of(cls, triangles: Float) -> Blocks:
         """Put triangles (m, 3, 3) into blocks, some √m of them: more take longer to go through, fewer hold more."""
-        size = max(_SMALLEST, math.isqrt(len(triangles)) // 8)
+        size = max(_MIN_BLOCK_TRIANGLES, math.isqrt(len(triangles)) // 8)
         # Triangles without area fill the last block.
         filling = np.broadcast_to(triangles[-1:, :1], (-len(triangles) % size, 3, 3))
         ordered = triangles[_order(triangles.sum(axis=1))]
@@ -165,7 +165,7 @@ class Blocks:
 def _order(places: Float) -> Integer:
     """Return an order of places (n, 3) in which those that follow each other are neighbours: Morton's (1966)."""
     low = places.min(axis=0)
-    step = max(float((places - low).max()), np.finfo(np.float64).tiny) / (2**_BITS - 1)
+    step = max(float((places - low).max()), np.finfo(np.float64).tiny) / (2**_COORDINATE_BITS - 1)
     steps = ((places - low) / step).astype(np.int64)
-    bits = [((steps >> bit) & 1) @ (1, 2, 4) << 3 * bit for bit in range(_BITS)]
+    bits = [((steps >> bit) & 1) @ (1, 2, 4) << 3 * bit for bit in range(_COORDINATE_BITS)]
     return np.argsort(sum(bits), kind="stable")

@@ -90,7 +90,7 @@ class LidarModel:
         return sum(self.price_range) / 2
 
 
-MOST_RAYS = 50_000_000
+MAX_RAYS = 50_000_000
 """Rays of a revolution beyond which a figure must be a slip: fifty times the study's finest type."""
 
 
@@ -105,8 +105,8 @@ def _require_valid(model: LidarModel) -> None:
         "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
         "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
         "the rotation rate must lie between 0.01 and 1000 Hz": 0.01 <= model.rotation_rate <= 1000,
-        f"a revolution must have at most {MOST_RAYS:,} rays": (
-            model.points_per_second <= MOST_RAYS * model.rotation_rate and model.channels <= MOST_RAYS
+        f"a revolution must have at most {MAX_RAYS:,} rays": (
+            model.points_per_second <= MAX_RAYS * model.rotation_rate and model.channels <= MAX_RAYS
         ),
         "its price range must be positive, finite and not decreasing": 0 < low <= high < math.inf,
         "the range noise must be 0 m or more and finite": 0 <= model.range_noise_std < math.inf,

@@ -10,13 +10,13 @@ from ..arrays import Boolean, Float
 from .beams import BeamPattern
 from .model import LidarModel
 
-DIRECTIONS = 120
+RING_AZIMUTHS = 120
 """Azimuths at which rings are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class BeamRings:
-    """Lines to be drawn.
+    """Rings and edges of the field of view, as lines.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class BeamRings:
 
 
 def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap: float) -> BeamRings:
-    """Return what a sensor's beams draw on a flat road.
+    """Return the rings of a sensor on a flat road, and the edges of its field of view.
 
     Parameters
     ----------
@@ -56,18 +56,18 @@ def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap:
     inwards[1:] = np.linalg.norm(hits[1:, :, :2] - hits[:-1, :, :2], axis=-1)
     inwards[1:][~meets[:-1]] = 0.0
     inwards[0] = 0.0
-    following = np.roll(np.arange(DIRECTIONS), -1)
+    following = np.roll(np.arange(RING_AZIMUTHS), -1)
     drawn = meets & meets[:, following]
     rings = np.stack([hits, hits[:, following]], axis=2)[drawn]
     ends = place + np.where(meets, reach, model.max_range)[..., None] * beams
-    edges = ends[[0, -1], :: DIRECTIONS // 12].reshape(-1, 3)
+    edges = ends[[0, -1], :: RING_AZIMUTHS // 12].reshape(-1, 3)
     cone = np.stack([np.broadcast_to(place, edges.shape), edges], axis=1)
     return BeamRings(rings, (np.maximum(inwards, inwards[:, following]) > gap)[drawn], cone)
 
 
 def _directions(model: LidarModel) -> Float:
-    """Return unit directions (channels, `DIRECTIONS`, 3) in the sensor's axes, the lowest channel first."""
-    steps = np.arange(DIRECTIONS) * model.azimuth_count // DIRECTIONS
+    """Return unit directions (channels, `RING_AZIMUTHS`, 3) in the sensor's axes, the lowest channel first."""
+    steps = np.arange(RING_AZIMUTHS) * model.azimuth_count // RING_AZIMUTHS
     channels = np.argsort(model.elevations, kind="stable")
     rays = channels[:, None] * model.azimuth_count + steps
-    return BeamPattern(model).directions(rays.ravel()).reshape(model.channels, DIRECTIONS, 3)
+    return BeamPattern(model).directions(rays.ravel()).reshape(model.channels, RING_AZIMUTHS, 3)

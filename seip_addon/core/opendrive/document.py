@@ -16,7 +16,7 @@ from ..errors import SeipError
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-_GREATEST = 1e9  # metres are below this anywhere on Earth in any projection; nothing computed from it overflows
+_MAX_NUMBER = 1e9  # metres are below this anywhere on Earth in any projection; nothing computed from it overflows
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Node:
             raise SeipError(f"{self.place}: <{self.tag}> has no {name!r}; OpenDRIVE asks for it, export the map again")
         return value.strip()
 
-    def number(self, name: str, default: float | None = None, *, most: float = _GREATEST) -> float:
+    def number(self, name: str, default: float | None = None, *, most: float = _MAX_NUMBER) -> float:
         """Return an attribute as a number of earthly size; without a default it must be there.
 
         Parameters
@@ -77,7 +77,7 @@ class Node:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not abs(value) <= _GREATEST:
+        if not abs(value) <= _MAX_NUMBER:
             raise SeipError(f"{self.place}: {name}={text!r} of <{self.tag}> is no sensible number; correct the map")
         if abs(value) > most:
             raise SeipError(
@@ -104,7 +104,7 @@ class Node:
         return self.text(name, str(default)).lower() in ("true", "yes", "1")
 
 
-_STARTS = {
+_OTHER_FILE_STARTS = {
     b"\x1f\x8b": "is compressed with gzip; unpack it (gunzip)",
     b"PK\x03\x04": "is a zip archive; unpack it",
     b"BZh": "is compressed with bzip2; unpack it (bunzip2)",
@@ -117,7 +117,7 @@ _STARTS = {
 def _refuse_other_formats(path: str | os.PathLike[str], name: str) -> None:
     with open(path, "rb") as file:  # noqa: PTH123 - as above
         start = file.read(1000)
-    for mark, cure in _STARTS.items():
+    for mark, cure in _OTHER_FILE_STARTS.items():
         if start.startswith(mark):
             raise SeipError(f"{name} {cure}")
     if start.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["):

@@ -6,10 +6,10 @@ import math
 import re
 from dataclasses import dataclass
 
-_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563
+_SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563
 """Of the ellipsoid WGS 84; GRS 80 differs from it by 0.1 mm."""
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
-_WORLD = {"WGS84", "GRS80", "ETRS89"}
+_WORLD_DATUMS = {"WGS84", "GRS80", "ETRS89"}
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class TransverseMercator:
         meridian exact to a millimetre.
         """
         n = _FLATTENING / (2 - _FLATTENING)
-        radius = _AXIS / (1 + n) * (1 + n**2 / 4 + n**4 / 64)
+        radius = _SEMI_MAJOR_AXIS / (1 + n) * (1 + n**2 / 4 + n**4 / 64)
         xi, eta = self._on_sphere(latitude, longitude - self.longitude, n)
         origin, _ = self._on_sphere(self.latitude, 0.0, n)
         return (
@@ -69,7 +69,7 @@ def projection(geo_reference: str | None) -> TransverseMercator | None:
     kind = values.get("proj", "")
     datum = values.get("datum", values.get("ellps", "WGS84")).upper()
     shifted = any(float(part or 0) for part in values.get("towgs84", "").split(",") if _is_number(part))
-    if datum not in _WORLD or shifted or values.get("units", "m") != "m":
+    if datum not in _WORLD_DATUMS or shifted or values.get("units", "m") != "m":
         return None
     if kind == "utm" and values.get("zone", "").isdigit():
         return _utm(int(values["zone"]), south="south" in values)

@@ -14,14 +14,14 @@ from ..geometry.plan import closed
 from .lanes import LaneSurface
 from .road_map import Junction, RoadMap
 
-_CRACK = 0.005  # metres
+_MAX_GAP = 0.005  # metres
 
 
 def junction_area(surfaces: Iterable[LaneSurface], junction_id: str) -> BaseGeometry:
     """Return the union of all lanes of a junction in plan, map coordinates; empty if it has none."""
     lanes = [surface.polygon for surface in surfaces if surface.junction_id == junction_id]
     # Neighbouring lanes of different roads meet to within rounding: hairline cracks are closed.
-    return closed(shapely.union_all(lanes), _CRACK)
+    return closed(shapely.union_all(lanes), _MAX_GAP)
 
 
 def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name: str) -> Junction:

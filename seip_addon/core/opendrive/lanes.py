@@ -16,8 +16,8 @@ from ..errors import SeipError
 from .road_map import Lane, LaneSection, Road, RoadFrame
 from .sampling import sample
 
-_SMALLEST_TRIANGLE = 1e-9  # square metres
-_HIGHEST, _WIDEST = 10_000.0, 1_000.0  # metres; beyond them a number of the map has slipped
+_MIN_TRIANGLE_AREA = 1e-9  # square metres
+_MAX_HEIGHT, _MAX_WIDTH = 10_000.0, 1_000.0  # metres; beyond them a number of the map has slipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class LaneSurface:
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         # Inside a bend tighter than the lane is far from the reference line a strip turns over.
         upward = np.where((normals[:, 2] < 0.0)[:, None, None], triangles[:, ::-1], triangles)
-        return np.asarray(upward[np.linalg.norm(normals, axis=1) > 2.0 * _SMALLEST_TRIANGLE])
+        return np.asarray(upward[np.linalg.norm(normals, axis=1) > 2.0 * _MIN_TRIANGLE_AREA])
 
     @cached_property
     def polygon(self) -> BaseGeometry:
@@ -126,10 +126,10 @@ def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
 def _check_size(points: Float, place: str) -> None:
     """Raise an error where edges of lanes, (k, lanes, 2, 3), are where no road is."""
     highest = float(np.abs(points[..., 2]).max(initial=0.0))
-    if highest > _HIGHEST:
+    if highest > _MAX_HEIGHT:
         raise SeipError(f"{place}: it lies at {highest:,.0f} m above or below zero; correct the elevation in the map")
     widest = float(np.linalg.norm(points[:, :, 0] - points[:, :, 1], axis=-1).max(initial=0.0))
-    if widest > _WIDEST:
+    if widest > _MAX_WIDTH:
         raise SeipError(f"{place}: a lane is {widest:,.0f} m wide; correct its width in the map")
 
 

@@ -16,7 +16,7 @@ from ..geometry.orientation import orientation
 from .road_map import Corner, Repeat, Road, RoadMap, RoadObject
 from .sampling import sample
 
-_MOST_COPIES = 10_000
+_MAX_COPIES = 10_000
 _STRIP_TOLERANCE = 0.02  # metres
 _ENDS = (0.0, 1.0)
 
@@ -119,8 +119,8 @@ def _steps(road: Road, thing: RoadObject, repeat: Repeat) -> Float:
     if repeat.distance == 0.0 or length <= 0.0:
         return np.zeros(1)
     # A row whose length is a multiple of the distance has its last copy in spite of rounding.
-    count = math.floor(min(length / repeat.distance + 1e-9, _MOST_COPIES)) + 1
-    if count > _MOST_COPIES:
+    count = math.floor(min(length / repeat.distance + 1e-9, _MAX_COPIES)) + 1
+    if count > _MAX_COPIES:
         raise SeipError(f"road {road.id}: object {thing.id} is repeated too often; correct its <repeat> in the map")
     return repeat.distance * np.arange(count)
 

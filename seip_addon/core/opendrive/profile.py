@@ -8,9 +8,9 @@ import numpy as np
 
 from ..arrays import Float
 
-_NOUGHT = 1e-12
+_MIN_TERM = 1e-12
 """Terms of a cubic smaller than this, in relation to the largest, move no zero that can be told."""
-_REAL = 1e-9
+_MAX_IMAGINARY_PART = 1e-9
 """Imaginary parts below this come from rounding."""
 
 
@@ -58,9 +58,9 @@ class Profile:
         may_cross = (span > 0.0) & (np.abs(scaled[:, 1:]).sum(axis=1) >= np.abs(scaled[:, 0]))
         found = [np.empty(0)]
         for record in np.flatnonzero(may_cross):
-            cubic = np.where(np.abs(scaled[record]) > _NOUGHT * np.abs(scaled[record]).max(), scaled[record], 0.0)
+            cubic = np.where(np.abs(scaled[record]) > _MIN_TERM * np.abs(scaled[record]).max(), scaled[record], 0.0)
             roots = np.roots(cubic[::-1])
-            share = roots[np.abs(roots.imag) < _REAL].real
+            share = roots[np.abs(roots.imag) < _MAX_IMAGINARY_PART].real
             found.append(self.start[record] + span[record] * share[(share > 0.0) & (share < 1.0)])
         return np.concatenate(found)
 
@@ -78,7 +78,7 @@ def profile(records: list[tuple[float, tuple[float, float, float, float]]]) -> P
     )
 
 
-NONE = profile([])
+ZERO_PROFILE = profile([])
 """The profile without records: zero everywhere."""
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
-from .profile import NONE, LateralShape, Profile, lateral_shape, profile
+from .profile import ZERO_PROFILE, LateralShape, Profile, lateral_shape, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
@@ -39,10 +39,10 @@ _OTHER_FORMATS = {
     "OpenSCENARIO": " as OpenSCENARIO does",
     "kml": " as KML does",
 }
-_LONGEST_ROAD = 1e6  # metres; beyond it a number has slipped
-_FARTHEST = 5_000.0  # metres that an object reaches, and stands from its road; beyond it a number has slipped
-_HIGHEST = 1_000.0  # metres; no building is higher
-_MOST_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
+_MAX_ROAD_LENGTH = 1e6  # metres; beyond it a number has slipped
+_MAX_OBJECT_DISTANCE = 5_000.0  # metres that an object reaches, and stands from its road
+_MAX_OBJECT_HEIGHT = 1_000.0  # metres; no building is higher
+_MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 
 
 def read_map(path: str | os.PathLike[str]) -> RoadMap:
@@ -129,7 +129,7 @@ def _reference_line(road: Node) -> ReferenceLine:
         start=np.array([[node.number(name) for name in ("x", "y", "hdg")] for node in nodes]),
         pieces=tuple(_piece(node) for node in nodes),
     )
-    if line.end > _LONGEST_ROAD:
+    if line.end > _MAX_ROAD_LENGTH:
         raise SeipError(f"{road.place}: its <geometry> reaches {line.end:g} m; no road is that long, correct the map")
     return line
 
@@ -157,7 +157,7 @@ def _piece(geometry: Node) -> Piece:
 
 def _clothoid(node: Node, first: float, last: float, length: float) -> Clothoid:
     curve = Clothoid(first, (last - first) / length)
-    if curve.turn(length) > _MOST_TURN:
+    if curve.turn(length) > _MAX_TURN:
         raise SeipError(
             f"{node.place}: a <{node.tag}> of {length:g} m turns more than a hundred times; correct its curvature"
         )
@@ -235,7 +235,7 @@ def _height(lane: Node, edge: str, start: float) -> Profile:
     """Return the height of an edge, which ramps from each record to the next."""
     nodes = sorted(lane.children("height"), key=lambda node: node.number("sOffset", 0.0))
     if not nodes:
-        return NONE
+        return ZERO_PROFILE
     s = [start + node.number("sOffset", 0.0) for node in nodes]
     heights = [node.number(edge, 0.0) for node in nodes]
     rises = [
@@ -252,15 +252,15 @@ def _object(node: Node) -> RoadObject:
         name=node.text("name", ""),
         kind=node.text("type", "none").lower(),
         s=node.number("s"),
-        t=node.number("t", most=_FARTHEST),
-        z_offset=node.number("zOffset", 0.0, most=_HIGHEST),
+        t=node.number("t", most=_MAX_OBJECT_DISTANCE),
+        z_offset=node.number("zOffset", 0.0, most=_MAX_OBJECT_HEIGHT),
         heading=node.number("hdg", 0.0),
         pitch=node.number("pitch", 0.0),
         roll=node.number("roll", 0.0),
-        length=node.number("length", 0.0, most=_FARTHEST),
-        width=node.number("width", 0.0, most=_FARTHEST),
-        height=node.number("height", 0.0, most=_HIGHEST),
-        radius=node.number("radius", 0.0, most=_FARTHEST),
+        length=node.number("length", 0.0, most=_MAX_OBJECT_DISTANCE),
+        width=node.number("width", 0.0, most=_MAX_OBJECT_DISTANCE),
+        height=node.number("height", 0.0, most=_MAX_OBJECT_HEIGHT),
+        radius=node.number("radius", 0.0, most=_MAX_OBJECT_DISTANCE),
         outlines=tuple(filter(lambda outline: outline.corners, map(_outline, outlines))),
         repeats=(),
     )
@@ -280,10 +280,10 @@ def _corner(node: Node) -> Corner:
     along, aside, up = ("s", "t", "dz") if on_road else ("u", "v", "z")
     return Corner(
         on_road,
-        node.number(along) if on_road else node.number(along, most=_FARTHEST),
-        node.number(aside, most=_FARTHEST),
-        node.number(up, 0.0, most=_HIGHEST),
-        node.number("height", most=_HIGHEST) if "height" in node.element.attrib else None,
+        node.number(along) if on_road else node.number(along, most=_MAX_OBJECT_DISTANCE),
+        node.number(aside, most=_MAX_OBJECT_DISTANCE),
+        node.number(up, 0.0, most=_MAX_OBJECT_HEIGHT),
+        node.number("height", most=_MAX_OBJECT_HEIGHT) if "height" in node.element.attrib else None,
     )
 
 
@@ -292,7 +292,7 @@ def _repeat(node: Node, thing: RoadObject) -> Repeat:
     if distance < 0.0:
         raise SeipError(f"{node.place}: distance={distance:g} of <repeat> is below zero; correct it in the map")
 
-    def pair(name: str, own: float, most: float = _FARTHEST) -> tuple[float, float]:
+    def pair(name: str, own: float, most: float = _MAX_OBJECT_DISTANCE) -> tuple[float, float]:
         start = node.number(f"{name}Start", own, most=most)
         return start, node.number(f"{name}End", start, most=most)
 
@@ -301,8 +301,8 @@ def _repeat(node: Node, thing: RoadObject) -> Repeat:
         length=node.number("length", 0.0),
         distance=distance,
         t=pair("t", thing.t),
-        z_offset=pair("zOffset", thing.z_offset, _HIGHEST),
-        height=pair("height", thing.height, _HIGHEST),
+        z_offset=pair("zOffset", thing.z_offset, _MAX_OBJECT_HEIGHT),
+        height=pair("height", thing.height, _MAX_OBJECT_HEIGHT),
         width=pair("width", thing.width),
         object_length=pair("length", thing.length),
         radius=pair("radius", thing.radius),

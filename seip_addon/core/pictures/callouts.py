@@ -8,9 +8,9 @@ from ..arrays import Float
 
 Bounds = tuple[float, float, float, float]
 
-DIRECTIONS = 16
-REACH = (1.0, 1.6, 2.3, 3.2, 4.4, 6.0)  # how far out a label is tried, in multiples of the nearest
-FAR = 0.35 * np.repeat(np.array(REACH) - 1.0, DIRECTIONS)
+LABEL_DIRECTIONS = 16
+LABEL_DISTANCES = (1.0, 1.6, 2.3, 3.2, 4.4, 6.0)  # how far out a label is tried, in multiples of the nearest
+DISTANCE_COSTS = 0.35 * np.repeat(np.array(LABEL_DISTANCES) - 1.0, LABEL_DIRECTIONS)
 """What distance costs, where hiding as much of the subject as any place would costs 1."""
 
 
@@ -52,7 +52,7 @@ def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: floa
         apart = np.any(
             (tried_low[:, None] - clearance >= taken_high) | (tried_high[:, None] + clearance <= taken_low), axis=2
         ).all(axis=1)
-        cost = np.where(inside & apart, _hidden(tried_low, tried_high, subject) + FAR, np.inf)
+        cost = np.where(inside & apart, _hidden(tried_low, tried_high, subject) + DISTANCE_COSTS, np.inf)
         best = int(np.argmin(cost))
         centre = tried[best] if np.isfinite(cost[best]) else np.clip(tried[0], low + half, high - half)
         centres[index] = centre
@@ -64,10 +64,10 @@ def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: floa
 def _places(anchor: Float, reach: Float, outwards: Float) -> Float:
     """Return centres round an anchor, nearest first, and at each distance those outwards first."""
     start = np.arctan2(outwards[1], outwards[0])
-    turn = np.arange(DIRECTIONS)
-    angle = start + np.pi * 2.0 / DIRECTIONS * ((turn + 1) // 2) * np.where(turn % 2, 1.0, -1.0)
+    turn = np.arange(LABEL_DIRECTIONS)
+    angle = start + np.pi * 2.0 / LABEL_DIRECTIONS * ((turn + 1) // 2) * np.where(turn % 2, 1.0, -1.0)
     round_anchor = np.stack((np.cos(angle), np.sin(angle)), axis=1) * reach
-    return np.concatenate([anchor + factor * round_anchor for factor in REACH])
+    return np.concatenate([anchor + factor * round_anchor for factor in LABEL_DISTANCES])
 
 
 def _hidden(low: Float, high: Float, subject: Float) -> Float:

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float
-from ..scans.frame import STATIC, Frame
-from .palette import SENSOR_COLOURS, STRENGTH_COLOURS, STRONGEST, rgb
+from ..scans.frame import STATIC_INSTANCE, Frame
+from .palette import INTENSITY_COLOURS, MAX_INTENSITY, SENSOR_COLOURS, rgb
 
 By = Literal["sensor", "intensity", "instance"]
 
-STANDING = "#7d8790"
+STATIC_COLOUR = "#7d8790"
 """Of points on what stands still, where road users have colours."""
-GOLDEN = 0.618033988749895
+GOLDEN_RATIO = 0.618033988749895
 """Of the colour circle, between a road user and the next: neighbours in number differ most."""
 
 
@@ -28,7 +28,7 @@ def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:
 
 def strength_ramp(share: Float) -> Float:
     """Return colours (…, 3) along the scale of intensities, from 0 to 1."""
-    stops = np.array([rgb(colour) for colour in STRENGTH_COLOURS])
+    stops = np.array([rgb(colour) for colour in INTENSITY_COLOURS])
     places = np.linspace(0.0, 1.0, len(stops))
     return np.stack([np.interp(share, places, channel) for channel in stops.T], axis=-1)
 
@@ -45,14 +45,14 @@ def _by_sensor(frame: Frame) -> Float:
 
 
 def _by_intensity(frame: Frame) -> Float:
-    return strength_ramp(np.sqrt(np.minimum(frame.intensity / STRONGEST, 1.0)))
+    return strength_ramp(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))
 
 
 def _by_instance(frame: Frame) -> Float:
-    hue = (frame.instance * GOLDEN) % 1.0
+    hue = (frame.instance * GOLDEN_RATIO) % 1.0
     wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, full saturation
     bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
-    coloured: Float = np.where((frame.instance == STATIC)[:, None], np.array(rgb(STANDING)), bright)
+    coloured: Float = np.where((frame.instance == STATIC_INSTANCE)[:, None], np.array(rgb(STATIC_COLOUR)), bright)
     return coloured
 
 

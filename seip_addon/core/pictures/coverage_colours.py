@@ -20,7 +20,7 @@ WEIGHT_COLOURS = ("#fff3d6", "#fdd07e", "#f0984a", "#c9592f", "#7f2d1f")
 
 @dataclass(frozen=True, eq=False)
 class Colouring:
-    """Classes that targets fall into, each with its words and its colour.
+    """Classes of targets, each with its label and colour.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Colouring:
 
     @property
     def shares(self) -> Float:
-        """Of the targets, how many are in each class, 0 to 1."""
+        """Share of the targets in each class, 0 to 1."""
         share: Float = np.bincount(self.of, minlength=len(self.words)) / max(len(self.of), 1)
         return share
 

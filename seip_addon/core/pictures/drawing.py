@@ -28,7 +28,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
 HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
-MOST_LABELLED = 40
+MAX_LABELLED = 40
 """More sensors than these get no labels on the picture."""
 
 
@@ -70,7 +70,7 @@ def draw_sensors(
     hidden : (k,) bool, optional
         Sensors behind something, which are marked by an outline alone.
     """
-    if 0 < len(points) <= MOST_LABELLED:
+    if 0 < len(points) <= MAX_LABELLED:
         words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{describe_tilt(s.tilt)}" for s in deployment.sensors]
         _draw_callouts(axes, points, words, road, zorder - 0.5)
     markers = markers_of(deployment)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 DPI = 160
 HEAD, FOOT, MARGIN = 0.86, 0.42, 0.2  # inches
 LEGEND_STEP = 2.35  # inches
-HAZE = "#e9edf0"
+BACKGROUND_COLOUR = "#e9edf0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def save_labelled_view(
     FigureCanvasAgg(figure)  # measures text
     page = height + HEAD + FOOT
     view = figure.add_axes((0.0, FOOT / page, 1.0, height / page))
-    view.set(xticks=(), yticks=(), facecolor=HAZE)
+    view.set(xticks=(), yticks=(), facecolor=BACKGROUND_COLOUR)
     view.spines[:].set_visible(False)
     view.imshow(pixels, extent=(0.0, width, 0.0, height), interpolation="nearest", aspect="auto")
     view.set(xlim=(0.0, width), ylim=(0.0, height))

@@ -11,7 +11,16 @@ from matplotlib.patches import Rectangle
 from ..site.scene_geometry import ASSUMED, FROM_MAP
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
+from .plan_style import (
+    ASSUMED_MARK,
+    FORBIDDEN_COLOUR,
+    HEIGHT_CMAP,
+    MANDATORY_COLOUR,
+    POLE_MARK,
+    SIDEWALK_MARK,
+    WEIGHTED_COLOUR,
+    Style,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -24,8 +33,8 @@ if TYPE_CHECKING:
     from ..site.site import Site
 
 LEGEND_WIDTH = 3.7  # inches
-ROW, LINE, SMALL_LINE = 0.42, 0.24, 0.15  # inches that a sensor, a line and a line of small text take
-LETTERS = 62  # of small text that fit into a line
+SENSOR_ROW_HEIGHT, LINE_HEIGHT, SMALL_LINE_HEIGHT = 0.42, 0.24, 0.15  # inches
+LETTERS_PER_LINE = 62  # of small text that fit into a line
 
 
 class PlanLegend:
@@ -64,12 +73,12 @@ class PlanLegend:
             Sentences below everything else.
         """
         weights = sorted({area.weight for area in geometry.weighted_regions})
-        lines = [line for note in notes for line in wrap(note, LETTERS)]
+        lines = [line for note in notes for line in wrap(note, LETTERS_PER_LINE)]
         assumed = any(pole.source == ASSUMED for pole in geometry.poles)
-        below = 3.72 + LINE * (
+        below = 3.72 + LINE_HEIGHT * (
             3 + assumed + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas)
         )
-        below += 0.5 + SMALL_LINE * len(lines) if lines else 0.0
+        below += 0.5 + SMALL_LINE_HEIGHT * len(lines) if lines else 0.0
         self._sensors(deployment, self.height - below)
         self._targets(site, deployment)
         self._map(geometry, site, weights)
@@ -79,8 +88,8 @@ class PlanLegend:
 
     def _sensors(self, deployment: Deployment, room: float) -> None:
         """List the sensors, without their positions where room is short, and as many as fit."""
-        detailed = len(deployment.sensors) * ROW <= room
-        rows = max(1, int(room / (ROW if detailed else LINE)))
+        detailed = len(deployment.sensors) * SENSOR_ROW_HEIGHT <= room
+        rows = max(1, int(room / (SENSOR_ROW_HEIGHT if detailed else LINE_HEIGHT)))
         self._heading("Sensors")
         markers = markers_of(deployment)
         for sensor in deployment.sensors[:rows]:
@@ -89,11 +98,17 @@ class PlanLegend:
             self._text(0.70, f"{_short(sensor.model.name, 28)}, {sensor.height:.3g} m")
             self._text(LEGEND_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
             if detailed:
-                self._text(0.70, _short(sensor.position_name, 40), y=self.y + ROW - LINE, color=SOFT_INK, size=8)
-            self.y += ROW if detailed else LINE
+                self._text(
+                    0.70,
+                    _short(sensor.position_name, 40),
+                    y=self.y + SENSOR_ROW_HEIGHT - LINE_HEIGHT,
+                    color=SOFT_INK,
+                    size=8,
+                )
+            self.y += SENSOR_ROW_HEIGHT if detailed else LINE_HEIGHT
         if len(deployment.sensors) > rows:
             self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
-            self.y += LINE
+            self.y += LINE_HEIGHT
         self._text(0.0, "Share of the road that each sees by itself", color=SOFT_INK, size=8)
         self.y += 0.38
 
@@ -104,7 +119,7 @@ class PlanLegend:
             self._swatch(facecolor=SEEN_COLOURS[times])
             self._text(0.34, SEEN_WORDS[times])
             self._text(LEGEND_WIDTH, percent(counts[times] / len(site.targets)), ha="right", weight="bold")
-            self.y += LINE
+            self.y += LINE_HEIGHT
         self._text(0.0, f"{len(site.targets):,} points, {site.targets.spacing:g} m apart", color=SOFT_INK, size=8)
         self.y += 0.38
 
@@ -115,11 +130,11 @@ class PlanLegend:
         for weight in weights:
             names = [area.name for area in geometry.weighted_regions if area.weight == weight]
             words = _short(names[0], 26) if len(names) == 1 else f"{len(names)} areas"
-            self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
+            self._swatch(facecolor="none", edgecolor=WEIGHTED_COLOUR, linewidth=1.4, linestyle=(0, (4, 1.5)))
             self._line(f"{words} (weight {weight:g} where weights count)")
         for areas, colour, hatch, words in (
-            (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
-            (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
+            (geometry.forbidden_areas, FORBIDDEN_COLOUR, "////", "no sensor here"),
+            (geometry.mandatory_areas, MANDATORY_COLOUR, "....", "at least one sensor here"),
         ):
             if areas:
                 self._swatch(facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9)
@@ -135,7 +150,7 @@ class PlanLegend:
         highest = float(norm.vmax or 0.0)
         ramp = np.linspace(0.0, highest, 128)[None, :]
         self.axes.imshow(
-            HEIGHTS(norm(ramp)), extent=(0.0, 2.2, self.y + 0.16, self.y), aspect="auto", interpolation="nearest"
+            HEIGHT_CMAP(norm(ramp)), extent=(0.0, 2.2, self.y + 0.16, self.y), aspect="auto", interpolation="nearest"
         )
         self.axes.set(xlim=(0.0, LEGEND_WIDTH), ylim=self.axes.get_ylim())
         self.y += 0.3
@@ -148,7 +163,7 @@ class PlanLegend:
         self._heading("Notes")
         for line in lines:
             self._text(0.0, line, size=7.5, color=SOFT_INK)
-            self.y += SMALL_LINE
+            self.y += SMALL_LINE_HEIGHT
 
     def _heading(self, words: str) -> None:
         self._text(0.0, words, weight="bold", size=11, y=self.y + 0.04)
@@ -157,7 +172,7 @@ class PlanLegend:
 
     def _line(self, words: str) -> None:
         self._text(0.34, words)
-        self.y += LINE
+        self.y += LINE_HEIGHT
 
     def _text(self, x: float, words: str, *, y: float | None = None, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
         plain: Style = {"size": 9, "color": INK, "ha": "left", "va": "center", "parse_math": False}

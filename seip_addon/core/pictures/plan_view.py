@@ -1,4 +1,4 @@
-"""A bird's-eye plan of a placement, as a picture for people who did not make it."""
+"""Plan view of a placement with scale, north, candidates and coverage."""
 
 from __future__ import annotations
 
@@ -21,7 +21,15 @@ from ..site.target_squares import target_squares
 from .drawing import draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
 from .plan_legend import LEGEND_WIDTH, PlanLegend
-from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHTS, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED
+from .plan_style import (
+    ASSUMED_MARK,
+    FORBIDDEN_COLOUR,
+    HEIGHT_CMAP,
+    MANDATORY_COLOUR,
+    POLE_MARK,
+    SIDEWALK_MARK,
+    WEIGHTED_COLOUR,
+)
 
 if TYPE_CHECKING:
     import os
@@ -36,13 +44,13 @@ if TYPE_CHECKING:
 
 DPI = 160
 MARGIN, HEAD = 0.3, 0.95  # inches
-NARROWEST_MAP, WIDEST_MAP = 9.6, 15.0  # inches
-SHORTEST_MAP, TALLEST_MAP = 6.6, 10.5  # inches
-AROUND = 0.06  # of the region's size, shown around it
+MIN_MAP_WIDTH, MAX_MAP_WIDTH = 9.6, 15.0  # inches
+MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 6.6, 10.5  # inches
+MARGIN_SHARE = 0.06  # of the region's size, shown around it
 
 LAND, PAVEMENT, ROAD, KERB = "#eaece6", "#d9d5cc", "#b9bcc0", "#8f949a"
-CRACK = 0.06  # metres
-FLAT = 1e-6  # square metres in plan, below which a triangle is a wall's
+MAX_GAP = 0.06  # metres
+MIN_PLAN_AREA = 1e-6  # square metres in plan, below which a triangle is a wall's
 
 SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
@@ -104,8 +112,8 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
 def _map_size(region: BaseGeometry) -> tuple[float, float]:
     """Return width and height of the map on the page in inches, as near to the region's shape as fits."""
     _, _, width, height = _bounds(region)
-    map_height = min(max(NARROWEST_MAP * height / width, SHORTEST_MAP), TALLEST_MAP)
-    return min(max(map_height * width / height, NARROWEST_MAP), WIDEST_MAP), map_height
+    map_height = min(max(MIN_MAP_WIDTH * height / width, MIN_MAP_HEIGHT), MAX_MAP_HEIGHT)
+    return min(max(map_height * width / height, MIN_MAP_WIDTH), MAX_MAP_WIDTH), map_height
 
 
 def _window(region: BaseGeometry, shape: float) -> tuple[float, float, float, float]:
@@ -118,7 +126,7 @@ def _window(region: BaseGeometry, shape: float) -> tuple[float, float, float, fl
 def _bounds(region: BaseGeometry) -> tuple[float, float, float, float]:
     """Return the middle, width and height of the region with some room around it."""
     left, bottom, right, top = region.bounds
-    around = 2 * AROUND * max(right - left, top - bottom)
+    around = 2 * MARGIN_SHARE * max(right - left, top - bottom)
     return (left + right) / 2, (bottom + top) / 2, right - left + around, top - bottom + around
 
 
@@ -134,9 +142,9 @@ def _axes(figure: Figure, left: float, bottom: float, width: float, height: floa
 
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
     pavement = shapely.intersection(geometry.candidate_areas, shown)
-    draw_area(plan, closed(pavement, CRACK), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
+    draw_area(plan, closed(pavement, MAX_GAP), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
     roads = shapely.union_all([_footprint(mesh, shown) for mesh in geometry.roads])
-    draw_area(plan, closed(roads, CRACK), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
+    draw_area(plan, closed(roads, MAX_GAP), facecolor=ROAD, edgecolor=KERB, linewidth=0.6, zorder=EDGE)
 
 
 def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
@@ -158,12 +166,12 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
     """Draw what stands in the way, the higher the darker, and return the scale of heights."""
     triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
     flat = shapely.polygons(triangles[:, :, :2])
-    drawn = (shapely.area(flat) > FLAT) & shapely.intersects(flat, shown)
+    drawn = (shapely.area(flat) > MIN_PLAN_AREA) & shapely.intersects(flat, shown)
     triangles, flat = triangles[drawn], flat[drawn]
     height = triangles[:, :, 2].max(axis=1) - _road_level(site, triangles.mean(axis=1))
     norm = Normalize(0.0, 5.0 * math.ceil(max(10.0, height.max(initial=0.0)) / 5.0))
     order = np.argsort(triangles[:, :, 2].max(axis=1), kind="stable")
-    colours = HEIGHTS(norm(height[order]))
+    colours = HEIGHT_CMAP(norm(height[order]))
     plan.add_collection(
         PolyCollection(
             triangles[order, :, :2], facecolors=colours, edgecolors="none", antialiaseds=False, zorder=OBSTACLE
@@ -183,10 +191,10 @@ def _road_level(site: Site, points: Float) -> Float:
 
 
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
-    draw_area(plan, closed(region, CRACK), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
+    draw_area(plan, closed(region, MAX_GAP), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
-        (geometry.forbidden_areas, FORBIDDEN, "////"),
-        (geometry.mandatory_areas, MANDATORY, "...."),
+        (geometry.forbidden_areas, FORBIDDEN_COLOUR, "////"),
+        (geometry.mandatory_areas, MANDATORY_COLOUR, "...."),
     ):
         for area in areas:
             draw_area(plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER)
@@ -196,7 +204,7 @@ def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> No
             plan,
             area.polygon,
             facecolor="none",
-            edgecolor=WEIGHTED,
+            edgecolor=WEIGHTED_COLOUR,
             linewidth=1.5,
             linestyle=(0, (5, 2)),
             zorder=BORDER,

@@ -18,16 +18,16 @@ from ..arrays import Float
 from ..scans.frame import Frame, Labels
 from ..scans.sensor import MountedSensor
 from .drawing import LABEL_SIZE, SENSOR_MARK, save_png
-from .palette import INK, PAPER, SENSOR_COLOURS, SOFT_INK, STRENGTH_COLOURS, STRONGEST
+from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SENSOR_COLOURS, SOFT_INK
 from .plan_view import draw_area, draw_scale
 
 DPI = 160
-MAP, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches
-AROUND = 0.04  # of the region's size, shown around it
+MAP_SIDE, MARGIN, HEAD, FOOT = 8.0, 0.3, 0.95, 0.55  # inches
+MARGIN_SHARE = 0.04  # of the region's size, shown around it
 PIXELS = 1100  # of a cloud's picture, along a side
-NIGHT = "#101820"
-STRENGTH = LinearSegmentedColormap.from_list("strength", STRENGTH_COLOURS)
-SEEN, UNSEEN = "#ffffff", "#ff5a4f"
+BACKGROUND_COLOUR = "#101820"
+INTENSITY_CMAP = LinearSegmentedColormap.from_list("strength", INTENSITY_COLOURS)
+SEEN_COLOUR, UNSEEN_COLOUR = "#ffffff", "#ff5a4f"
 
 
 def save_scan_view(
@@ -48,22 +48,22 @@ def save_scan_view(
 def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSensor]) -> Figure:
     """Return the view as a figure."""
     west, south, east, north = region.bounds
-    left, bottom, right, top = region.buffer(AROUND * max(east - west, north - south)).bounds
-    tall = MAP * (top - bottom) / (right - left)
-    figure = Figure((2 * MAP + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
+    left, bottom, right, top = region.buffer(MARGIN_SHARE * max(east - west, north - south)).bounds
+    tall = MAP_SIDE * (top - bottom) / (right - left)
+    figure = Figure((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
     palette = np.array([to_rgb(SENSOR_COLOURS[number % len(SENSOR_COLOURS)]) for number in range(len(sensors))])
     colours = (
         palette[frame.sensor],
-        STRENGTH(np.sqrt(np.minimum(frame.intensity / STRONGEST, 1.0)))[:, :3],
+        INTENSITY_CMAP(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))[:, :3],
     )
     for number, colour in enumerate(colours):
-        axes = _axes(figure, MARGIN + number * (MAP + MARGIN), FOOT, MAP, tall)
-        axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=NIGHT)
+        axes = _axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
+        axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=BACKGROUND_COLOUR)
         _draw_points(axes, frame.points, colour)
         draw_area(axes, region, facecolor="none", edgecolor=SOFT_INK, linewidth=0.9)
         _draw_boxes(axes, frame.labels)
         _draw_sensors(axes, sensors, palette if number == 0 else np.ones((len(sensors), 3)))
-        draw_scale(axes, (right - left) / MAP)
+        draw_scale(axes, (right - left) / MAP_SIDE)
     _write_around(figure, frame, sensors)
     return figure
 
@@ -84,7 +84,7 @@ def _draw_points(axes: Axes, points: NDArray[np.float32], colour: Float) -> None
     shown = np.flatnonzero((column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0]))
     shown = shown[np.argsort(points[shown, 2], kind="stable")]
     picture = np.empty((*shape, 3))
-    picture[:] = to_rgb(NIGHT)
+    picture[:] = to_rgb(BACKGROUND_COLOUR)
     picture[row[shown], column[shown]] = colour[shown]
     axes.imshow(picture, extent=(left, right, bottom, top), origin="lower", interpolation="nearest", aspect="auto")
 
@@ -96,7 +96,7 @@ def _draw_boxes(axes: Axes, labels: Labels) -> None:
     middle = labels.centre[:, :2]
     corners = np.stack([middle + a * forward + b * left for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1)
     noses = np.stack([middle, middle + forward], axis=1)
-    edge = np.where(labels.points.sum(axis=1) > 0, SEEN, UNSEEN)
+    edge = np.where(labels.points.sum(axis=1) > 0, SEEN_COLOUR, UNSEEN_COLOUR)
     for shapes, closed in ((corners, True), (noses, False)):
         axes.add_collection(
             PolyCollection(list(shapes), closed=closed, facecolors="none", edgecolors=edge, linewidths=0.8),
@@ -137,21 +137,21 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     )
     for text in legend.get_texts():
         text.set_parse_math(False)
-    bar = figure.add_axes(((2 * MARGIN + MAP) / width, 0.3 / height, 3.0 / width, 0.12 / height))
-    bar.imshow(np.linspace(0, 1, 256)[None], cmap=STRENGTH, aspect="auto", extent=(0, 1, 0, 1))
+    bar = figure.add_axes(((2 * MARGIN + MAP_SIDE) / width, 0.3 / height, 3.0 / width, 0.12 / height))
+    bar.imshow(np.linspace(0, 1, 256)[None], cmap=INTENSITY_CMAP, aspect="auto", extent=(0, 1, 0, 1))
     shares = np.array([0.0, 0.05, 0.25, 1.0])
-    words = [*(f"{share * STRONGEST:g}" for share in shares[:-1]), f"{STRONGEST:g} and more"]
+    words = [*(f"{share * MAX_INTENSITY:g}" for share in shares[:-1]), f"{MAX_INTENSITY:g} and more"]
     bar.set(yticks=(), xticks=np.sqrt(shares))
     bar.set_xticklabels(words, size=8, color=INK)
     bar.set_title("intensity", size=8, color=INK, pad=2)
-    boxes = [Line2D([], [], color=colour, linewidth=1.5) for colour in (SEEN, UNSEEN)]
+    boxes = [Line2D([], [], color=colour, linewidth=1.5) for colour in (SEEN_COLOUR, UNSEEN_COLOUR)]
     figure.legend(
         boxes,
         ["road user with returns", "without a return"],
         loc="lower right",
         bbox_to_anchor=(1 - MARGIN / width, 0.0),
-        facecolor=NIGHT,
-        labelcolor=SEEN,
+        facecolor=BACKGROUND_COLOUR,
+        labelcolor=SEEN_COLOUR,
         ncols=2,
         fontsize=9,
     )

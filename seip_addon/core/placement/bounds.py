@@ -32,20 +32,20 @@ from .search_limits import Clock
 
 ITERATIONS = 1000
 PATIENCE = 20
-SHRINK = 0.7
+STEP_REDUCTION = 0.7
 DEFLECTION = 0.85
-SMALLEST_STEP = 1e-3
+MIN_STEP = 1e-3
 
-REVIEW, WORTHWHILE = 25, 0.8
+REDUCTION_INTERVAL, MAX_KEPT_SHARE = 25, 0.8
 """Every so many steps candidates are ruled out, where no more than such a share of them would be left."""
 
-FEW = 10_000
+MAX_LISTED_CHOICES = 10_000
 """The search ends when no more choices than these are left."""
 
-NEAR = (0.8, 0.95, 1.0, 1.05, 1.25)
+FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)
 """Factors by which the budget's multiplier may change in a step."""
 
-PRICES = 200
+PRICES_TRIED = 200
 """Multipliers of the price that are tried for a bound on it."""
 
 
@@ -111,7 +111,7 @@ def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
     if instance.affordable(float(instance.price[free.picked].sum())):
         return free
     if near > 0:
-        return min((_select(instance, score, near * factor) for factor in NEAR), key=lambda choice: choice.value)
+        return min((_select(instance, score, near * factor) for factor in FACTORS), key=lambda choice: choice.value)
     priced = instance.price > 0
     low, high = 0.0, float((score[priced] / instance.price[priced]).max())
     best = _select(instance, score, high)
@@ -176,7 +176,7 @@ class SubgradientDescent(Generic[B]):
         if bound.value < self.best.value - 1e-7 * self._total:
             self.best, self._stale = bound, 0
         elif self._stale == PATIENCE:
-            self.step, self._stale = self.step * SHRINK, 0
+            self.step, self._stale = self.step * STEP_REDUCTION, 0
             self.restart(self.best)
 
 
@@ -254,9 +254,10 @@ def lagrangian_bound(
     descent = SubgradientDescent(bound_from(instance, targets, groups, layers, exact=False), float(layers.sum()))
     for iteration in range(iterations):
         best = descent.best
-        if best.value < goal - instance.margin or descent.step < SMALLEST_STEP or clock.left <= 0:
+        if best.value < goal - instance.margin or descent.step < MIN_STEP or clock.left <= 0:
             break
-        if iteration % REVIEW == REVIEW - 1 and len(can_reach(instance, best, goal)) <= WORTHWHILE * len(keep):
+        due = iteration % REDUCTION_INTERVAL == REDUCTION_INTERVAL - 1
+        if due and len(can_reach(instance, best, goal)) <= MAX_KEPT_SHARE * len(keep):
             within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)
             if _few(instance, within):
                 break
@@ -298,7 +299,7 @@ def least_price(instance: Instance, bound: Bound, goal: float) -> float:
     fixed = bound.value - bound.selection.value
     worth = np.unique(score[instance.price > 0] / instance.price[instance.price > 0])
     worth = worth[worth > 0]
-    tried = worth[np.linspace(0, len(worth) - 1, min(len(worth), PRICES)).astype(np.int64)]
+    tried = worth[np.linspace(0, len(worth) - 1, min(len(worth), PRICES_TRIED)).astype(np.int64)]
     gained = [_select(instance, score, multiplier) for multiplier in tried]
     prices = [
         (goal - fixed - math.fsum(selection.net[selection.picked])) / selection.multiplier for selection in gained
@@ -310,7 +311,7 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     """Return the candidates that some placement reaching ``goal`` may contain, (k,) int64.
 
     A candidate is ruled out when the bound, with that candidate forced into
-    the selection, falls short of the goal by more than `TIE`: all optimal
+    the selection, falls short of the goal by more than `TIE_TOLERANCE`: all optimal
     placements survive, ties included.
     """
     picked, net = bound.selection.picked, bound.selection.net
@@ -323,7 +324,7 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
 
 
 def _few(instance: Instance, candidates: Integer) -> bool:
-    return math.comb(len(candidates), min(instance.count, len(candidates) // 2)) <= FEW
+    return math.comb(len(candidates), min(instance.count, len(candidates) // 2)) <= MAX_LISTED_CHOICES
 
 
 def _select(instance: Instance, score: Float, multiplier: float) -> Selection:

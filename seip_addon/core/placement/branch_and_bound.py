@@ -43,32 +43,32 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import Bound, lagrangian_bound, select
-from .problem import TIE
-from .reduced_problem import EXACT, Instance, Numbers
+from .problem import TIE_TOLERANCE
+from .reduced_problem import MAX_EXACT_DOUBLE, Instance, Numbers
 from .search_limits import Clock
 
-RELAXED = 3
+MIN_SENSORS = 3
 """With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""
 
-WIDE = 60
+MIN_CHILDREN = 60
 """... where at least so many children are left, and each sensor adds no more than the one before it ...
 
 Elsewhere branching itself tightens the bound, and sooner.
 """
 
-TRIALS, WORTHWHILE = 4, 0.5
+TRIALS, MAX_KEPT_SHARE = 4, 0.5
 """... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
 
 FIRST_STEPS, LATER_STEPS = 300, 100
 """Steps that the multipliers of the first node may take, and of each later one from its parent's."""
 
-LARGEST = 30_000_000
+MAX_ENTRIES = 30_000_000
 """Entries of V up to which the search keeps V as numbers: 240 MB, or twice that where weights are uneven."""
 
-COPY = 8
+OPERATIONS_PER_FETCH = 8
 """Multiplications that take as long as fetching an entry of V."""
 
-WAITING = 16_000_000
+MAX_WAITING_FOLLOWERS = 16_000_000
 """Followers of nodes that wait to be taken by their bounds: 200 MB. With so many, new nodes are searched first."""
 
 
@@ -107,7 +107,7 @@ class _Node:
 
 def is_worthwhile(instance: Instance, candidates: Integer) -> bool:
     """Return whether a search among some candidates of an instance fits into useful memory."""
-    return len(candidates) * max(len(instance.weight), len(candidates)) <= LARGEST
+    return len(candidates) * max(len(instance.weight), len(candidates)) <= MAX_ENTRIES
 
 
 def merit(instance: Instance, chosen: Integer) -> tuple[int, float, float, list[int]]:
@@ -164,9 +164,9 @@ class Search:
         self._weight = instance.weight.astype(self._matrix.dtype)
         self._overlap = (self._matrix * self._weight) @ self._by_target if instance.cover.top == 1 else None
         self._excluded = instance.conflict | np.eye(len(instance), dtype=bool)
-        # running sums of all gains, each at most the total, are exact below EXACT and rounded at each step beyond
+        # running sums of all gains, each at most the total, are exact below MAX_EXACT_DOUBLE and rounded beyond
         most = instance.total * (len(instance) + 1)
-        self._rounding = 0.0 if most < EXACT else most * len(instance) / EXACT
+        self._rounding = 0.0 if most < MAX_EXACT_DOUBLE else most * len(instance) / MAX_EXACT_DOUBLE
         self._queue: list[tuple[tuple[float, int, int], _Node]] = []
         self._stack: list[_Node] = []
         self._serial = self._waiting = self._met = 0
@@ -224,7 +224,7 @@ class Search:
 
     def _push(self, children: list[_Node]) -> None:
         for child in reversed(children):
-            if self._depth_first or self._waiting > WAITING:
+            if self._depth_first or self._waiting > MAX_WAITING_FOLLOWERS:
                 self._stack.append(child)
             else:
                 self._serial += 1
@@ -244,7 +244,7 @@ class Search:
             self._take_leaves(node, children)
             return []
         known = node.multipliers is not None and not node.chosen
-        if children >= WIDE and self.instance.cover.concave and not known and self._relaxation_pays(left):
+        if children >= MIN_CHILDREN and self.instance.cover.concave and not known and self._relaxation_pays(left):
             before = children
             node, children = yield from self._relaxed(node, left, goal)
             self._left_over.setdefault(left, []).append(children / before)
@@ -314,13 +314,13 @@ class Search:
             mandatory=np.zeros((0, len(followers)), bool),
             original=instance.original[followers],
             count=left,
-            budget=max(instance.budget * (1 + TIE) - spent, 0.0),
+            budget=max(instance.budget * (1 + TIE_TOLERANCE) - spent, 0.0),
         )
 
     def _relaxation_pays(self, left: int) -> bool:
         """Whether enough children were cut where nodes with so many sensors to come were relaxed before."""
         shares = self._left_over.get(left, [])
-        return left >= RELAXED and (len(shares) < TRIALS or sum(shares) <= WORTHWHILE * len(shares))
+        return left >= MIN_SENSORS and (len(shares) < TRIALS or sum(shares) <= MAX_KEPT_SHARE * len(shares))
 
     def _relaxed(self, node: _Node, left: int, goal: float) -> Generator[Progress, None, tuple[_Node, int]]:
         """Drop the followers that a Lagrangian bound rules out; return also how many are children."""
@@ -377,7 +377,7 @@ class Search:
         overlap = self._overlap if len(kept) <= len(changed) else None
         targets = changed if overlap is None else kept
         factor = (lost if overlap is None else instance.weight)[targets].astype(self._matrix.dtype)[:, None]
-        self._clock.spend(len(targets) * len(followers) * (children + COPY))
+        self._clock.spend(len(targets) * len(followers) * (children + OPERATIONS_PER_FETCH))
         rows, by_target = followers[:children], self._by_target[targets]
         if 2 * len(followers) < len(instance):
             by_target = by_target[:, followers]

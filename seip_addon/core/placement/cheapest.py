@@ -15,13 +15,13 @@ from .bounds import bound_from, can_reach, lagrangian_bound, least_price
 from .feasibility import starting_choice
 from .greedy import drop_redundant, greedy, greedy_with_swaps
 from .integer_program import check_solver, reaching
-from .problem import TIE, Placement, PlacementProblem, assess
+from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
 from .tie_breaking import fewest
 
-FINISH = 1.0
+MIN_TIE_BREAKING_LIMIT = 1.0
 """Seconds, or units of work, that choosing among equally cheap placements may always take."""
 
 
@@ -61,7 +61,7 @@ def cheapest_for_coverage(
     else:
         cheapest, proven = yield from fewest(instance, chosen, goal, solver, clock)
         bound = 0.0 if proven else -math.inf
-    finishing = clock.part(clock.elapsed, FINISH)  # no longer than it took to find the price
+    finishing = clock.part(clock.elapsed, MIN_TIE_BREAKING_LIMIT)  # no longer than it took to find the price
     best = yield from solve_within(_no_dearer(problem, instance, cheapest), solver, finishing)
     reached = best.covered * factor >= goal - instance.margin
     chosen = best.chosen if reached else instance.original[cheapest]
@@ -107,7 +107,7 @@ def _cheapest(
         chosen, proven = yield from fewest(instance, chosen, goal, solver, clock)
         price = math.fsum(instance.price[chosen])
         single = float(instance.price[0])
-        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE)) * single)
+        return chosen, price if proven else min(price, math.ceil(least / single * (1 - TIE_TOLERANCE)) * single)
     cheaper = replace(instance, budget=_below(price, instance.price)).of(keep)
     within = can_reach(cheaper, bound_from(cheaper, bound.targets, bound.groups), goal)
     keep, cheaper = keep[within], cheaper.part(within)
@@ -126,7 +126,7 @@ def _cheapest(
 def _below(price: float, prices: Float) -> float:
     """Return a budget that any lower total price meets, and that is as far below the price as it can be."""
     unit, whole = common_unit(prices[prices > 0])
-    return price - unit / 2 if whole else price * (1 - 3 * TIE)
+    return price - unit / 2 if whole else price * (1 - 3 * TIE_TOLERANCE)
 
 
 def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer) -> PlacementProblem:
@@ -138,7 +138,7 @@ def _no_dearer(problem: PlacementProblem, instance: Instance, cheapest: Integer)
 
 def _record(problem: PlacementProblem, chosen: Integer, bound: float, best: Placement, clock: Clock) -> Placement:
     price = math.fsum(problem.prices[chosen])
-    optimal = bound >= price * (1 - 3 * TIE)
+    optimal = bound >= price * (1 - 3 * TIE_TOLERANCE)
     notes = [*scale_notes(problem)]
     if not optimal:
         notes.append(

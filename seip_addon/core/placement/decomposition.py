@@ -24,14 +24,14 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
-from .bounds import SMALLEST_STEP, SubgradientDescent
+from .bounds import MIN_STEP, SubgradientDescent
 from .greedy import greedy
 from .reduced_problem import Instance, Numbers
 from .search_limits import Clock
 
 ITERATIONS = 2000
 
-SENSORS = 1.8
+SENSORS_PER_PART = 1.8
 """So many sensors there are for each part: of two their overlap is known."""
 
 
@@ -92,7 +92,7 @@ def decomposition_bound(
         shared[part.targets] += 1
     descent = SubgradientDescent(_bound(instance, parts, instance.weight / np.maximum(shared, 1)), instance.total)
     for iteration in range(ITERATIONS):
-        if descent.best.value < goal - instance.margin or descent.step < SMALLEST_STEP or clock.elapsed > end:
+        if descent.best.value < goal - instance.margin or descent.step < MIN_STEP or clock.elapsed > end:
             break
         yield Progress(iteration, ITERATIONS, "bounding by parts of the candidates")
         clock.spend(6 * sum(part.matrix.size for part in parts))
@@ -107,7 +107,7 @@ def decomposition_bound(
 
 def _parts(instance: Instance) -> list[_Part]:
     """Part the candidates around the first of a greedy choice, each clique where it overlaps most."""
-    number = max(1, round(instance.count / SENSORS))
+    number = max(1, round(instance.count / SENSORS_PER_PART))
     free = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
     centres = greedy(free, np.zeros(0, np.int64))
     overlap = instance.gains((instance.visible[centres] * instance.weight).T)

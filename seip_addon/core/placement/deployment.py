@@ -116,16 +116,16 @@ def deploy(
         Indices of the chosen poses; their order breaks ties between labels.
     """
     order = _by_added_coverage(visible, chosen)
-    hung = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
-    return deployment_of(site, hung, visible[order])
+    mounted = [sensor_at(site, models, f"S{rank + 1}", int(pose)) for rank, pose in enumerate(order)]
+    return deployment_of(site, mounted, visible[order])
 
 
-def deployment_of(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployment:
+def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deployment:
     """Return sensors with what they see, each and together.
 
     Parameters
     ----------
-    hung : sequence of Sensor
+    mounted : sequence of Sensor
         In the order in which each adds to those before it; their own shares are not looked at.
     rows : (k, t) bool
         What each of them sees.
@@ -136,7 +136,7 @@ def deployment_of(site: Site, hung: Sequence[Sensor], rows: Boolean) -> Deployme
     targets = site.targets
     sensors = tuple(
         replace(sensor, alone=_share(row), added=_share(row & (earlier == 0)), marginal=_share(row & (seen_by == 1)))
-        for sensor, row, earlier in zip(hung, rows, before, strict=True)
+        for sensor, row, earlier in zip(mounted, rows, before, strict=True)
     )
     return Deployment(
         sensors=sensors,

@@ -17,7 +17,7 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-SECONDS = 20.0
+TIME_LIMIT = 20.0
 """Time for a program without targets: far more than it takes, and apart from the user's time limit."""
 
 
@@ -79,10 +79,10 @@ def _decide(
     solver: str,
 ) -> Generator[Progress, None, Integer | None]:
     """Return the choice of largest objective, or None where there is none."""
-    outcome = yield from program.maximise(objective, solver, Clock(SECONDS))
+    outcome = yield from program.maximise(objective, solver, Clock(TIME_LIMIT))
     if outcome.chosen is None and not outcome.finished:
         raise SeipError(
-            f"{SECONDS:g} s were too short to tell whether the mandatory places ({', '.join(problem.group_names)}) "
+            f"{TIME_LIMIT:g} s were too short to tell whether the mandatory places ({', '.join(problem.group_names)}) "
             "can all carry a sensor; lift a demand, or choose another solver"
         )
     return outcome.chosen

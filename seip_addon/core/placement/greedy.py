@@ -10,17 +10,17 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..progress import Progress
 from .bounds import select
-from .problem import TIE
+from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-STARTS = 8
+GREEDY_STARTS = 8
 """Candidates to begin a greedy choice with, before swaps."""
 
-STEPS = 2
+TABU_STEPS_PER_CANDIDATE = 2
 """Swaps of a tabu search for each candidate."""
 
-HOLD, RETURN = 4, 12
+ADDED_TENURE, DROPPED_TENURE = 4, 12
 """Who came stays for fewer steps than the first of these, and who went stays away for once or twice the second."""
 
 
@@ -50,7 +50,7 @@ def greedy_steps(
         left = max(instance.count - len(chosen), 0)
         gain = instance.gains(instance.increments(instance.times(chosen), left))
         gain[~addable(instance, chosen)] = 0.0
-        score = gain / np.maximum(instance.price, TIE * instance.price.max()) if per_price else gain
+        score = gain / np.maximum(instance.price, TIE_TOLERANCE * instance.price.max()) if per_price else gain
         best = int(np.argmax(score))
         if gain[best] <= 0 or instance.value(chosen) >= enough:
             return
@@ -86,7 +86,7 @@ def greedy_with_swaps(instance: Instance, start: Integer) -> Generator[Progress,
         improved = yield from swap_search(instance, greedy(instance, start, per_price=per_price))
         best = max(best, improved, key=instance.value)
     first = np.where(addable(instance, start), instance.gains(instance.increments(instance.times(start))), 0.0)
-    for candidate in np.argsort(-first, kind="stable")[1:STARTS]:
+    for candidate in np.argsort(-first, kind="stable")[1:GREEDY_STARTS]:
         if first[candidate] > 0 and instance.value(best) < instance.total:
             improved = yield from swap_search(instance, np.append(start, candidate))
             best = max(best, improved, key=instance.value)
@@ -121,7 +121,7 @@ def tabu_search(
     random = np.random.default_rng(0)
     columns = np.ascontiguousarray(instance.matrix.T)
     rests, seen = np.zeros((0, len(instance.weight))), np.zeros((0, len(instance)))
-    steps = STEPS * len(instance)
+    steps = TABU_STEPS_PER_CANDIDATE * len(instance)
     for step in range(steps):
         if len(chosen) == 0 or clock.elapsed > end or most == instance.total:
             break
@@ -134,13 +134,13 @@ def tabu_search(
         else:
             seen = instance.gains(rests.T).T
         gain = _allowed_gains(instance, chosen, seen)
-        held = (locked > step) | (locked[chosen, None] > step)
-        gain[held & (covered + gain <= most + instance.slack)] = -np.inf
+        tabu = (locked > step) | (locked[chosen, None] > step)
+        gain[tabu & (covered + gain <= most + instance.slack)] = -np.inf
         if not np.isfinite(gain).any():
             continue
         gone, came = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        locked[came] = step + random.integers(1, HOLD)
-        locked[chosen[gone]] = step + random.integers(RETURN, 2 * RETURN)
+        locked[came] = step + random.integers(1, ADDED_TENURE)
+        locked[chosen[gone]] = step + random.integers(DROPPED_TENURE, 2 * DROPPED_TENURE)
         chosen = np.where(np.arange(len(chosen)) == gone, came, chosen)
         if len(chosen) < instance.count:
             chosen = greedy(instance, chosen)

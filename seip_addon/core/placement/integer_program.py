@@ -23,11 +23,11 @@ from pulp.apis.coin_api import pulp_cbc_path
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress, in_thread
-from .problem import TIE
+from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
-from .search_limits import OPERATIONS, Clock
+from .search_limits import OPERATIONS_PER_UNIT, Clock
 
-SCALE = 1e4
+TOTAL_WEIGHT = 1e4
 """Total weight in a program: far above the solvers' absolute tolerances of 1e-6."""
 
 TOLERANCE = 2e-6
@@ -37,13 +37,13 @@ SOLVERS = ("highs", "cbc", "gurobi")
 """What `solver_name` knows beside ``auto``."""
 
 
-LEAST_SECONDS = 0.01
+MIN_SECONDS = 0.01
 """Seconds that a solver is given where none are left."""
 
-PER_NODE = 1e4
+OPERATIONS_PER_ENTRY = 1e4
 """Multiplications for each entry of a program that count as the work of one branch of a solver."""
 
-LONGEST = 1e7
+UNLIMITED_SECONDS = 1e7
 """Seconds that solvers are given where there is no limit: not all of them take infinity."""
 
 
@@ -102,8 +102,8 @@ class CoverProgram:
 
     @property
     def weight_scale(self) -> float:
-        """Factor that brings the total weight to `SCALE`."""
-        return SCALE / self.instance.total if self.instance.total > 0 else 1.0
+        """Factor that brings the total weight to `TOTAL_WEIGHT`."""
+        return TOTAL_WEIGHT / self.instance.total if self.instance.total > 0 else 1.0
 
     @property
     def number(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
@@ -142,8 +142,8 @@ class CoverProgram:
         self.require(self._at_least(self.doubly_covered, goal), lambda c: instance.doubly(c) >= goal - instance.slack)
 
     def require_price(self, price: float) -> None:
-        """Require a total price of at most ``price``, but for `TIE`."""
-        limit = price * (1 + TIE)
+        """Require a total price of at most ``price``, but for `TIE_TOLERANCE`."""
+        limit = price * (1 + TIE_TOLERANCE)
         prices = self.instance.price
         self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
 
@@ -164,14 +164,14 @@ class CoverProgram:
         ends = clock.elapsed + share * clock.left
         size = np.count_nonzero(self.instance.visible) + len(self.x)
         while True:
-            left = max(ends - clock.elapsed, LEAST_SECONDS)
-            seconds = max(clock.seconds_left, LEAST_SECONDS) if clock.counts_work else left
-            nodes = math.ceil(left * OPERATIONS / (size * PER_NODE)) if clock.counts_work else None
+            left = max(ends - clock.elapsed, MIN_SECONDS)
+            seconds = max(clock.seconds_left, MIN_SECONDS) if clock.counts_work else left
+            nodes = math.ceil(left * OPERATIONS_PER_UNIT / (size * OPERATIONS_PER_ENTRY)) if clock.counts_work else None
             outcome = yield from in_thread(
                 lambda stop, limits=(seconds, nodes): self._solve(solver, limits, stop),  # type: ignore[misc]
                 f"solving an integer program of {len(self.x)} candidates",
             )
-            clock.spend((outcome.nodes + 1) * size * PER_NODE)
+            clock.spend((outcome.nodes + 1) * size * OPERATIONS_PER_ENTRY)
             chosen = outcome.chosen
             if chosen is None or all(check(chosen) for check in self._checks):
                 return outcome
@@ -217,7 +217,7 @@ class CoverProgram:
         if instance.count < len(instance):
             self.model += self.number <= instance.count
         if math.isfinite(instance.budget):
-            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE)
+            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
         for group in instance.mandatory:
             self.model += self.number_among(np.flatnonzero(group)) >= 1
         for clique in cover_by_cliques(instance.conflict):
@@ -297,7 +297,7 @@ def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event
 
     HiGHS ends soon after ``stop`` is set; PuLP offers no way to stop the others before their time limit.
     """
-    limit, nodes = min(limits[0], LONGEST), limits[1]
+    limit, nodes = min(limits[0], UNLIMITED_SECONDS), limits[1]
     solver = solver_name(solver)
     if solver == "highs":
         import highspy  # noqa: PLC0415 -- only where it is asked for: another solver may be all there is

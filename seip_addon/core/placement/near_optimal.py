@@ -16,10 +16,10 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance, make_instance
 from .search_limits import Clock
 
-MOST_LISTED = 10_000
+MAX_LISTED = 10_000
 """Placements that are listed at most."""
 
-MOST_BRANCHES = 300
+MAX_BRANCHES = 300
 """Branches that are searched at most: no clock decides what is found."""
 
 
@@ -100,7 +100,7 @@ def near_optimal_set(
         return None
     best = problem.covered(chosen) * factor
     search = _NearOptimal(instance, (1 - share) * best)
-    finished = yield from search.run(Clock(math.inf), math.inf, MOST_BRANCHES)
+    finished = yield from search.run(Clock(math.inf), math.inf, MAX_BRANCHES)
     if not finished:
         search.take_swaps(np.flatnonzero(np.isin(instance.original, chosen)))
     rows = _in_rows([np.sort(instance.original[list(found)]) for found in search.found], len(chosen))
@@ -135,7 +135,7 @@ class _NearOptimal(Search):
     def _take(self, placement: Integer) -> float:
         key, value = tuple(placement.tolist()), self.instance.value(placement)
         if value >= self.goal and key not in self.found and self.instance.feasible(placement):
-            if len(self.found) == MOST_LISTED:
+            if len(self.found) == MAX_LISTED:
                 self.satisfied = True
             else:
                 self.found[key] = value

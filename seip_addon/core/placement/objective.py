@@ -31,7 +31,7 @@ MOVED_MESSAGE = "Moved by hand: judged where the sensors hang; nothing is proven
 
 @dataclass(frozen=True)
 class Objective:
-    """What is asked for: the most coverage for N sensors or a budget, or a coverage for the least money.
+    """Objective and constraints: the most coverage for N sensors or a budget, or the least price for a coverage.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Objective:
     """
 
     count: int | None = setting(
-        None, f"largest number of sensors ({DEFAULT_COUNT} if no goal is given)", minimum=1, metavar="N"
+        None, f"largest number of sensors ({DEFAULT_COUNT} if no objective is given)", minimum=1, metavar="N"
     )
     budget: float | None = setting(None, "largest total price", unit="USD", minimum=0.0, metavar="USD")
     coverage: float | None = setting(
@@ -85,17 +85,17 @@ class Objective:
 
     @property
     def cheapest(self) -> bool:
-        """Whether this is the reverse problem, whose objective is a price."""
+        """Whether the least price for a coverage is asked for."""
         return self.coverage is not None
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """An answer to a goal.
+    """A solution: an objective with its placement, certificate and deployment.
 
     Parameters
     ----------
-    goal : Objective
+    objective : Objective
         With the number of sensors filled in where none was asked for.
     placement : Placement
         With its certificate.
@@ -105,7 +105,7 @@ class Solution:
         The chosen sensors and what they see.
     """
 
-    goal: Objective
+    objective: Objective
     placement: Placement
     greedy: Placement | None
     deployment: Deployment
@@ -113,7 +113,7 @@ class Solution:
     @property
     def certificate(self) -> str:
         """How good the placement provably is, as a sentence."""
-        return certificate(self.placement.status, self.placement.gap, cheapest=self.goal.cheapest)
+        return certificate(self.placement.status, self.placement.gap, cheapest=self.objective.cheapest)
 
 
 def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
@@ -137,21 +137,21 @@ def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
     return f"Within {share} of the {best} placement possible among these candidates."
 
 
-def target_weights(site: Site, goal: Objective) -> NDArray[np.float64]:
-    """Weight of each target under a goal, (t,) float64."""
-    if goal.central_weight is None:
+def target_weights(site: Site, objective: Objective) -> NDArray[np.float64]:
+    """Weight of each target under an objective, (t,) float64."""
+    if objective.central_weight is None:
         return np.ones(len(site.targets))
     if not site.targets.central.any():
         raise SeipError("the weighted problem needs a weighted region: draw one in SEIP Weighted Regions")
-    if goal.central_weight == "scene":
+    if objective.central_weight == "scene":
         return site.targets.weight
-    return np.where(site.targets.central, goal.central_weight, 1.0)
+    return np.where(site.targets.central, objective.central_weight, 1.0)
 
 
 def placement_problem(
-    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], goal: Objective
+    site: Site, visible: NDArray[np.bool_], models: Mapping[str, LidarModel], objective: Objective
 ) -> PlacementProblem:
-    """State a goal on a site as a maximal covering location problem.
+    """State an objective on a site as a maximal covering location problem.
 
     Parameters
     ----------
@@ -163,44 +163,44 @@ def placement_problem(
     Raises
     ------
     SeipError
-        The goal contradicts itself or the site.
+        The objective contradicts itself or the site.
     """
     candidates = site.candidates
-    demanded = np.array([_named(candidates, name) for name in goal.mandatory], dtype=bool)
+    demanded = np.array([_named(candidates, name) for name in objective.mandatory], dtype=bool)
     groups = np.concatenate((candidates.mandatory, demanded.reshape(-1, len(candidates.position))))
     forbidden = np.zeros(len(candidates.position), dtype=bool)
-    for name in goal.forbidden:
+    for name in objective.forbidden:
         forbidden |= _named(candidates, name)
     return PlacementProblem(
         visible=visible,
-        weights=target_weights(site, goal),
+        weights=target_weights(site, objective),
         prices=np.array([models[key].price for key in candidates.sensor]),
         positions=candidates.position_of,
         xyz=candidates.xyz,
         labels=candidates.sensor,
         mandatory=groups[:, candidates.position_of],
-        mandatory_names=np.concatenate((candidates.mandatory_name, np.array(goal.mandatory, dtype=np.str_))),
+        mandatory_names=np.concatenate((candidates.mandatory_name, np.array(objective.mandatory, dtype=np.str_))),
         forbidden=forbidden[candidates.position_of],
-        count=with_count(goal, site).count,
-        budget=goal.budget,
-        min_distance=goal.min_distance,
+        count=with_count(objective, site).count,
+        budget=objective.budget,
+        min_distance=objective.min_distance,
     )
 
 
-def check_objective(site: Site, models: Mapping[str, LidarModel], goal: Objective) -> None:
-    """Raise SeipError where a site can be seen not to allow a goal before any ray is cast."""
+def check_objective(site: Site, models: Mapping[str, LidarModel], objective: Objective) -> None:
+    """Raise SeipError where a site cannot meet an objective, before any ray is cast."""
     everything = np.ones((len(site.candidates), len(site.targets)), dtype=bool)
-    placement_problem(site, everything, models, goal)
+    placement_problem(site, everything, models, objective)
 
 
 def optimise(
     site: Site,
     visible: NDArray[np.bool_],
     models: Mapping[str, LidarModel],
-    goal: Objective,
+    objective: Objective,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, Solution]:
-    """Answer a goal on a site: the most coverage, or the least price for a coverage.
+    """Optimise a placement on a site: the most coverage, or the least price for a coverage.
 
     Parameters
     ----------
@@ -214,20 +214,20 @@ def optimise(
     SeipError
         As for `placement_problem`, `solve` and `cheapest_for_coverage`.
     """
-    problem = placement_problem(site, visible, models, goal)
-    if goal.coverage is not None:
-        placement = yield from cheapest_for_coverage(problem, goal.coverage, limits)
+    problem = placement_problem(site, visible, models, objective)
+    if objective.coverage is not None:
+        placement = yield from cheapest_for_coverage(problem, objective.coverage, limits)
         greedy = None
     else:
         placement = yield from solve(problem, limits)
         greedy = solve_greedy(problem)
-    return Solution(with_count(goal, site), placement, greedy, deploy(site, models, visible, placement.chosen))
+    return Solution(with_count(objective, site), placement, greedy, deploy(site, models, visible, placement.chosen))
 
 
-def with_count(goal: Objective, site: Site) -> Objective:
+def with_count(objective: Objective, site: Site) -> Objective:
     """Fill in the number of sensors where nothing is asked for that limits it."""
-    free = goal.count is None and goal.budget is None and goal.coverage is None
-    return replace(goal, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else goal
+    free = objective.count is None and objective.budget is None and objective.coverage is None
+    return replace(objective, count=min(DEFAULT_COUNT, len(site.candidates.position))) if free else objective
 
 
 def _named(candidates: Candidates, name: str) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 
-TIE = 1e-9
+TIE_TOLERANCE = 1e-9
 """Placements count as equal when they differ by less than this fraction of all weight, or of the price."""
 
 
@@ -77,7 +77,7 @@ class PlacementProblem:
     min_distance: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse contradictions that can be told without solving."""
+        """Raise SeipError on contradictions that can be told without solving."""
         self._check_values()
         self._check_limits()
         for group, name in zip(self.mandatory_groups & self.allowed, self.group_names, strict=True):
@@ -113,7 +113,7 @@ class PlacementProblem:
             return most
         cheapest = np.full(len(positions), math.inf)
         np.minimum.at(cheapest, position, self.prices[self.allowed])
-        affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE))
+        affordable = np.count_nonzero(np.cumsum(np.sort(cheapest)) <= self.budget * (1 + TIE_TOLERANCE))
         return min(most, max(1, int(affordable)))
 
     def covered(self, chosen: Integer) -> float:

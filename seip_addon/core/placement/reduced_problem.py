@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from .multi_cover import COVERAGE, MultiCover
-from .problem import TIE, PlacementProblem, canonical_order
+from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
-EXACT = 2**53
+MAX_EXACT_DOUBLE = 2**53
 """Sums of whole numbers up to here are exact in double precision."""
 
-SINGLE = 2**24
+MAX_EXACT_SINGLE = 2**24
 """Sums of whole numbers up to here are exact in single precision, whatever the order of summation."""
 
-FINEST = 2**50
-"""Total of weights that have no common unit: sums stay exact in double precision, rounding far below `TIE`."""
+INCOMMENSURABLE_TOTAL = 2**50
+"""Total of weights that have no common unit: sums stay exact in double precision, rounding below `TIE_TOLERANCE`."""
 
 MICROMETRE = 1e-6
 """Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
@@ -93,7 +93,7 @@ class Instance:
     @cached_property
     def matrix(self) -> Numbers:
         """``visible`` as numbers, in the smallest precision in which products with increments are exact."""
-        return self.visible.astype(np.float32 if self.total < SINGLE else np.float64)
+        return self.visible.astype(np.float32 if self.total < MAX_EXACT_SINGLE else np.float64)
 
     @cached_property
     def total(self) -> float:
@@ -147,7 +147,7 @@ class Instance:
 
     def affordable(self, price: Float | float) -> Boolean | bool:
         """Return whether a total price is within the budget, but for rounding."""
-        return price <= self.budget * (1 + TIE)
+        return price <= self.budget * (1 + TIE_TOLERANCE)
 
     def feasible(self, chosen: Integer) -> bool:
         """Return whether the chosen candidates meet every constraint."""
@@ -193,7 +193,7 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
         )
     unit, whole = common_unit(problem.weights[seen])
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))
-    margin = TIE * float(weight.sum())
+    margin = TIE_TOLERANCE * float(weight.sum())
     slack = min(margin, WHOLE_SLACK) if whole else margin
     conflict = _conflicts(problem.positions[order], problem.xyz[order], problem.min_distance)
     instance = Instance(
@@ -218,7 +218,7 @@ def common_unit(weights: Float) -> tuple[float, bool]:
 
     It is theirs where all weights are whole numbers whose sum is exact in
     double precision, or where rounding all weights to its multiples moves no
-    sum of them by more than `TIE` and a single unit counts for more than that.
+    sum of them by more than `TIE_TOLERANCE` and a single unit counts for more than that.
 
     Parameters
     ----------
@@ -226,14 +226,14 @@ def common_unit(weights: Float) -> tuple[float, bool]:
         Positive.
     """
     total = math.fsum(weights)
-    if total <= EXACT and (weights == np.rint(weights)).all():
+    if total <= MAX_EXACT_DOUBLE and (weights == np.rint(weights)).all():
         return float(np.gcd.reduce(weights.astype(np.int64))), True
     for parts in DENOMINATORS:
         unit = float(weights.min()) / parts
         rounding = math.fsum(np.abs(weights - np.rint(weights / unit) * unit))
-        if unit > 4 * TIE * total and rounding <= TIE / 2 * total:
+        if unit > 4 * TIE_TOLERANCE * total and rounding <= TIE_TOLERANCE / 2 * total:
             return unit, True
-    return total / FINEST, False
+    return total / INCOMMENSURABLE_TOTAL, False
 
 
 def merge_targets(visible: Boolean, weight: Float) -> tuple[Boolean, Float]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 from ..errors import SeipError
 
-OPERATIONS = 1e10
+OPERATIONS_PER_UNIT = 1e10
 """Multiplications that make a unit of work: about a second of one processor core."""
 
-OVERHEAD = 3e6
+OVERHEAD_OPERATIONS = 3e6
 """Multiplications that take as long as what goes on around each counted step."""
 
-SHORTEST = 0.01
+MIN_PART = 0.01
 """Seconds, or units of work, of a part of a limit where nothing is left."""
 
 
@@ -46,7 +46,7 @@ DEFAULT_LIMITS = SolverLimits()
 
 
 class Clock:
-    """A limit of time that starts now, and a limit of work that is the same on every machine.
+    """Limits of a search: of time from now on, and of counted work, which is the same on every machine.
 
     Where work is limited, shares of what is left are shares of work: as long as
     the time suffices, nothing depends on how fast the machine is.
@@ -84,11 +84,11 @@ class Clock:
 
     def spend(self, operations: float) -> None:
         """Count a step of so many multiplications as work."""
-        self.work += (operations + OVERHEAD) / OPERATIONS
+        self.work += (operations + OVERHEAD_OPERATIONS) / OPERATIONS_PER_UNIT
         if self._whole is not None:
             self._whole.spend(operations)
 
-    def part(self, most: float, least: float = SHORTEST) -> Clock:
+    def part(self, most: float, least: float = MIN_PART) -> Clock:
         """Return a limit within this one, in the same measure; what is spent there is spent here."""
         share = max(min(most, self.left), least)
         if self.counts_work:
@@ -98,7 +98,7 @@ class Clock:
     def counted_part(self, most: float) -> Clock:
         """Return a limit of so many units of work within what is left of this one."""
         limit = min(most, self.left) if self.counts_work else most
-        return Clock(max(self.seconds_left, SHORTEST), max(limit, SHORTEST), self)
+        return Clock(max(self.seconds_left, MIN_PART), max(limit, MIN_PART), self)
 
     @property
     def counts_work(self) -> bool:

@@ -16,33 +16,33 @@ from .decomposition import decomposition_bound
 from .feasibility import starting_choice
 from .greedy import drop_redundant, greedy_bound, greedy_steps, greedy_with_swaps, orders, swap_search, tabu_search
 from .integer_program import CoverProgram, check_solver
-from .problem import TIE, Placement, PlacementProblem, assess
+from .problem import TIE_TOLERANCE, Placement, PlacementProblem, assess
 from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
-from .tie_breaking import MANY, canonical_optimum
+from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
 
-BRANCHING = 0.15
+BRANCHING_SHARE = 0.15
 """Share of what is left of the limits for a first branch and bound, which goes on after the other methods."""
 
-SEARCHING, PROBING, BOUNDING = 0.1, 0.05, 0.4
+TABU_SEARCH_SHARE, FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.1, 0.05, 0.4
 """Shares for a tabu search of swaps, for a first bound by decomposition, and for a full one where the first gains."""
 
-GAIN = 0.05
+MIN_BOUND_GAIN = 0.05
 """Share of the gap that the first bound by decomposition must close for the full one to be worth its time."""
 
-SOLVING = 0.5
+PROGRAM_SHARE = 0.5
 """Share for the integer program, beside branch and bound."""
 
-TIGHT = 0.01
+MAX_RELAXATION_GAP = 0.01
 """Gap of the linear relaxation up to which the integer program is tried beside branch and bound."""
 
-LEAST_FOR_TIES = 2.0
+MIN_TIE_BREAKING_WORK = 2.0
 """Units of work that the choice among equally good placements may take, or as many as their proof took."""
 
-SLOW = 0.02
+MIN_GAP_PROGRESS = 0.02
 """Share of the gap that closes in the second half of the time where more time is of use."""
 
-LARGEST = 1_000_000
+MAX_PROGRAM_ENTRIES = 1_000_000
 """Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
 
 
@@ -102,7 +102,7 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
     chosen = drop_redundant(instance, proof.chosen, instance.value(proof.chosen))
     notes = [*scale_notes(problem)]
     if proof.optimal:
-        part = clock.counted_part(max(clock.work, LEAST_FOR_TIES))
+        part = clock.counted_part(max(clock.work, MIN_TIE_BREAKING_WORK))
         chosen, settled = yield from canonical_optimum(instance, chosen, proof.ties, solver, part)
         if not settled:
             notes.append(
@@ -186,24 +186,24 @@ def _prove_among(
     as_good = np.union1d(can_reach(instance, bound, instance.value(chosen)), chosen)
     search = None
     if is_worthwhile(instance, as_good):
-        search = BestPlacements(instance.part(as_good), instance.value(chosen), MANY, least)
-        finished = yield from search.run(clock, BRANCHING * clock.left)
+        search = BestPlacements(instance.part(as_good), instance.value(chosen), MAX_SEARCHED_TIES, least)
+        finished = yield from search.run(clock, BRANCHING_SHARE * clock.left)
         chosen = max([chosen, *_found(search, as_good)], key=instance.value)
         if finished:
             return _finished(instance, search, as_good, chosen)
         least = min(least, search.bound)
     if least >= _better(instance, chosen) - instance.margin:
         for beginning in (chosen, relaxed):
-            searched = yield from tabu_search(instance, beginning, clock, SEARCHING * clock.left)
+            searched = yield from tabu_search(instance, beginning, clock, TABU_SEARCH_SHARE * clock.left)
             chosen = max(chosen, searched, key=instance.value)
         least = min(least, (yield from _decomposition_bound(instance, least, chosen, clock)))
     keep = can_reach(instance, bound, _better(instance, chosen))
     if least < _better(instance, chosen) - instance.margin or len(keep) == 0:
         return Proof(chosen, instance.value(chosen), optimal=True)
-    tight = bound.value - instance.value(chosen) <= TIGHT * instance.value(chosen)
-    if clock.left > 0 and (tight or search is None) and np.count_nonzero(instance.visible[keep]) <= LARGEST:
+    tight = bound.value - instance.value(chosen) <= MAX_RELAXATION_GAP * instance.value(chosen)
+    if clock.left > 0 and (tight or search is None) and np.count_nonzero(instance.visible[keep]) <= MAX_PROGRAM_ENTRIES:
         yield Progress(0, 0, f"proving with {len(keep)} of {len(instance)} candidates")
-        known, share = Proof(chosen, least, optimal=False), 1.0 if search is None else SOLVING
+        known, share = Proof(chosen, least, optimal=False), 1.0 if search is None else PROGRAM_SHARE
         proof = yield from _decide(instance, keep, known, solver, clock, share)
         if proof.optimal:
             return proof
@@ -246,10 +246,10 @@ def _decomposition_bound(
 ) -> Generator[Progress, None, float]:
     """Bound by parts of the candidates: shortly first, and with more time where that closes part of the gap."""
     better = _better(instance, chosen)
-    first = yield from decomposition_bound(instance, better, clock, PROBING * clock.left)
-    if first < better or least - first < GAIN * (least - better):
+    first = yield from decomposition_bound(instance, better, clock, FIRST_DECOMPOSITION_SHARE * clock.left)
+    if first < better or least - first < MIN_BOUND_GAIN * (least - better):
         return first
-    return (yield from decomposition_bound(instance, better, clock, BOUNDING * clock.left))
+    return (yield from decomposition_bound(instance, better, clock, FULL_DECOMPOSITION_SHARE * clock.left))
 
 
 def _better(instance: Instance, chosen: Integer) -> float:
@@ -290,12 +290,12 @@ def _decide(  # what is known, and how far to go
 
 
 def _outlook(instance: Instance, proof: Proof) -> list[str]:
-    """Say what more time would do."""
+    """Return notes on what more time would gain."""
     value = instance.value(proof.chosen)
     if proof.halfway is None or value <= 0:
         return []
     before, now = (bound / value - 1 for bound in (proof.halfway, proof.bound))
-    if before - now < SLOW * before:
+    if before - now < MIN_GAP_PROGRESS * before:
         slow = (
             "the gap has hardly closed in the second half of the time: a proof may take many times as long; fewer "
             "candidates (a larger spacing, fewer heights) or fewer sensors make it easier"
@@ -319,7 +319,7 @@ def _guarantee(problem: PlacementProblem, instance: Instance) -> str:
 
 
 def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
-    """Say which targets and prices cannot decide because others are too large.
+    """Return notes on targets and prices too small, beside others, to affect the choice.
 
     Returns
     -------
@@ -328,17 +328,17 @@ def scale_notes(problem: PlacementProblem) -> tuple[str, ...]:
     """
     notes = []
     weights = problem.weights[problem.weights > 0]
-    light = int(np.count_nonzero(weights < TIE * weights.sum()))
+    light = int(np.count_nonzero(weights < TIE_TOLERANCE * weights.sum()))
     if light and not common_unit(weights)[1]:
         notes.append(
-            f"{light:,} of {len(weights):,} targets weigh less than {TIE:g} of all weight each: beside the others "
-            "they cannot decide; bring the weights closer together"
+            f"{light:,} of {len(weights):,} targets weigh less than {TIE_TOLERANCE:g} of all weight each: beside the "
+            "others they cannot decide; bring the weights closer together"
         )
     prices = problem.prices[problem.allowed & (problem.prices > 0)]
-    cheap = int(np.count_nonzero(prices < TIE * prices.max(initial=0.0)))
+    cheap = int(np.count_nonzero(prices < TIE_TOLERANCE * prices.max(initial=0.0)))
     if cheap:
         notes.append(
-            f"{cheap:,} candidates cost less than {TIE:g} of the dearest: beside it their prices cannot decide; "
-            "give all prices in the same currency"
+            f"{cheap:,} candidates cost less than {TIE_TOLERANCE:g} of the dearest: beside it their prices cannot "
+            "decide; give all prices in the same currency"
         )
     return tuple(notes)

@@ -23,13 +23,13 @@ from .integer_program import reaching
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-MANY = 2_000
+MAX_SEARCHED_TIES = 2_000
 """Ties that branch and bound lists; of more it looks for the first in order."""
 
-SOME = 12
+MAX_LISTED_TIES = 12
 """Ties that are listed by one program each; beyond, each stage is a program of its own."""
 
-BLOCK = 10
+BLOCK_SIZE = 10
 """Candidates whose order is settled by one program: powers of two up to 512 stay far above all tolerances."""
 
 
@@ -70,7 +70,7 @@ def canonical_optimum(
         return keep[min(candidates, key=lambda choice: merit(part, choice))], finished
     equal, all_found = yield from _all_equal(part, within, goal, solver, clock)
     best = min(equal, key=lambda choice: merit(part, choice))
-    if all_found or len(equal) < SOME:
+    if all_found or len(equal) < MAX_LISTED_TIES:
         return keep[best], all_found
     best, settled = yield from _settle(part, goal, best, solver, clock)
     return keep[best], settled
@@ -108,14 +108,14 @@ def fewest(
 def _all_equal(
     part: Instance, chosen: Integer, goal: float, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[list[Integer], bool]]:
-    """Return the placements that reach the goal, `SOME` at most, and whether these are all.
+    """Return the placements that reach the goal, `MAX_LISTED_TIES` at most, and whether these are all.
 
     Each is found by maximising coverage once more with those before forbidden:
     that prunes far better than any other objective under a coverage to reach.
     """
     program = reaching(part, goal)
     found = [chosen]
-    while len(found) < SOME:
+    while len(found) < MAX_LISTED_TIES:
         program.require(program.number_among(found[-1]) <= len(chosen) - 1)
         outcome = yield from program.maximise_coverage(solver, clock)
         if outcome.chosen is None:
@@ -154,7 +154,7 @@ def _settle(
     if len(chosen) > 1:
         yield from stages.maximise(program.doubly_covered)
         program.require_double_coverage(part.doubly(stages.chosen))
-    for block in np.array_split(np.arange(len(part)), range(BLOCK, len(part), BLOCK)):
+    for block in np.array_split(np.arange(len(part)), range(BLOCK_SIZE, len(part), BLOCK_SIZE)):
         # the indicator of the choice, read as a binary number, a block of digits at a time
         yield from stages.maximise(program.number_among(block, 2.0 ** np.arange(len(block))[::-1]))
         for candidate in block:

@@ -275,8 +275,8 @@ def placement_record(site: Site, plan: Solution, run: Run) -> PlacementRecord:
             seen_twice=_share(deployment.seen_twice),
         ),
         objective=RecordedObjective(
-            kind="weighted" if plan.goal.weighted else "vanilla",
-            sought="least price" if plan.goal.cheapest else "most coverage",
+            kind="weighted" if plan.objective.weighted else "vanilla",
+            sought="least price" if plan.objective.cheapest else "most coverage",
             value=_significant(placement.objective),
             bound=_found(placement.bound),
             gap=_found(placement.gap),

@@ -1,1 +1,1 @@
-"""What placements lose to pose errors, failures and traffic, and placements that lose less."""
+"""Robustness of placements to pose errors, sensor failures and traffic, and robust optimisation."""

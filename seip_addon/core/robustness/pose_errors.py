@@ -30,13 +30,13 @@ _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
 
 
-WIDEST, STEEPEST = 100.0, 1.0
+MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0
 """Metres and radians: larger standard deviations are slips of the keyboard."""
 
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Standard deviations of what may be wrong with a sensor's pose.
+    """Standard deviations of the errors of a sensor's pose.
 
     Parameters
     ----------
@@ -49,10 +49,10 @@ class PoseErrors:
     """
 
     position: float = setting(
-        0.3, "standard deviation of x and of y", unit="m", maximum=WIDEST, option="position-error", metavar="M"
+        0.3, "standard deviation of x and of y", unit="m", maximum=MAX_OFFSET_STD, option="position-error", metavar="M"
     )
     height: float = setting(
-        0.3, "as of the position if not given", unit="m", maximum=WIDEST, option="height-error", metavar="M"
+        0.3, "as of the position if not given", unit="m", maximum=MAX_OFFSET_STD, option="height-error", metavar="M"
     )
     yaw: float = setting(
         math.radians(2.0),
@@ -66,7 +66,7 @@ class PoseErrors:
         math.radians(2.0),
         "standard deviation of pitch and of roll",
         unit="rad",
-        maximum=STEEPEST,
+        maximum=MAX_ANGLE_STD,
         option="tilt-error",
         metavar="DEG",
     )
@@ -74,26 +74,26 @@ class PoseErrors:
     def __post_init__(self) -> None:
         for name in ("position", "height"):
             value = getattr(self, name)
-            if not 0 <= value <= WIDEST:
-                raise SeipError(f"the error of {name} must be 0 to {WIDEST:g} m, not {value:g} m")
-        for name, most in (("tilt", STEEPEST), ("yaw", math.pi)):
+            if not 0 <= value <= MAX_OFFSET_STD:
+                raise SeipError(f"the error of {name} must be 0 to {MAX_OFFSET_STD:g} m, not {value:g} m")
+        for name, most in (("tilt", MAX_ANGLE_STD), ("yaw", math.pi)):
             value = getattr(self, name)
             if not 0 <= value <= most:
                 limit, shown = math.degrees(most), math.degrees(value)
                 raise SeipError(f"the error of {name} must be 0 to {limit:.0f}°, not {shown:g}°")
 
     def alone(self, kind: str) -> PoseErrors:
-        """Return the errors of one kind, with nothing else wrong."""
-        return replace(self, **{name: 0.0 for name in KINDS if name != kind})
+        """Return the errors of one kind, all others zero."""
+        return replace(self, **{name: 0.0 for name in ERROR_KINDS if name != kind})
 
 
-KINDS = tuple(field.name for field in fields(PoseErrors))
-"""What can be wrong with a pose."""
+ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
+"""Kinds of pose errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseDraws:
-    """How n draws of errors leave s sensors.
+    """Poses of s sensors in n draws of errors.
 
     Parameters
     ----------
@@ -122,13 +122,13 @@ class PoseDraws:
 
 
 def require_draws(draws: int) -> None:
-    """Raise SeipError where there would be no draw."""
+    """Raise SeipError where the number of draws is below one."""
     if draws < 1:
         raise SeipError(f"asked for {draws} draws of pose errors; ask for at least 1")
 
 
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
-    """Draw what is wrong with the poses of sensors.
+    """Draw random pose errors of sensors.
 
     What is drawn for a sensor follows from the seed, the number of the draw and
     the sensor's position alone: whichever type hangs there at whichever height,
@@ -160,7 +160,7 @@ def _standard_normal(seed: int, position: Sequence[int], draws: int) -> Float:
 
 
 def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tuple[PoseDraws, Boolean]:
-    """Hang no sensor inside an object: where a draw would, its shift is turned about, or else there is none.
+    """Move sensors that a draw puts inside an object: to the opposite side, or else to the planned position.
 
     Parameters
     ----------

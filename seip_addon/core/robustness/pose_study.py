@@ -18,19 +18,19 @@ from ..estimates import IntervalEstimate, mean_of, quantile_of
 from ..placement.deployment import Deployment
 from ..progress import Progress
 from ..site.site import Site
-from .pose_errors import KINDS, PoseErrors
+from .pose_errors import ERROR_KINDS, PoseErrors
 from .scenario_visibility import ScenarioVisibility
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
 QUANTILES = (0.05, 0.5, 0.95)
 
-NOTABLE = 0.01
+NOTABLE_LOSS = 0.01
 """Share of the targets whose loss, in one of twenty draws, a user should know of."""
 
 
 @dataclass(frozen=True)
 class PoseStudySettings:
-    """How pose errors are studied.
+    """Settings of a study of pose errors.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class PoseStudySettings:
 
 @dataclass(frozen=True, eq=False)
 class Coverages:
-    """What a placement covers in each of n draws.
+    """Coverage of a placement in each of n draws.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Coverages:
 
 @dataclass(frozen=True, eq=False)
 class PoseStudy:
-    """What errors of poses do to a placement.
+    """Coverage of a placement under pose errors.
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ class PoseStudy:
         return quantile_of(self.together.whole, share)
 
     def loss_by_sensor(self) -> tuple[IntervalEstimate, ...]:
-        """Estimate what is lost of the whole coverage on average when each sensor alone errs."""
+        """Estimate the mean loss of coverage when each sensor alone has errors."""
         return tuple(mean_of(self.planned.whole[0] - coverages.whole) for coverages in self.alone)
 
     def loss_by_kind(self) -> dict[str, IntervalEstimate]:
-        """Estimate what is lost of the whole coverage on average by each kind of error alone."""
+        """Estimate the mean loss of coverage from each kind of error alone."""
         return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
 
     def worst_sensor(self) -> tuple[str, bool]:
@@ -112,7 +112,7 @@ class PoseStudy:
         return self.labels[worst], all(mean_of(difference).low > 0 for difference in behind)
 
     def is_converged(self) -> bool:
-        """Whether half of the draws say the same: estimates of mean and quantiles whose intervals meet."""
+        """Whether half of the draws give the same mean and quantiles, within their intervals."""
         whole = self.together.whole
         half = whole[: len(whole) // 2]
         pairs = [(mean_of(half), mean_of(whole)), *((quantile_of(half, q), quantile_of(whole, q)) for q in QUANTILES)]
@@ -124,7 +124,7 @@ def pose_study(
     deployment: Deployment,
     settings: PoseStudySettings,
 ) -> Generator[Progress, None, PoseStudy]:
-    """Find what a placement covers when its poses err.
+    """Compute the coverage of a placement under draws of pose errors.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def pose_study(
     planned = as_planned.seen(0)
     together, blocked = yield from views(settings.errors, settings.draws)
     by_kind = {}
-    for kind in KINDS:
+    for kind in ERROR_KINDS:
         if settings.draws_of_kind and getattr(settings.errors, kind) > 0:
             of_kind, _ = yield from views(settings.errors.alone(kind), settings.draws_of_kind)
             by_kind[kind] = _coverages(site, [of_kind.seen(draw) for draw in range(len(of_kind))])
@@ -159,7 +159,7 @@ def pose_study(
 
 
 def _coverages(site: Site, views: Sequence[Boolean]) -> Coverages:
-    """Return what rows of V cover together, draw by draw."""
+    """Return the joint coverage of rows of V in each draw."""
     seen = np.array([rows.any(axis=0) for rows in views])
     central = site.targets.central
     return Coverages(seen.mean(axis=1), seen[:, central].mean(axis=1) if central.any() else None)
@@ -171,13 +171,13 @@ def _one_errs(site: Site, planned: Boolean, together: ScenarioVisibility, number
 
 
 def pose_warnings(study: PoseStudy) -> tuple[str, ...]:
-    """Say where a placement does not hold what was planned, in sentences."""
+    """Return a warning where pose errors cost a placement much of its coverage."""
     lost = study.planned.whole[0] - study.quantile(QUANTILES[0]).value
-    return (pose_message(study),) if lost >= NOTABLE else ()
+    return (pose_message(study),) if lost >= NOTABLE_LOSS else ()
 
 
 def pose_message(study: PoseStudy) -> str:
-    """Say what a placement covers in one of twenty cases, and which sensor's error costs most."""
+    """Describe the 5 % quantile of a placement's coverage, and which sensor's error costs most."""
     errors, low = study.settings.errors, study.quantile(QUANTILES[0])
     lost = max(study.planned.whole[0] - low.value, 0.0)
     worst, certain = study.worst_sensor()

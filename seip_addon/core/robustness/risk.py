@@ -39,7 +39,7 @@ Failure = Literal["none", "worst", "mean"]
 
 @dataclass(frozen=True)
 class Risk:
-    """What is to be large.
+    """What a robust placement maximises.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ class Risk:
 
     @property
     def least_sensors(self) -> int:
-        """Fewer sensors than these have no outcome but zero."""
+        """Number of sensors below which every outcome is zero."""
         return self.seen_by + (self.failure != "none")
 
     def describe(self) -> str:
-        """Name what is to be large."""
+        """Name the risk measure."""
         of = {1.0: "expected coverage", 0.0: "coverage in the worst scenario"}.get(
             self.tail, f"mean coverage of the worst {self.tail:.0%} of the scenarios"
         )
@@ -87,7 +87,7 @@ class Risk:
 
     @property
     def alone(self) -> Risk:
-        """The same for one scenario: what any draw is judged by, whichever of them count."""
+        """Return the same measure for a single scenario, by which each draw is evaluated."""
         return replace(self, tail=1.0)
 
     def counted(self, scenarios: int) -> int:
@@ -95,7 +95,7 @@ class Risk:
         return max(1, math.ceil(self.tail * scenarios - 1e-9))
 
     def outcomes(self, seen: NDArray[np.uint8], weight: Float, sensors: int) -> Float:
-        """Return what becomes of a placement in each scenario.
+        """Return the outcome of a placement in each scenario.
 
         Parameters
         ----------

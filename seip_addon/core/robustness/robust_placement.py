@@ -42,7 +42,7 @@ from ..placement.bounds import lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS
 from ..placement.feasibility import starting_choice
 from ..placement.greedy import swap_search
-from ..placement.problem import TIE, assess, relative_gap
+from ..placement.problem import TIE_TOLERANCE, assess, relative_gap
 from ..placement.reduced_problem import Instance, common_unit, make_instance, merge_targets
 from ..placement.search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from ..placement.solver import solve_within
@@ -55,14 +55,14 @@ ROUNDS = 16
 """Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
 
 
-FORESEEING = 0.5
+SCENARIO_SHARE = 0.5
 """Share of the time for the problems of single scenarios."""
 
-LEAST_SECONDS = 1.0
+MIN_SECONDS = 1.0
 """Or units of work, for what comes after them, however slow they were."""
 
 
-TOO_SHORT = "the time was too short to prove this placement the best: the gap says how far"
+UNPROVEN_MESSAGE = "the time was too short to prove this placement the best: the gap says how far"
 
 
 def solve_robust(
@@ -72,7 +72,7 @@ def solve_robust(
     limits: SolverLimits = DEFAULT_LIMITS,
     foreseen: Sequence[Placement] | None = None,
 ) -> Generator[Progress, None, Placement]:
-    """Choose the placement that has the least to fear.
+    """Choose the placement that maximises a risk measure over scenarios.
 
     Parameters
     ----------
@@ -108,8 +108,8 @@ def solve_robust(
         return replace(placement, covered=problem.covered(placement.chosen))
     solver, clock = limits.solver, limits.clock()
     if foreseen is None and risk.seen_by == 1:
-        foreseen = yield from foresee(problem, different, solver, clock.part(FORESEEING * clock.left))
-    placement = yield from _searched(problem, different, risk, solver, clock.part(math.inf, LEAST_SECONDS))
+        foreseen = yield from foresee(problem, different, solver, clock.part(SCENARIO_SHARE * clock.left))
+    placement = yield from _searched(problem, different, risk, solver, clock.part(math.inf, MIN_SECONDS))
     if foreseen is not None and risk.seen_by == 1:  # coverage by one look bounds that by two as well, but far above
         placement = _with_foresight(problem, different, risk, placement, foreseen)
     return replace(placement, seconds=clock.seconds)
@@ -118,7 +118,7 @@ def solve_robust(
 def foresee(
     problem: PlacementProblem, scenarios: ScenarioVisibility, solver: str, clock: Clock
 ) -> Generator[Progress, None, tuple[Placement, ...]]:
-    """Solve each scenario as if it were known that it comes: no placement does better there.
+    """Solve each scenario by itself: no placement does better there.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def foresee(
         yield here
         alone = replace(problem, visible=scenarios.seen(scenario))
         # what the quick ones leave goes to those that follow
-        part = clock.part(clock.left / (len(scenarios) - scenario), LEAST_SECONDS)
+        part = clock.part(clock.left / (len(scenarios) - scenario), MIN_SECONDS)
         found.append((yield from within(here, solve_within(alone, solver, part))))
     return tuple(found)
 
@@ -148,10 +148,10 @@ def _with_foresight(
     value, chosen = placement.objective, placement.chosen
     for other in foreseen:
         reached = risk.of(outcomes_of(problem, scenarios, risk, other.chosen))
-        if reached > value * (1 + TIE) and placement.status != "optimal":
+        if reached > value * (1 + TIE_TOLERANCE) and placement.status != "optimal":
             value, chosen = reached, other.chosen
     bound = max(min(placement.bound, risk.of(np.array([other.bound for other in foreseen]))), value)
-    optimal = placement.status == "optimal" or bound <= value * (1 + TIE)
+    optimal = placement.status == "optimal" or bound <= value * (1 + TIE_TOLERANCE)
     return assess(
         problem,
         chosen,
@@ -169,7 +169,7 @@ def at_least(found: Placement, other: Placement, reached: float) -> Placement:
 
     A search that ran out of time may have missed the placement that knows of no scenarios.
     """
-    if reached <= found.objective * (1 + TIE):
+    if reached <= found.objective * (1 + TIE_TOLERANCE):
         return found
     bound = max(found.bound, reached)
     return replace(
@@ -184,7 +184,7 @@ def at_least(found: Placement, other: Placement, reached: float) -> Placement:
 
 
 def outcomes_of(problem: PlacementProblem, scenarios: ScenarioVisibility, risk: Risk, chosen: Integer) -> Float:
-    """Return what becomes of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
+    """Return the outcome of chosen candidates in each scenario, (K,) float64, in units of the targets' weight."""
     return risk.outcomes(scenarios.seen_by_each(chosen), problem.weights, problem.most_sensors)
 
 
@@ -210,7 +210,7 @@ def _searched(
     game = FictitiousPlay(problem, scenarios, risk, whole)
     start = yield from starting_choice(problem, whole, solver)
     chosen, share = yield from game.play(start, clock)
-    instance, unit, slack = game.instance(share), game.unit(share), TIE * math.fsum(problem.weights)
+    instance, unit, slack = game.instance(share), game.unit(share), TIE_TOLERANCE * math.fsum(problem.weights)
     goal = (game.evaluate(chosen) - slack) * unit
     root = yield from lagrangian_bound(instance, goal, clock, iterations=FIRST_STEPS)
     search = BestUnderRisk(instance, unit, game.evaluate, chosen, slack, root)
@@ -222,13 +222,13 @@ def _searched(
         optimal=finished,
         solver="branch and bound",
         seconds=clock.seconds,
-        notes=() if finished else (TOO_SHORT,),
+        notes=() if finished else (UNPROVEN_MESSAGE,),
         objective=search.value,
     )
 
 
 class FictitiousPlay:
-    """Weights of scenarios with a small bound: placements answer the scenarios that were worst before.
+    """Fictitious play for scenario weights with a small bound: placements answer the worst scenarios so far.
 
     Parameters
     ----------

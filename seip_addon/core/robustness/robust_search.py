@@ -28,10 +28,10 @@ from ..placement.reduced_problem import Instance
 from ..placement.search_limits import Clock
 from ..progress import Progress
 
-STARTS, FIRST = 8, 100
+STARTING_PAIRS, MAX_FIRST_CANDIDATES = 8, 100
 """Pairs to begin from where one sensor is worth nothing, and candidates that may be the first of a pair."""
 
-RIVALS = 24
+SWAPS_TRIED = 24
 """Swaps of a sensor for which T is computed, those with the largest F."""
 
 
@@ -57,11 +57,11 @@ def _best_pairs(instance: Instance, start: Integer) -> list[list[int]]:
     """Return pairs that can join the start, no candidate in two of them, those that see most together first."""
     seen = instance.gains(instance.weight)
     seen[~addable(instance, start)] = 0.0
-    first = np.argsort(-seen, kind="stable")[: min(FIRST, np.count_nonzero(seen))]
+    first = np.argsort(-seen, kind="stable")[: min(MAX_FIRST_CANDIDATES, np.count_nonzero(seen))]
     together = (instance.matrix[first] * instance.weight.astype(instance.matrix.dtype)) @ instance.matrix.T
     together[instance.conflict[first] | (seen == 0) | (first[:, None] == np.arange(len(instance)))] = 0.0
     pairs: list[list[int]] = []
-    while len(pairs) < STARTS and together.any():
+    while len(pairs) < STARTING_PAIRS and together.any():
         row, other = np.unravel_index(int(np.argmax(together)), together.shape)
         pair = [int(first[row]), int(other)]
         together[np.isin(first, pair)] = 0.0
@@ -81,7 +81,7 @@ def swap_search_by_risk(
         rivals = [
             np.sort(np.append(chosen[chosen != gone], new))
             for gone, row in zip(chosen, swap_gains(instance, chosen), strict=True)
-            for new in np.argsort(-row, kind="stable")[:RIVALS]
+            for new in np.argsort(-row, kind="stable")[:SWAPS_TRIED]
             if math.isfinite(row[new])
         ]
         reached = [evaluate(rival) for rival in rivals]

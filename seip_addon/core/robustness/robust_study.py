@@ -1,4 +1,4 @@
-"""Price and benefit of robust placements, judged on unseen draws."""
+"""Price and benefit of robust placements, evaluated on unseen draws."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
-LOW = 0.05
-"""The quantile that judges."""
+LOW_QUANTILE = 0.05
+"""Quantile of coverage by which placements are compared."""
 
-RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
+COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
 """That are compared where nothing else is asked for."""
 
 
 @dataclass(frozen=True)
 class RobustnessSettings:
-    """What a placement is to stand, and how that is tried.
+    """Settings of robust placement: risk measure, pose errors, scenarios, and draws to evaluate on.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ class RobustnessSettings:
     scenarios : int
         Draws to choose on.
     draws : int
-        Unseen draws to judge by.
+        Unseen draws to evaluate on.
     seed : int
         Of the scenarios; the unseen draws have the next one.
 
     Raises
     ------
     SeipError
-        There is nothing to choose on, or nothing to judge by.
+        There is nothing to choose on, or nothing to evaluate on.
     """
 
     risk: Risk = field(default_factory=Risk)
@@ -61,7 +61,7 @@ class RobustnessSettings:
 
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A placement and what becomes of it in unseen draws.
+    """A placement with its outcomes in unseen draws.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Contender:
         What it was chosen for.
     planned : float
         Share of the targets' weight that it covers as planned, by one look and without any failure.
-    judged_by : Risk
+    evaluated_by : Risk
         Whose outcome the following are: coverage, or what is left of it after a loss, or what several sensors see.
     undisturbed : float
         The outcome for the poses as planned, as a share of the targets' weight.
@@ -80,14 +80,14 @@ class Contender:
     name: str
     placement: Placement
     planned: float
-    judged_by: Risk
+    evaluated_by: Risk
     undisturbed: float
     unseen: Float
 
     @property
     def low(self) -> IntervalEstimate:
         """The 5 % quantile over unseen draws."""
-        return quantile_of(self.unseen, LOW)
+        return quantile_of(self.unseen, LOW_QUANTILE)
 
     @property
     def mean(self) -> IntervalEstimate:
@@ -97,12 +97,12 @@ class Contender:
 
 @dataclass(frozen=True, eq=False)
 class RobustStudy:
-    """The nominal optimum beside placements chosen for what may go wrong.
+    """Comparison of the nominal optimum with robust placements.
 
     Parameters
     ----------
     nominal : tuple of Contender
-        The placement chosen for the poses as planned, once for each way in which the others are judged.
+        The placement chosen for the poses as planned, once for each way in which the others are evaluated.
     robust : tuple of Contender
         One for each risk.
     total : float
@@ -115,21 +115,21 @@ class RobustStudy:
     total: float
 
     def beside(self, contender: Contender) -> Contender:
-        """Return the nominal optimum, judged as a contender is."""
-        return next(nominal for nominal in self.nominal if nominal.judged_by == contender.judged_by)
+        """Return the nominal optimum, evaluated as a contender is."""
+        return next(nominal for nominal in self.nominal if nominal.evaluated_by == contender.evaluated_by)
 
     def price(self, contender: Contender) -> float:
-        """Return what a contender gives away of the nominal optimum's planned coverage."""
+        """Return the planned coverage that a contender loses against the nominal optimum."""
         return self.beside(contender).planned - contender.planned
 
     def saving(self, contender: Contender) -> IntervalEstimate:
         """Estimate by how much its 5 % quantile over unseen draws exceeds the nominal optimum's."""
-        return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW)
+        return quantile_gain(contender.unseen, self.beside(contender).unseen, LOW_QUANTILE)
 
     def is_converged(self, contender: Contender) -> bool:
-        """Whether half of the unseen draws say the same of it: estimates whose intervals meet."""
+        """Whether half of the unseen draws give the same estimates, within their intervals."""
         half = len(contender.unseen) // 2
-        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW)
+        saved = quantile_gain(contender.unseen[:half], self.beside(contender).unseen[:half], LOW_QUANTILE)
         return saved.agrees_with(self.saving(contender))
 
 
@@ -137,10 +137,10 @@ def robust_study(
     around: Surroundings,
     problem: PlacementProblem,
     settings: RobustnessSettings,
-    risks: Sequence[Risk] = RISKS,
+    risks: Sequence[Risk] = COMPARED_RISKS,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, RobustStudy]:
-    """Place for the poses as planned and for each risk, and judge all by unseen draws.
+    """Optimise for the planned poses and for each risk, and evaluate all placements on unseen draws.
 
     Parameters
     ----------
@@ -168,33 +168,35 @@ def robust_study(
         found: Placement = yield from within(here, steps)
         placed = at_least(found, nominal, risk.of(outcomes_of(problem, spread, risk, nominal.chosen)))
         entries.append((risk.describe(), placed, risk.alone))
-    contenders = yield from _judged(around, problem, settings, entries)
+    contenders = yield from _evaluated(around, problem, settings, entries)
     return RobustStudy(
         settings, tuple(contenders[: len(ways)]), tuple(contenders[len(ways) :]), float(problem.weights.sum())
     )
 
 
-def _judged(
+def _evaluated(
     around: Surroundings,
     problem: PlacementProblem,
     settings: RobustnessSettings,
     entries: Sequence[tuple[str, Placement, Risk]],
 ) -> Generator[Progress, None, list[Contender]]:
-    """Look from all chosen poses at once, in draws of another seed."""
+    """Evaluate placements on draws of another seed, all chosen poses at once."""
     used = np.unique(np.concatenate([placement.chosen for _, placement, _ in entries]))
     drawn, _ = draws_for(around, used, settings.errors, settings.draws, settings.seed + 1)
     views = yield from visibility_under_errors(around, used, drawn)
     planned = replace(views, packed=np.packbits(problem.visible[used], axis=1)[None])
     total = float(problem.weights.sum())
     contenders = []
-    for name, placement, judged_by in entries:
+    for name, placement, evaluated_by in entries:
         rows = np.searchsorted(used, placement.chosen)
-        (undisturbed,) = outcomes_of(problem, planned, judged_by, rows)
+        (undisturbed,) = outcomes_of(problem, planned, evaluated_by, rows)
         outcomes = [  # one draw at a time: all at once take much memory
-            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), judged_by, rows)
+            outcomes_of(problem, replace(views, packed=views.packed[[draw]]), evaluated_by, rows)
             for draw in range(len(views))
         ]
         unseen = np.concatenate(outcomes) / total
         planned_coverage = placement.covered / total
-        contenders.append(Contender(name, placement, planned_coverage, judged_by, float(undisturbed) / total, unseen))
+        contenders.append(
+            Contender(name, placement, planned_coverage, evaluated_by, float(undisturbed) / total, unseen)
+        )
     return contenders

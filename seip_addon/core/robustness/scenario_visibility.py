@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class ScenarioVisibility:
-    """Which of s poses sees which of t targets in each of n circumstances.
+    """Visibility grids of s poses and t targets in each of n scenarios.
 
     Parameters
     ----------
@@ -32,23 +32,23 @@ class ScenarioVisibility:
     targets: int
 
     def __len__(self) -> int:
-        """Return the number of circumstances."""
+        """Return the number of scenarios."""
         return len(self.packed)
 
     def seen(self, number: int) -> Boolean:
-        """Return V in one circumstance, (s, t) bool."""
+        """Return V in one scenario, (s, t) bool."""
         return np.unpackbits(self.packed[number], axis=1, count=self.targets).view(bool)
 
     def seen_by_pose(self, pose: int) -> Boolean:
-        """Return what one pose sees in each circumstance, (n, t) bool."""
+        """Return what one pose sees in each scenario, (n, t) bool."""
         return np.unpackbits(self.packed[:, pose], axis=1, count=self.targets).view(bool)
 
     def seen_by_each(self, poses: Integer) -> NDArray[np.uint8]:
-        """Return what a few poses see in each circumstance, (n, s, t) uint8."""
+        """Return what a few poses see in each scenario, (n, s, t) uint8."""
         return np.unpackbits(self.packed[:, poses], axis=2, count=self.targets)
 
     def seen_by_any(self, poses: Integer) -> Boolean:
-        """Return what some of a few poses sees in each circumstance, (n, t) bool."""
+        """Return what any of a few poses sees in each scenario, (n, t) bool."""
         joined = np.bitwise_or.reduce(self.packed[:, poses], axis=1)
         return np.unpackbits(joined, axis=1, count=self.targets).view(bool)
 

@@ -18,7 +18,7 @@ from ..traffic.bodies import fitted_body
 WARM_UP = 2.0
 """Seconds from the first sample of a run to the first instant that is looked at."""
 
-STRETCH = 12.0
+BATCH_SECONDS = 12.0
 """Seconds of a run whose instants count as one draw: what stands in the way at one stays there for some of them."""
 
 _MARGIN = 1e-3
@@ -29,7 +29,7 @@ _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(
 
 @dataclass(frozen=True, eq=False)
 class TrafficObstacles:
-    """What stands on the road at one instant, beside what always does; k road users of n triangles together.
+    """Bodies of the k road users present at one instant; n triangles together.
 
     Parameters
     ----------
@@ -58,21 +58,21 @@ class Instants:
     run : (n,) int64
         Which of the runs.
     time : (n,) float64, seconds
-    stretch : (n,) int64
-        Which stretch of a run each instant is in; instants of different ones hardly depend on each other.
+    batch : (n,) int64
+        Which batch of a run each instant is in; instants of different ones hardly depend on each other.
     """
 
     runs: tuple[Trajectories, ...]
     run: Integer
     time: Float
-    stretch: Integer
+    batch: Integer
 
     def __len__(self) -> int:
         """Return n."""
         return len(self.time)
 
     def obstacles(self) -> list[TrafficObstacles]:
-        """Return who stands where at each instant."""
+        """Return the bodies present at each instant."""
         return [
             obstacles_of(self.runs[run], self.runs[run].at(time))
             for run, time in zip(self.run.tolist(), self.time.tolist(), strict=True)
@@ -80,7 +80,7 @@ class Instants:
 
     def of(self, which: Integer) -> Instants:
         """Return some of the instants."""
-        return Instants(self.runs, self.run[which], self.time[which], self.stretch[which])
+        return Instants(self.runs, self.run[which], self.time[which], self.batch[which])
 
 
 def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Instants:
@@ -102,13 +102,13 @@ def spread_instants(runs: Sequence[Trajectories], number: int, seed: int) -> Ins
     drawn = (np.arange(number) + np.random.default_rng(seed).random(number)) * before[-1] / number
     run = np.searchsorted(before[1:-1], drawn, side="right")
     into = drawn - before[run]
-    parts = np.maximum(np.rint(lasts / STRETCH), 1).astype(np.int64)
+    parts = np.maximum(np.rint(lasts / BATCH_SECONDS), 1).astype(np.int64)
     part = np.minimum(into / lasts[run] * parts[run], parts[run] - 1).astype(np.int64)
     return Instants(tuple(runs), run, begin[run] + into, np.concatenate([[0], np.cumsum(parts)])[run] + part)
 
 
 def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
-    """Raise SeipError where a run has nobody in the region of interest: it is of another place."""
+    """Raise SeipError where a run has no road user in the region of interest: it is of another place."""
     for run in runs:
         if not shapely.contains_xy(region, run.position[:, 0], run.position[:, 1]).any():
             raise SeipError(
@@ -118,7 +118,7 @@ def check_runs(runs: Sequence[Trajectories], region: BaseGeometry) -> None:
 
 
 def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObstacles:
-    """Return the bodies of an instant's road users where they are."""
+    """Return the bodies of the road users of an instant, in place."""
     if len(snapshot) == 0:
         return NO_TRAFFIC
     attitudes = rotations(snapshot.yaw, snapshot.pitch)

@@ -13,7 +13,7 @@ from ..site.targets import Targets
 from ..traffic import Trajectories
 from .traffic_instants import WARM_UP
 
-STEP = 0.2
+INTERVAL = 0.2
 """Seconds between two looks: a car at 50 km/h moves 2.8 m, less than its length."""
 
 _ALONG, _ACROSS = 12, 4
@@ -54,7 +54,7 @@ def road_user_seconds(targets: Targets, runs: Sequence[Trajectories]) -> Generat
         yield Progress(number, len(runs), "watching where road users are")
         size = np.array([(user.length, user.width) for user in run.users])
         begin, end = run.span[0] + WARM_UP, run.span[1]
-        for time in (begin + STEP * (np.arange(max(round((end - begin) / STEP), 0)) + 0.5)).tolist():
+        for time in (begin + INTERVAL * (np.arange(max(round((end - begin) / INTERVAL), 0)) + 0.5)).tolist():
             now = run.at(time)
             ahead = np.column_stack([np.cos(now.yaw), np.sin(now.yaw)])
             left = np.column_stack([-np.sin(now.yaw), np.cos(now.yaw)])
@@ -65,7 +65,7 @@ def road_user_seconds(targets: Targets, runs: Sequence[Trajectories]) -> Generat
     if not parts.any():
         raise SeipError("no road user is ever over a target: the traffic is of another place, or too short")
     yield Progress(len(runs), len(runs), "watching where road users are")
-    return parts * (STEP / len(_SHARES))
+    return parts * (INTERVAL / len(_SHARES))
 
 
 class _Squares:

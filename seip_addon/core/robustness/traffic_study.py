@@ -1,8 +1,8 @@
 """Coverage that traffic leaves of a placement, and what optimising for traffic regains.
 
-Placements are chosen at some instants of traffic and judged at others, of other runs. What is judged is a share of
-time: of each target, and of the targets' weight. Instants near in time see the same queues, so that intervals come of
-stretches of time (`mean_over_time`).
+Placements are optimised on some instants of traffic and evaluated at others, of other runs, by the share of time that
+each target is seen and by the mean share of the targets' weight. Instants near in time see the same queues: intervals
+come of the means of batches of time (`mean_over_time`).
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from .risk import Risk
 from .robust_placement import at_least, outcomes_of, solve_robust
 from .scenario_visibility import ScenarioVisibility
 from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
-from .visibility_in_traffic import HEIGHT, TrafficLayer, visibility_in_traffic
+from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_traffic
 from .visibility_under_errors import Surroundings
 
-NOTABLE = 0.01
+NOTABLE_LOSS = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
 
 IN_TRAFFIC = "in traffic"
 """How the sentence of `tried_in_traffic` begins, and no other."""
 
-MOSTLY = 0.9
+MOSTLY_SEEN_SHARE = 0.9
 """Share of time from which on a target counts as mostly seen."""
 
-WHAT: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {HEIGHT:g} m above the road"}
-"""What is seen, in words."""
+LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
+"""For messages and charts."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrafficScenarios:
-    """What all candidates see at the instants that a placement is chosen on.
+    """Visibility grids of all candidates: of the empty road, and at the instants that a placement is optimised on.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class TrafficScenarios:
 
 @dataclass(frozen=True, eq=False)
 class TrafficCoverage:
-    """What a placement sees on the empty road and at n instants of traffic.
+    """Coverage of a placement on the empty road and at n instants of traffic.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class TrafficCoverage:
         Which targets on the empty road.
     time : (t,) float64
         Share of the instants at which each target is seen.
-    stretch : (n,) int64
+    batch : (n,) int64
         Of the instants.
     """
 
@@ -81,43 +81,43 @@ class TrafficCoverage:
     hidden_at: Float
     empty_targets: Boolean
     time: Float
-    stretch: Integer
+    batch: Integer
 
     @property
-    def held(self) -> IntervalEstimate:
-        """The share of the targets' weight that is seen, on average over time."""
-        return mean_over_time(self.at, self.stretch)
+    def mean(self) -> IntervalEstimate:
+        """Mean over time of the share of the targets' weight that is seen."""
+        return mean_over_time(self.at, self.batch)
 
     @property
-    def lost(self) -> IntervalEstimate:
-        """How much less that is than on the empty road: what is hidden, less what returns from vehicles show."""
-        return mean_over_time(self.empty - self.at, self.stretch)
+    def loss(self) -> IntervalEstimate:
+        """Coverage of the empty road minus that in traffic: hidden weight, less what returns from vehicles add."""
+        return mean_over_time(self.empty - self.at, self.batch)
 
     @property
     def hidden(self) -> IntervalEstimate:
-        """Of the weight that is seen on the empty road, the share that vehicles hide, on average over time."""
-        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.stretch)
+        """Share of the weight seen on the empty road that vehicles hide, on average over time."""
+        return mean_over_time(self.hidden_at / self.empty if self.empty else self.hidden_at, self.batch)
 
     @property
-    def rarely(self) -> float:
-        """Of the targets seen on the empty road, the share that is seen less than `MOSTLY` of the time."""
-        return float((self.time[self.empty_targets] < MOSTLY).mean()) if self.empty_targets.any() else 0.0
+    def rarely_seen(self) -> float:
+        """Share of the targets seen on the empty road that are seen less than `MOSTLY_SEEN_SHARE` of the time."""
+        return float((self.time[self.empty_targets] < MOSTLY_SEEN_SHARE).mean()) if self.empty_targets.any() else 0.0
 
     def more_than(self, other: TrafficCoverage) -> IntervalEstimate:
-        """Estimate how much more of the weight is seen than by another placement at the same instants."""
-        return mean_over_time(self.at - other.at, self.stretch)
+        """Estimate the gain in coverage over another placement at the same instants."""
+        return mean_over_time(self.at - other.at, self.batch)
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedInTraffic:
-    """A placement and what becomes of it in traffic that it was not chosen on.
+class TrafficEvaluation:
+    """A placement with its coverage in traffic that it was not optimised on.
 
     Parameters
     ----------
     name : str
         What it was chosen for.
     seen : mapping of {"road", "height"} to TrafficCoverage
-        Of the targets, and of the points `HEIGHT` metres above them.
+        Of the targets, and of the points `LAYER_HEIGHT` metres above them.
     """
 
     name: str
@@ -127,7 +127,7 @@ class JudgedInTraffic:
 
 @dataclass(frozen=True, eq=False)
 class TrafficStudy:
-    """The optimum of the empty road beside the placement chosen on traffic.
+    """Comparison of the optimum for the empty road with the placement optimised on traffic.
 
     Parameters
     ----------
@@ -136,35 +136,35 @@ class TrafficStudy:
     chosen_at : int
         Instants of traffic that one of the two was chosen on.
     road_users : float
-        On the road at an instant that is judged, on average.
-    empty : JudgedInTraffic
+        On the road at an instant that is evaluated, on average.
+    empty : TrafficEvaluation
         Chosen for the empty road.
-    traffic : JudgedInTraffic
+    traffic : TrafficEvaluation
         Chosen on traffic.
     """
 
     layer: TrafficLayer
     chosen_at: int
     road_users: float
-    empty: JudgedInTraffic
-    traffic: JudgedInTraffic
+    empty: TrafficEvaluation
+    traffic: TrafficEvaluation
 
-    def won(self, layer: TrafficLayer) -> IntervalEstimate:
-        """Estimate how much more the placement chosen on traffic sees in traffic than the one for the empty road."""
+    def gain(self, layer: TrafficLayer) -> IntervalEstimate:
+        """Estimate the gain in coverage in traffic from optimising on traffic rather than for the empty road."""
         return self.traffic.seen[layer].more_than(self.empty.seen[layer])
 
     def is_converged(self) -> bool:
-        """Whether every other instant says the same as all: means whose intervals meet."""
+        """Whether every other instant gives the same means as all, within their intervals."""
         rows = [seen.at for placed in (self.empty, self.traffic) for seen in placed.seen.values()]
         rows.append(self.traffic.seen[self.layer].at - self.empty.seen[self.layer].at)
-        stretch = self.empty.seen[self.layer].stretch
-        return all(mean_over_time(row[::2], stretch[::2]).agrees_with(mean_over_time(row, stretch)) for row in rows)
+        batch = self.empty.seen[self.layer].batch
+        return all(mean_over_time(row[::2], batch[::2]).agrees_with(mean_over_time(row, batch)) for row in rows)
 
 
-def look_at_traffic(
+def traffic_scenarios(
     around: Surroundings, problem: PlacementProblem, instants: Instants, layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, TrafficScenarios]:
-    """Look from all candidates that may be chosen at instants of traffic; the others see nothing."""
+    """Compute visibility at instants of traffic, for the candidates that may be chosen; the others see nothing."""
     every = np.flatnonzero(problem.allowed)
     views = yield from visibility_in_traffic(around, every, [NO_TRAFFIC, *instants.obstacles()], layer)
     spread = views.spread_to(every, len(problem.visible))
@@ -175,16 +175,16 @@ def traffic_study(
     around: Surroundings,
     problem: PlacementProblem,
     scenarios: TrafficScenarios,
-    judged: Instants,
+    evaluation: Instants,
     limits: SolverLimits = DEFAULT_LIMITS,
 ) -> Generator[Progress, None, TrafficStudy]:
-    """Place for the empty road and on traffic, and judge both at other instants.
+    """Optimise for the empty road and for traffic, and evaluate both placements at other instants.
 
     Parameters
     ----------
     problem : PlacementProblem
         Of all candidates of the site; what they see is taken from the scenarios.
-    judged : Instants
+    evaluation : Instants
         Of runs that are not those of the scenarios.
     limits : SolverLimits
         For each placement.
@@ -195,37 +195,37 @@ def traffic_study(
     reached = Risk().of(outcomes_of(problem, scenarios.views, Risk(), empty.chosen))
     placed = at_least(found, empty, reached)
     used = np.unique(np.concatenate([empty.chosen, placed.chosen]))
-    obstacles = judged.obstacles()
+    obstacles = evaluation.obstacles()
     layers: tuple[TrafficLayer, ...] = ("road", "height")
     views: dict[TrafficLayer, ScenarioVisibility] = {}
     for layer in layers:
         views[layer] = yield from visibility_in_traffic(around, used, [NO_TRAFFIC, *obstacles], layer)
 
-    def judge(name: str, placement: Placement) -> JudgedInTraffic:
+    def evaluate(name: str, placement: Placement) -> TrafficEvaluation:
         rows = np.searchsorted(used, placement.chosen)
-        seen = {layer: _seen(views[layer], rows, problem.weights, judged.stretch) for layer in layers}
-        return JudgedInTraffic(name, placement, seen)
+        seen = {layer: _seen(views[layer], rows, problem.weights, evaluation.batch) for layer in layers}
+        return TrafficEvaluation(name, placement, seen)
 
     return TrafficStudy(
         layer=scenarios.layer,
         chosen_at=len(scenarios.views),
         road_users=_users(obstacles),
-        empty=judge("the empty road", empty),
-        traffic=judge("traffic", placed),
+        empty=evaluate("the empty road", empty),
+        traffic=evaluate("traffic", placed),
     )
 
 
-def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, stretch: Integer) -> TrafficCoverage:
-    """Return what some poses see together; the first of the views is of the empty road."""
+def _seen(views: ScenarioVisibility, rows: Integer, weight: Float, batch: Integer) -> TrafficCoverage:
+    """Return the joint coverage of some poses; the first view is of the empty road."""
     seen = views.seen_by_any(rows)
     share, hidden = (which @ weight / weight.sum() for which in (seen, seen[0] & ~seen[1:]))
-    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), stretch)
+    return TrafficCoverage(float(share[0]), share[1:], hidden, seen[0], seen[1:].mean(axis=0), batch)
 
 
-def tried_in_traffic(
+def traffic_message(
     around: Surroundings, poses: Integer, weight: Float, instants: Instants
 ) -> Generator[Progress, None, str]:
-    """Say, in a sentence, what poses see of the road in traffic on average over time, and when it is empty.
+    """Describe how much of the road poses see in traffic, on average over time, and when it is empty.
 
     Parameters
     ----------
@@ -236,9 +236,9 @@ def tried_in_traffic(
     """
     obstacles = instants.obstacles()
     views = yield from visibility_in_traffic(around, poses, [NO_TRAFFIC, *obstacles], "road")
-    seen = _seen(views, np.arange(len(poses)), weight, instants.stretch)
+    seen = _seen(views, np.arange(len(poses)), weight, instants.batch)
     return (
-        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.held.describe()} of "
+        f"{IN_TRAFFIC} ({_users(obstacles):.0f} road users at a time) this placement sees {seen.mean.describe()} of "
         f"the road on average over time, {seen.empty:.2%} when it is empty"
     )
 
@@ -248,15 +248,16 @@ def _users(obstacles: Sequence[TrafficObstacles]) -> float:
 
 
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
-    """Say where the empty road promises too much, and where placing on traffic is not known to win, in sentences."""
+    """Return warnings where traffic costs much coverage, and where optimising for it is not known to gain any."""
     losses = tuple(
-        f"the best placement for the empty road sees {seen.held.value:.1%} of the {WHAT[layer]} on average over time "
-        f"in traffic ({study.road_users:.0f} road users at a time), not {seen.empty:.1%}: {seen.lost.value:.1%} less"
+        f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average over "
+        f"time in traffic ({study.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
+        f"{seen.loss.value:.1%} less"
         for layer, seen in study.empty.seen.items()
-        if seen.lost.value >= NOTABLE
+        if seen.loss.value >= NOTABLE_LOSS
     )
-    won = study.won(study.layer)
-    if won.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
+    gain = study.gain(study.layer)
+    if gain.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
         return losses
     doubt = (
         "this placement is not known to see more in traffic that it was not chosen on than the best one for the empty "

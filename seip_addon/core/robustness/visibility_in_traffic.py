@@ -5,7 +5,7 @@ distance d on the first of the scene's triangles or of the bodies of road users:
 
 - ``road``: a return nearer than δ to the target, as on the empty road. A return from
   a vehicle that stands on a target, or beside it, sees that place as one from the road does.
-- ``height``: a beam that comes nearer than δ to the point `HEIGHT` metres above the
+- ``height``: a beam that comes nearer than δ to the point `LAYER_HEIGHT` metres above the
   target before it ends. On the empty road nothing is there to return it; whatever
   were there would. A vehicle adds nothing to this: where more stand less is seen.
 
@@ -36,19 +36,19 @@ from .visibility_under_errors import Surroundings
 
 TrafficLayer = Literal["road", "height"]
 
-HEIGHT = 1.5
+LAYER_HEIGHT = 1.5
 """Metres above its target at which a car has its roof, and a van or a truck its side."""
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
 _POINTS_AT_ONCE = 128  # bounds that of the rays past points
-_OUTSIDE = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out
+_CUBE_SLACK = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out
 _CORNERS = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1), indexing="ij")).reshape(3, 8).T
 
 
 def visibility_in_traffic(
     around: Surroundings, poses: Integer, instants: Sequence[TrafficObstacles], layer: TrafficLayer = "road"
 ) -> Generator[Progress, None, ScenarioVisibility]:
-    """Look from poses at instants of traffic.
+    """Compute visibility from poses at instants of traffic.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ def visibility_in_traffic(
     engine = engine_name(around.engine)
     caster = make_ray_caster(site.triangles, engine)
     vehicles = [_vehicle_caster(around, one, caster) for one in instants]
-    wanted = site.targets.xyz + np.array([0.0, 0.0, HEIGHT if layer == "height" else 0.0])
+    wanted = site.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT if layer == "height" else 0.0])
     index = TargetIndex(wanted, around.sight.delta)
     packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
 
-    def look(number: int) -> None:
+    def compute(number: int) -> None:
         pose = int(poses[number])
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
         place = ScanPosition(caster, xyz, float(yaw), [model], around.sight)
@@ -88,7 +88,7 @@ def visibility_in_traffic(
         for instant, present in enumerate(vehicles):
             packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(present)))
 
-    yield from each_in_threads(look, range(len(poses)), caster.threads, "looking between vehicles")
+    yield from each_in_threads(compute, range(len(poses)), caster.threads, "looking between vehicles")
     return ScenarioVisibility(packed, len(wanted))
 
 
@@ -254,7 +254,7 @@ class _HeightVisibility:
 
     def _passing(self, points: Integer) -> Iterator[tuple[Integer, Integer]]:
         """Try all rays past points, and return some points at a time with the rays that pass them."""
-        reach = self._static.place.settings.delta * (1 + _OUTSIDE)
+        reach = self._static.place.settings.delta * (1 + _CUBE_SLACK)
         for part in np.array_split(points, max(1, -(-len(points) // _POINTS_AT_ONCE))):
             hull, ray = self._static.through(self._points[part][:, None] + reach * _CORNERS)
             passing = self._pass(ray, part[hull])

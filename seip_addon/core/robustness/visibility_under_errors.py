@@ -22,14 +22,14 @@ from .scenario_visibility import ScenarioVisibility, each_in_threads
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Where sensors may hang, and what they see there.
+    """A site with its sensor models, visibility settings and obstacles, for visibility from changed poses.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
         At least those that the candidates name.
     objects : sequence of Mesh
-        Nothing hangs inside these: the scene's occluders.
+        The scene's occluders: no sensor is inside one.
     engine : {"auto", "bvh", "embree"}
     """
 
@@ -52,7 +52,7 @@ def draws_for(
 def visibility_under_errors(
     around: Surroundings, poses: Integer, draws: PoseDraws
 ) -> Generator[Progress, None, ScenarioVisibility]:
-    """Look from poses as draws of errors leave them; sensors of several types at one place share rays.
+    """Compute visibility from poses under draws of errors; sensors of several types at one place share rays.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def visibility_under_errors(
     packed = np.zeros((len(draws), len(poses), (len(site.targets) + 7) // 8), dtype=np.uint8)
     orientations = draws.orientations(yaw, tilt)
 
-    def look(work: tuple[int, Integer]) -> None:
+    def compute(work: tuple[int, Integer]) -> None:
         draw, members = work
         first = members[0]
         where, turned = xyz[first] + draws.shift[draw, first], orientations[draw, first]
@@ -84,5 +84,5 @@ def visibility_under_errors(
         packed[draw, members] = np.packbits(seen, axis=1)
 
     works = [(draw, members) for draw in range(len(draws)) for members in together]
-    yield from each_in_threads(look, works, caster.threads, "looking from poses as they may be")
+    yield from each_in_threads(compute, works, caster.threads, "looking from poses as they may be")
     return ScenarioVisibility(packed, len(site.targets))

@@ -12,36 +12,36 @@ from ..arrays import Boolean, Float, Integer, Text
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..traffic.trajectories import CATEGORIES
 
-_FARTHEST = 1e7
+_MAX_COORDINATE = 1e7
 """Metres from the local origin within which all points and boxes lie."""
 
-_ABOUT_ONE = 1.0 + 1e-5
+_ROUNDED_ONE = 1.0 + 1e-5
 """1, as float32 may round it."""
 
 _POINTS = {
-    "points": ArrayRule("f4", ("n", 3), -_FARTHEST, _FARTHEST),
+    "points": ArrayRule("f4", ("n", 3), -_MAX_COORDINATE, _MAX_COORDINATE),
     "sensor": ArrayRule("i2", ("n",), 0),
     "delay": ArrayRule("f4", ("n",), -1e3, 1e3),
-    "intensity": ArrayRule("f4", ("n",), 0.0, _ABOUT_ONE),
+    "intensity": ArrayRule("f4", ("n",), 0.0, _ROUNDED_ONE),
     "instance": ArrayRule("i4", ("n",), -1),
 }
 _LABELS = {
     "labels.user": ArrayRule("i8", ("k",), 0),
     "labels.category": ArrayRule("U", ("k",)),
-    "labels.centre": ArrayRule("f8", ("k", 3), -_FARTHEST, _FARTHEST),
+    "labels.centre": ArrayRule("f8", ("k", 3), -_MAX_COORDINATE, _MAX_COORDINATE),
     "labels.size": ArrayRule("f8", ("k", 3), 0.0, 1e3),
     "labels.yaw": ArrayRule("f8", ("k",), -4.0, 4.0),
     "labels.pitch": ArrayRule("f8", ("k",), -2.0, 2.0),
     "labels.speed": ArrayRule("f8", ("k",), -1e6, 1e6),
     "labels.points": ArrayRule("i8", ("k", "s"), 0),
-    "labels.visibility": ArrayRule("f8", ("k",), 0.0, _ABOUT_ONE),
+    "labels.visibility": ArrayRule("f8", ("k",), 0.0, _ROUNDED_ONE),
     "labels.inside": ArrayRule("b1", ("k",)),
 }
 FILE = ArrayFile(
     "seip.frame", 2, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False, undigested=True
 )
 
-STATIC = -1
+STATIC_INSTANCE = -1
 """The instance of a point that is on no road user."""
 
 
@@ -101,7 +101,7 @@ class Frame:
         Of each point after ``time``; zero unless the shutter rolls.
     intensity : (n,) float32, 0 to 1
     instance : (n,) int32
-        Road user that returned it, `STATIC` for none.
+        Road user that returned it, `STATIC_INSTANCE` for none.
     """
 
     time: float
@@ -143,7 +143,7 @@ class Frame:
             raise ContentError("a label has an unknown category")
         if (np.diff(labels.user) <= 0).any():
             raise ContentError("road users are labelled twice")
-        if not np.isin(self.instance[self.instance != STATIC], labels.user).all():
+        if not np.isin(self.instance[self.instance != STATIC_INSTANCE], labels.user).all():
             raise ContentError("points lie on road users without a label")
         if len(self) and int(self.sensor.max()) >= labels.points.shape[1]:
             raise ContentError("points are from sensors that the labels do not count")

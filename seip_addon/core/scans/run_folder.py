@@ -31,7 +31,7 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """All that the frames of a run follow from.
+    """All inputs of the frames of a run.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def write_run(folder: Path, run: Run, simulation: Simulation) -> Generator[Progr
 
 
 def check_run_folder(folder: Path, run: Run) -> None:
-    """Refuse a folder that holds something other than frames of this run."""
+    """Raise SeipError where a folder holds something other than frames of this run."""
     if (folder / MANIFEST).exists():
         if load_manifest(folder)["key"] != run.key:
             raise SeipError(

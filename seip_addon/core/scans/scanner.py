@@ -16,14 +16,14 @@ from ..arrays import Boolean, Float, Integer
 from ..lidar import BeamPattern, return_chance, return_intensity
 from ..visibility.ray_casting import RayCaster
 from .beam_culling import BeamWindows
-from .frame import STATIC
+from .frame import STATIC_INSTANCE
 from .motion import Motion
 from .sensor import MountedSensor
 
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of the static scan
 _MARGIN = 1e-3
 """Metres by which bounding boxes are larger than what they bound: engines compute in float32."""
-_LEVEL = 1e-12  # a ray of less slope than this is off by less than the margin at any range
+_MAX_LEVEL_SLOPE = 1e-12  # a ray of less slope than this is off by less than the margin at any range
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
 
@@ -91,7 +91,7 @@ class BodySurface(ReflectiveSurface):
         -------
         (n,) bool
         """
-        slowness = 1.0 / np.where(np.abs(directions) < _LEVEL, _LEVEL, directions)
+        slowness = 1.0 / np.where(np.abs(directions) < _MAX_LEVEL_SLOPE, _MAX_LEVEL_SLOPE, directions)
         one, other = (self.low[:, None] - origin) * slowness, (self.high[:, None] - origin) * slowness
         enter = np.minimum(one, other).max(axis=0)
         leave = np.maximum(one, other).min(axis=0)
@@ -101,7 +101,7 @@ class BodySurface(ReflectiveSurface):
 
 @dataclass(frozen=True, eq=False)
 class MovingTraffic:
-    """What moves during a revolution; k road users.
+    """The k road users that move during a revolution.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class MovingTraffic:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """What the rays of one revolution end on; r rays in the order of `BeamPattern`.
+    """Hits of the rays of one revolution; r rays in the order of `BeamPattern`.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Scan:
     chance : (r,) float32
         That the ray's return is not lost.
     instance : (r,) int32
-        Road user, or `STATIC`.
+        Road user, or `STATIC_INSTANCE`.
     unoccluded : (u,) int64
         For each of the trajectories' road users, how many rays would return from it with nothing else there.
     visible : (u,) int64
@@ -153,7 +153,7 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class _Hits:
-    """What some rays meet; n hits."""
+    """Hits of rays; n of them."""
 
     ray: Integer
     distance: Float
@@ -210,7 +210,7 @@ class Scanner:
         """Return what the rays end on with traffic that is one of so many road users."""
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
         reflected = np.empty(len(distance))
-        instance = np.full(len(distance), STATIC, dtype=np.int32)
+        instance = np.full(len(distance), STATIC_INSTANCE, dtype=np.int32)
         unoccluded = np.zeros(users, dtype=np.int64)
         for motion, hits in self._hits(traffic):
             unoccluded[motion.user] = self.in_range(hits.distance).sum()
@@ -218,7 +218,7 @@ class Scanner:
             ray = hits.ray[nearest]
             distance[ray], reflected[ray] = hits.distance[nearest], hits.reflected[nearest]
             instance[ray] = motion.user
-        on_traffic = np.flatnonzero(instance != STATIC)
+        on_traffic = np.flatnonzero(instance != STATIC_INSTANCE)
         far = distance[on_traffic]
         intensity[on_traffic] = return_intensity(self._model, far, reflected[on_traffic])
         chance[on_traffic] = return_chance(self._model, far, intensity[on_traffic])
@@ -266,4 +266,4 @@ class Scanner:
 
 def returns_by_user(instance: NDArray[np.int32], users: int) -> Integer:
     """Return how many of some returns are from each of so many road users, (u,)."""
-    return np.bincount(instance[instance != STATIC], minlength=users)
+    return np.bincount(instance[instance != STATIC_INSTANCE], minlength=users)

@@ -10,13 +10,13 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import LidarModel
 
-_RIGID = 1e-6
+_ORTHONORMAL_TOLERANCE = 1e-6
 """How far an orientation's columns may be from unit vectors at right angles."""
 
 
 @dataclass(frozen=True, eq=False)
 class MountedSensor:
-    """A LiDAR with its place and the way it is turned.
+    """A LiDAR model at a position and orientation.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class MountedSensor:
 
     def __post_init__(self) -> None:
         turn = self.orientation
-        rigid = np.allclose(turn.T @ turn, np.eye(3), rtol=0, atol=_RIGID) and np.linalg.det(turn) > 0
+        rigid = np.allclose(turn.T @ turn, np.eye(3), rtol=0, atol=_ORTHONORMAL_TOLERANCE) and np.linalg.det(turn) > 0
         if not (rigid and np.isfinite(self.xyz).all()):
             raise SeipError(f"sensor {self.label!r} has no place, or is not turned but mirrored or skewed: set it anew")
 

@@ -28,7 +28,7 @@ from .static_scene import StaticScene
 
 @dataclass(frozen=True)
 class ScanSettings:
-    """How scans are made.
+    """Settings of simulated scans.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Simulation:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting the scans, in sentences."""
+        """Warnings about the scans."""
         blind = tuple(
             f"{scanner.sensor.label} sees nothing of the scene: no ray of it meets anything within its range; "
             "look whether it hangs where it should"
@@ -149,7 +149,7 @@ def prepare(
     bodies: Sequence[Body],
     settings: ScanSettings,
 ) -> Generator[Progress, None, Simulation]:
-    """Cast against what stands still, once for all frames.
+    """Cast all rays against the static scene, once for all frames.
 
     Parameters
     ----------
@@ -216,12 +216,12 @@ def frame_times(
         raise SeipError(f"{slowest.label} turns {fastest:g} times a second: ask for a rate from 0 to {fastest:g} Hz")
     start = begin if start is None else start
     duration = end - start if duration is None else duration
-    if not (begin <= start <= end and 0 <= duration <= end - start + _SLACK):
+    if not (begin <= start <= end and 0 <= duration <= end - start + _TIME_TOLERANCE):
         raise SeipError(f"the traffic is known from {begin:g} s to {end:g} s: choose start and duration within that")
-    return start + np.arange(math.floor(duration * rate + _SLACK) + 1) / rate
+    return start + np.arange(math.floor(duration * rate + _TIME_TOLERANCE) + 1) / rate
 
 
-_SLACK = 1e-6
+_TIME_TOLERANCE = 1e-6
 """Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
 
 

@@ -19,22 +19,22 @@ from .obstruction import inside_any, post_blocked
 from .pavement_sampling import spread
 from .scene_geometry import ASSUMED, NamedArea, Pole, SceneGeometry, joined
 
-_ABOVE_POLE = 0.5
+_MAX_ABOVE_POLE = 0.5
 """Metres that a sensor may hang above the top of its pole, on a short mast."""
 
-HIGHEST = 100.0
+MAX_SENSOR_HEIGHT = 100.0
 """Metres: a sensor higher than this is taken for a typing error."""
 
 ASSUMED_POLES = "assumed poles"
-"""Why poles that stand in no map are dropped."""
+"""Reason for which assumed poles are dropped."""
 
-STEEPEST = 90.0
+MAX_TILT = 90.0
 """Degrees: tilts are less than this, up or down."""
 
 
 @dataclass(frozen=True)
 class CandidateSettings:
-    """How candidates are laid out.
+    """Settings of candidate poses: sensor types, heights, tilts, spacing and clearances.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class CandidateSettings:
         (3.5, 5.4, 8.0),
         "metres, or FROM:TO:STEP",
         unit="m",
-        maximum=HIGHEST,
+        maximum=MAX_SENSOR_HEIGHT,
         metavar="M",
         read=lambda texts: heights_of(texts),  # noqa: PLW0108 -- defined below
     )
@@ -98,9 +98,9 @@ class CandidateSettings:
         if not self.heights:
             raise SeipError("no mounting height is given: name at least one, in metres")
         for height in self.heights:
-            if not 0 < height <= HIGHEST:
+            if not 0 < height <= MAX_SENSOR_HEIGHT:
                 raise SeipError(
-                    f"a mounting height must be a positive number of metres up to {HIGHEST:g}, not {height}"
+                    f"a mounting height must be a positive number of metres up to {MAX_SENSOR_HEIGHT:g}, not {height}"
                 )
         self._check_tilts()
         if not 0.1 <= self.spacing <= 1000:
@@ -114,9 +114,9 @@ class CandidateSettings:
         if not self.tilts:
             raise SeipError("no tilt is given: name at least one, in degrees; 0 is upright")
         for number, tilt in enumerate(self.tilts):
-            if not abs(math.degrees(tilt)) < STEEPEST:
+            if not abs(math.degrees(tilt)) < MAX_TILT:
                 raise SeipError(
-                    f"a tilt must be more than -{STEEPEST:g}° and less than {STEEPEST:g}°, not {math.degrees(tilt):g}°"
+                    f"a tilt must be more than -{MAX_TILT:g}° and less than {MAX_TILT:g}°, not {math.degrees(tilt):g}°"
                 )
             if tilt in self.tilts[:number]:
                 raise SeipError(f"the tilt of {math.degrees(tilt):g}° is given twice: name each tilt once")
@@ -132,11 +132,11 @@ def heights_of(texts: Sequence[str]) -> tuple[float, ...]:
     """
     heights: list[float] = []
     for text in texts:
-        named = _named_by(text, 0.0, HIGHEST)
+        named = _named_by(text, 0.0, MAX_SENSOR_HEIGHT)
         if not named:
             raise SeipError(
                 f"{text!r} is neither a height in metres nor a range FROM:TO:STEP "
-                f"up to {HIGHEST:g} m in steps of at least {_FINEST:g} m"
+                f"up to {MAX_SENSOR_HEIGHT:g} m in steps of at least {_MIN_STEP:g} m"
             )
         heights += named
     return tuple(heights)
@@ -152,17 +152,17 @@ def tilts_of(texts: Sequence[str]) -> tuple[float, ...]:
     """
     tilts: list[float] = []
     for text in texts:
-        named = _named_by(text, -STEEPEST, STEEPEST)
+        named = _named_by(text, -MAX_TILT, MAX_TILT)
         if not named:
             raise SeipError(
                 f"{text!r} is neither a tilt in degrees nor a range FROM:TO:STEP within "
-                f"±{STEEPEST:g}° in steps of at least {_FINEST:g}°"
+                f"±{MAX_TILT:g}° in steps of at least {_MIN_STEP:g}°"
             )
         tilts += [math.radians(tilt) + 0.0 for tilt in named]
     return tuple(tilts)
 
 
-_FINEST = 0.01
+_MIN_STEP = 0.01
 """Metres or degrees: a finer range is taken for a typing error."""
 
 
@@ -174,7 +174,7 @@ def _named_by(text: str, above: float, most: float) -> list[float]:
         return []
     if len(numbers) == 1:
         return numbers
-    if len(numbers) == 3 and above < numbers[0] <= numbers[1] <= most and numbers[2] >= _FINEST:
+    if len(numbers) == 3 and above < numbers[0] <= numbers[1] <= most and numbers[2] >= _MIN_STEP:
         first, last, step = numbers
         steps: list[float] = np.round(np.arange(first, last + step * 1e-6, step), 6).tolist()
         return steps
@@ -240,8 +240,8 @@ class Candidates:
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 
-def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
-    """Sample the candidate areas, take the poles, and drop what cannot carry a sensor.
+def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Candidates:
+    """Make candidate poses at positions on the candidate areas and poles, without those that carry no sensor.
 
     Returns
     -------
@@ -263,7 +263,7 @@ def lay_candidates(geometry: SceneGeometry, settings: CandidateSettings) -> Cand
     xyz = foot[position_of] + axis_offset[position_of]
     xyz[:, 2] += height
 
-    too_high = height > top[position_of] + _ABOVE_POLE
+    too_high = height > top[position_of] + _MAX_ABOVE_POLE
     inside = ~too_high
     inside[inside] = inside_any(xyz[inside], geometry.occluders)
     blocked = np.zeros(len(xyz), dtype=bool)
@@ -398,7 +398,7 @@ def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[
 
 
 def assumed_pole_warnings(geometry: SceneGeometry, candidates: Candidates) -> tuple[str, ...]:
-    """Say how many poles of a scene are assumed, and whether they may carry sensors."""
+    """Return a warning on how many poles of a scene are assumed, and whether they may carry sensors."""
     assumed = sum(pole.source == ASSUMED for pole in geometry.poles)
     if not assumed:
         return ()

@@ -18,32 +18,32 @@ from ..progress import Progress
 from ..storage.files import digest
 from .scene_geometry import ASSUMED, Pole, SceneGeometry
 from .site import Site
-from .targets import lay_targets
+from .targets import generate_targets
 
-FAR = 10_000.0
+MAX_ORIGIN_DISTANCE = 10_000.0
 """Metres from the origin beyond which Blender's single precision rounds coordinates to a millimetre and more."""
-SMALLEST_REGION, LARGEST_REGION = 5.0, 10_000.0
+MIN_REGION_SIZE, MAX_REGION_SIZE = 5.0, 10_000.0
 """Metres across between which a region of interest is one."""
-UPRIGHT = 0.5
+MIN_PLAN_SHARE = 0.5
 """Share of a surface's area that shows in plan below which it stands more than it lies."""
-FAR_POLE = 60.0
+MAX_POLE_DISTANCE = 60.0
 """Metres from the region beyond which a pole is none of the place's."""
-OFF_GROUND = 0.5
+MAX_FOOT_OFFSET = 0.5
 """Metres between a pole's foot and the ground beyond which sensors would hang at a wrong height."""
-HOLE = 10.0
+MAX_HOLE_AREA = 10.0
 """Square metres in plan up to which a hole in the road is rather a missing face than an island."""
-LEAST_HOLE = 0.01
+MIN_HOLE_AREA = 0.01
 """Square metres in plan below which a hole is a seam."""
-STEP = 0.3
+MAX_ROAD_STEP = 0.3
 """Metres of height between road a metre apart that no vehicle drives over."""
-LAYERS = (0.05, 2.5)
+LAYER_DISTANCES = (0.05, 2.5)
 """Metres between which one road above another is no bridge, but a mistake."""
-SAMPLE = 1.0
+SAMPLE_SPACING = 1.0
 """Metres between the places at which the road is looked at."""
-MOST_SAMPLES = 250_000
-SAME_PLACE = 0.05
+MAX_SAMPLES = 250_000
+SAME_POLE_DISTANCE = 0.05
 """Metres in plan below which two poles stand at one place."""
-MOST_NAMED = 5
+MAX_NAMED = 5
 """Culprits of one kind that are named one by one."""
 
 Severity = Literal["ERROR", "WARNING"]
@@ -51,7 +51,7 @@ Severity = Literal["ERROR", "WARNING"]
 
 @dataclass(frozen=True)
 class Problem:
-    """Something that stops a survey, or harms its answer.
+    """A problem of a scene: it makes a survey impossible, or its result unreliable.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ ROLES = {
 
 @dataclass(frozen=True, eq=False)
 class SceneContents:
-    """What was found in a scene, whole or not.
+    """Contents of a scene, whether complete or not.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class SceneContents:
 
 @dataclass(frozen=True)
 class SiteCheck:
-    """What a scene holds, by what it is called, and its problems: errors first."""
+    """Result of a check: counts of a scene's contents, and its problems, errors first."""
 
     counts: dict[str, str]
     problems: tuple[Problem, ...]
@@ -134,7 +134,7 @@ class SiteCheck:
 def check_site(
     contents: SceneContents, lay_out: Callable[[SceneGeometry], tuple[Site, Sequence[str]]]
 ) -> Generator[Progress, None, SiteCheck]:
-    """Count what a scene holds and look for what would harm an answer.
+    """Check a scene: count what it holds and find problems that would affect a result.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def _wrong_size(contents: SceneContents, region: BaseGeometry) -> Iterator[Probl
         return
     low_x, low_y, high_x, high_y = region.bounds
     across = max(high_x - low_x, high_y - low_y)
-    if not SMALLEST_REGION <= across <= LARGEST_REGION:
+    if not MIN_REGION_SIZE <= across <= MAX_REGION_SIZE:
         yield Problem(
             "WARNING",
             f"The region is {across:,.3g} m across: one unit of Blender is one metre; scale the scene if it is not.",
@@ -268,7 +268,7 @@ def _wrong_size(contents: SceneContents, region: BaseGeometry) -> Iterator[Probl
 def _far(contents: SceneContents) -> Iterator[Problem]:
     reaches = [(float(np.abs(surface.triangles).max()), surface.name) for surface in contents.surfaces]
     reaches += [(float(np.abs(pole.base).max()), pole.name) for pole in contents.poles]
-    far = [(reach, name) for reach, name in reaches if reach > FAR]
+    far = [(reach, name) for reach, name in reaches if reach > MAX_ORIGIN_DISTANCE]
     if far:
         reach, name = max(far)
         yield Problem(
@@ -281,11 +281,11 @@ def _far(contents: SceneContents) -> Iterator[Problem]:
 
 
 def _upright(contents: SceneContents) -> Iterator[Problem]:
-    """Find what should lie and stands: z-up mistakes, and what is no road among the roads."""
+    """Find upright surfaces among those that should be level, as from a model with another axis up."""
     for surface in contents.surfaces:
         if surface.role in {"region", "roads", "candidate_areas", "weighted_regions"}:
             side = np.linalg.norm(_normals(surface.triangles), axis=1).sum() / 2
-            if np.abs(signed_area(surface.triangles)).sum() < UPRIGHT * side:
+            if np.abs(signed_area(surface.triangles)).sum() < MIN_PLAN_SHARE * side:
                 yield Problem(
                     "WARNING",
                     f"{surface.name!r} among the {ROLES[surface.role].lower()} stands more than it lies: turn it so "
@@ -314,7 +314,7 @@ def _without_road(contents: SceneContents, plans: dict[str, BaseGeometry]) -> It
     shapely.prepare(plans["region"])
     for role in ("weighted_regions", "mandatory_areas"):
         for surface in _of(contents, role):
-            lies_in = plans["region"] if role == "weighted_regions" else plans["region"].buffer(FAR_POLE)
+            lies_in = plans["region"] if role == "weighted_regions" else plans["region"].buffer(MAX_POLE_DISTANCE)
             if not lies_in.intersects(outline(surface.triangles)):
                 yield Problem(
                     "WARNING",
@@ -334,9 +334,9 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
         [
             (pole.name, f"The pole {pole.name!r} stands {away:,.0f} m from the region: take it out of the poles.")
             for pole, away in zip(poles, distance, strict=True)
-            if away > FAR_POLE
+            if away > MAX_POLE_DISTANCE
         ],
-        f"poles stand more than {FAR_POLE:g} m from the region: take them out of the poles",
+        f"poles stand more than {MAX_POLE_DISTANCE:g} m from the region: take them out of the poles",
     )
     under = np.concatenate([np.empty((0, 3, 3)), *_triangles(contents, "roads"), *_triangles(contents, "ground")])
     above = feet[:, 2] - surface_height(feet[:, :2], under) if len(under) else np.full(len(feet), np.nan)
@@ -347,12 +347,12 @@ def _pole_problems(contents: SceneContents, region: BaseGeometry) -> Iterator[Pr
                 f"The foot of the pole {pole.name!r} is {_level(high)} the ground: move it, or its origin, there.",
             )
             for pole, high in zip(poles, above, strict=True)
-            if abs(high) > OFF_GROUND
+            if abs(high) > MAX_FOOT_OFFSET
         ],
-        f"poles have their foot more than {OFF_GROUND:g} m above or below the ground: move them or their origins",
+        f"poles have their foot more than {MAX_FOOT_OFFSET:g} m above or below the ground: move them or their origins",
     )
     nearest = shapely.STRtree(shapely.points(feet[:, :2])).query(
-        shapely.points(feet[:, :2]), predicate="dwithin", distance=SAME_PLACE
+        shapely.points(feet[:, :2]), predicate="dwithin", distance=SAME_POLE_DISTANCE
     )
     yield from _named(
         [
@@ -370,8 +370,8 @@ def _level(high: float) -> str:
 
 def _named(culprits: list[tuple[str, str]], together: str) -> Iterator[Problem]:
     """Name a few culprits one by one, and the others together."""
-    yield from (Problem("WARNING", text, name) for name, text in culprits[:MOST_NAMED])
-    rest = culprits[MOST_NAMED:]
+    yield from (Problem("WARNING", text, name) for name, text in culprits[:MAX_NAMED])
+    rest = culprits[MAX_NAMED:]
     if rest:
         yield Problem("WARNING", f"{len(rest):,} more {together}.", rest[0][0])
 
@@ -405,9 +405,9 @@ def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> I
         return
     yield from _holes(contents, road, region)
     triangles = np.concatenate(_triangles(contents, "roads"))
-    spacing = max(SAMPLE, math.sqrt(region.area / MOST_SAMPLES))
+    spacing = max(SAMPLE_SPACING, math.sqrt(region.area / MAX_SAMPLES))
     try:
-        places = lay_targets(region, triangles, spacing).xyz
+        places = generate_targets(region, triangles, spacing).xyz
     except SeipError:  # too narrow for the grid: nothing to be seen of steps
         return
     yield from _steps(contents, places, spacing)
@@ -417,7 +417,7 @@ def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> I
 def _holes(contents: SceneContents, road: BaseGeometry, region: BaseGeometry) -> Iterator[Problem]:
     rings = [ring for part in shapely.get_parts(road) if part.geom_type == "Polygon" for ring in part.interiors]
     areas = [shapely.Polygon(ring) for ring in rings]
-    holes = [hole for hole in areas if LEAST_HOLE < hole.area <= HOLE and hole.intersects(region)]
+    holes = [hole for hole in areas if MIN_HOLE_AREA < hole.area <= MAX_HOLE_AREA and hole.intersects(region)]
     if holes:
         largest = max(holes, key=lambda hole: float(hole.area))
         yield Problem(
@@ -433,13 +433,13 @@ def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[P
     pairs = tree.query(shapely.points(places[:, :2]), predicate="dwithin", distance=1.1 * spacing)
     first, second = pairs[:, pairs[0] < pairs[1]]
     rise = np.abs(places[first, 2] - places[second, 2])
-    steep = np.flatnonzero(rise > STEP * spacing)
+    steep = np.flatnonzero(rise > MAX_ROAD_STEP * spacing)
     if len(steep):
         worst = steep[np.argmax(rise[steep])]
         point = shapely.Point(places[first[worst], :2])
         yield Problem(
             "WARNING",
-            f"The road has steps or slopes over {STEP:.0%} at {_number(len(steep), 'place')}, up to "
+            f"The road has steps or slopes over {MAX_ROAD_STEP:.0%} at {_number(len(steep), 'place')}, up to "
             f"{rise[worst]:.2g} m at {_place(point)}: targets there lie on no road, unless it is a bridge's edge.",
             _nearest_road(contents, point),
         )
@@ -448,13 +448,14 @@ def _steps(contents: SceneContents, places: Float, spacing: float) -> Iterator[P
 def _layers(contents: SceneContents, places: Float, triangles: Float) -> Iterator[Problem]:
     point, heights = heights_over(places[:, :2], triangles)
     below = places[point, 2] - heights
-    hidden = np.unique(point[(below > LAYERS[0]) & (below < LAYERS[1])])
+    hidden = np.unique(point[(below > LAYER_DISTANCES[0]) & (below < LAYER_DISTANCES[1])])
     if len(hidden):
         at = shapely.Point(places[hidden[0], :2])
         yield Problem(
             "WARNING",
-            f"Road lies {LAYERS[0]:g} to {LAYERS[1]:g} m above other road at {_number(len(hidden), 'place')}, as at "
-            f"{_place(at)}: targets lie on the upper one; take out what is no road.",
+            f"Road lies {LAYER_DISTANCES[0]:g} to {LAYER_DISTANCES[1]:g} m above other road at "
+            f"{_number(len(hidden), 'place')}, as at {_place(at)}: targets lie on the upper one; take out what is "
+            "no road.",
             _nearest_road(contents, at),
         )
 

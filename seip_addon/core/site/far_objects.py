@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Boolean, Float
 from .scene_geometry import Mesh, SceneGeometry
 
-_SLACK = 1.0
+_RANGE_SLACK = 1.0
 """Metres beyond the range that are kept, for all that a return may be off."""
 
 
@@ -71,7 +71,7 @@ def without_far_objects(
 
 def _near(mesh: Mesh, middle: BaseGeometry, reach: float) -> Boolean:
     """Return which triangles of a mesh are within reach in plan, (n,) bool."""
-    near: Boolean = shapely.dwithin(middle, _plan_boxes(mesh.triangles), reach + _SLACK)
+    near: Boolean = shapely.dwithin(middle, _plan_boxes(mesh.triangles), reach + _RANGE_SLACK)
     return near
 
 

@@ -14,20 +14,20 @@ from .scene_geometry import Mesh, SceneGeometry, joined
 _POST_FOOT = 0.3
 """Metres above the ground from which a post must keep clear: kerbs and plinths are no walls."""
 
-_LOW, _SLIM = 1.0, 0.5
+_MIN_OBSTACLE_HEIGHT, _MIN_OBSTACLE_WIDTH = 1.0, 0.5
 """Metres of height and of width up to which an object hides next to nothing from a sensor on a post."""
 
-BARE = (
+NO_OBSTACLES_MESSAGE = (
     "nothing in this scene can hide anything: it has no building, tree or wall, so that coverage says where the rings "
     "of the sensors fall, not what they can see; describe or model what stands there"
 )
 
 
 def bareness_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
-    """Say that nothing stands in the way, where no occluder but poles is large enough to hide anything."""
+    """Return a warning where no occluder but poles is large enough to hide anything."""
     poles = {pole.name for pole in geometry.poles}
     others = (mesh.triangles.reshape(-1, 3) for mesh in geometry.occluders if mesh.name not in poles)
-    return () if any(map(can_hide, others)) else (BARE,)
+    return () if any(map(can_hide, others)) else (NO_OBSTACLES_MESSAGE,)
 
 
 def can_hide(corners: Float) -> bool:
@@ -35,7 +35,7 @@ def can_hide(corners: Float) -> bool:
     if not len(corners):
         return False
     x, y, z = np.ptp(corners, axis=0)
-    return bool(z > _LOW and max(x, y) > _SLIM)
+    return bool(z > _MIN_OBSTACLE_HEIGHT and max(x, y) > _MIN_OBSTACLE_WIDTH)
 
 
 def inside_any(points: Float, meshes: Sequence[Mesh]) -> Boolean:

@@ -15,7 +15,7 @@ _FINE_STEPS = 8
 _TILE = 128
 """Columns and rows of the fine grid that are looked at at once."""
 
-MOST_POINTS = 20_000
+MAX_POSITIONS = 20_000
 """More positions than these are a slip of the keyboard: each is cast from at every height with every type."""
 
 
@@ -43,10 +43,10 @@ def spread(area: BaseGeometry, spacing: float) -> Float:
     """
     if area.is_empty:
         return np.empty((0, 2))
-    if area.area / spacing**2 > MOST_POINTS:
+    if area.area / spacing**2 > MAX_POSITIONS:
         raise SeipError(
             f"a candidate spacing of {spacing:g} m would lay about {area.area / spacing**2:,.0f} positions on "
-            f"{area.area:,.0f} m²; choose a wider one (at most {MOST_POINTS:,} positions)"
+            f"{area.area:,.0f} m²; choose a wider one (at most {MAX_POSITIONS:,} positions)"
         )
     step = spacing / _FINE_STEPS
     low_x, low_y, high_x, high_y = area.bounds

@@ -82,7 +82,7 @@ class NamedArea:
 
 @dataclass(frozen=True, eq=False)
 class SceneGeometry:
-    """A scene as the core sees it. All coordinates are local: metres, z up, right-handed.
+    """Geometry of a scene. All coordinates are local: metres, z up, right-handed.
 
     Parameters
     ----------

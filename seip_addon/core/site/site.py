@@ -10,17 +10,17 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from .candidates import Candidates, CandidateSettings, lay_candidates
+from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined
-from .targets import Targets, lay_targets
+from .targets import Targets, generate_targets
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]
 
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """All that visibility and placement need of a place.
+    """A site: targets, candidates and static triangles, all that visibility and placement need.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Site:
 def make_site(
     geometry: SceneGeometry, settings: CandidateSettings, grid_spacing: float = 1.0, reach: float = math.inf
 ) -> Site:
-    """Lay targets and candidates into a scene.
+    """Make the site of a scene: its targets, candidates and static triangles.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def make_site(
         name=geometry.name,
         origin=geometry.origin,
         region=geometry.region,
-        targets=lay_targets(geometry.region, road, grid_spacing, geometry.weighted_regions),
-        candidates=lay_candidates(geometry, settings),
+        targets=generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions),
+        candidates=generate_candidates(geometry, settings),
         triangles=_in_order(everything),
     )
 

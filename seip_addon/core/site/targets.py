@@ -18,7 +18,7 @@ from .scene_geometry import NamedArea
 MAX_TARGETS = 2_000_000
 """A grid beyond this is a slip of the keyboard, not a plan."""
 
-FINEST, WIDEST = 0.01, 1000.0
+MIN_SPACING, MAX_SPACING = 0.01, 1000.0
 """Metres between which a spacing makes sense."""
 
 
@@ -48,7 +48,7 @@ class Targets:
         return len(self.xyz)
 
 
-def lay_targets(
+def generate_targets(
     region: BaseGeometry, road: Float, spacing: float, weighted_regions: Sequence[NamedArea] = ()
 ) -> Targets:
     """Lay a uniform grid over the region and keep the points that lie on the road.
@@ -79,8 +79,8 @@ def lay_targets(
         The spacing is not positive or far too small, the region is empty, or
         no grid point lies on the road inside it.
     """
-    if not FINEST <= spacing <= WIDEST:
-        raise SeipError(f"the grid spacing must be {FINEST:g} to {WIDEST:g} m, not {spacing}")
+    if not MIN_SPACING <= spacing <= MAX_SPACING:
+        raise SeipError(f"the grid spacing must be {MIN_SPACING:g} to {MAX_SPACING:g} m, not {spacing}")
     if region.is_empty:
         raise SeipError("the region of interest is empty: put a mesh over the road into SEIP Region")
     plan = _grid(region, spacing)

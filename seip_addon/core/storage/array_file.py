@@ -21,19 +21,19 @@ from numpy.typing import NDArray
 from ..errors import SeipError
 from .files import digest, whole_file
 
-LARGEST = 1 << 32
+MAX_BYTES = 1 << 32
 """Bytes of all arrays of a file together at most: 4 GiB."""
 
-LARGEST_HEADER = 1 << 27
+MAX_HEADER_BYTES = 1 << 27
 """Bytes of the header, four for each of its characters: 128 MiB."""
 
-LONGEST_TEXT = 256
+MAX_TEXT_LENGTH = 256
 """Characters of an entry of an array of text at most."""
 
-_UNDIGESTED = 1
+_OLD_VERSION = 1
 """The version of files that hold no digest."""
 
-_DEFLATED_AT_MOST = 1032
+_MAX_DEFLATE_RATIO = 1032
 """Bytes that one byte of DEFLATE can stand for (RFC 1951)."""
 
 _NPY = re.compile(
@@ -55,7 +55,7 @@ class ArrayRule:
     Parameters
     ----------
     dtype : str
-        NumPy's name of its type; ``U`` is text of any length up to `LONGEST_TEXT`.
+        NumPy's name of its type; ``U`` is text of any length up to `MAX_TEXT_LENGTH`.
     shape : tuple of int and str
         Length of each axis; a text is a variable that has one value across all arrays of a file.
     least, most : float
@@ -150,13 +150,13 @@ class ArrayFile:
             raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
         except ContentError as error:
             raise SeipError(f"{path} is no {self.what}, or is damaged: {error}; {self.remedy}") from error
-        except _DAMAGE as error:
+        except _READ_ERRORS as error:
             raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
         if not known:
             raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
 
     def _versions(self) -> tuple[int, ...]:
-        return (_UNDIGESTED, self.version) if self.undigested else (self.version,)
+        return (_OLD_VERSION, self.version) if self.undigested else (self.version,)
 
     def _read_arrays(self, archive: zipfile.ZipFile, header: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         members = {f"{name}.npy": name for name in self.arrays}
@@ -166,7 +166,7 @@ class ArrayFile:
         self._check_claims({members[name]: _claim(archive, name) for name in members})
         arrays = {name: _array(archive, member) for member, name in members.items()}
         content = {name: value for name, value in header.items() if name != "digest"}
-        if (header["version"] != _UNDIGESTED or "digest" in header) and header["digest"] != _digest(content, arrays):
+        if (header["version"] != _OLD_VERSION or "digest" in header) and header["digest"] != _digest(content, arrays):
             raise ContentError("its content is not what was written")
         for name, rule in self.arrays.items():
             rule.check(name, arrays[name])
@@ -177,7 +177,7 @@ class ArrayFile:
         lengths: dict[str, int] = {}
         for name, rule in self.arrays.items():
             dtype, shape = claims[name]
-            text = dtype.kind == rule.dtype == "U" and dtype.itemsize <= 4 * LONGEST_TEXT
+            text = dtype.kind == rule.dtype == "U" and dtype.itemsize <= 4 * MAX_TEXT_LENGTH
             if not text and dtype != np.dtype(rule.dtype):
                 raise ContentError(f"{name} is of the type {dtype}")
             if len(shape) != len(rule.shape):
@@ -186,8 +186,8 @@ class ArrayFile:
                 other = wanted if isinstance(wanted, int) else lengths.setdefault(wanted, length)
                 if length != other:
                     raise ContentError(f"{name} has the length {length} in place of {other}")
-        if sum(math.prod(shape) * dtype.itemsize for dtype, shape in claims.values()) > LARGEST:
-            raise ContentError(f"it holds more than {LARGEST >> 30} GiB")
+        if sum(math.prod(shape) * dtype.itemsize for dtype, shape in claims.values()) > MAX_BYTES:
+            raise ContentError(f"it holds more than {MAX_BYTES >> 30} GiB")
 
 
 def _archive(file: BinaryIO) -> zipfile.ZipFile:
@@ -199,7 +199,7 @@ def _archive(file: BinaryIO) -> zipfile.ZipFile:
 
 def _read_header(archive: zipfile.ZipFile) -> dict[str, Any]:
     dtype, shape = _claim(archive, "header.npy")
-    if dtype.kind != "U" or shape != () or dtype.itemsize > LARGEST_HEADER:
+    if dtype.kind != "U" or shape != () or dtype.itemsize > MAX_HEADER_BYTES:
         raise ContentError("it has no header")
     text = str(_array(archive, "header.npy"))
     header = json.loads(text, parse_constant=_refuse_constant)
@@ -220,7 +220,7 @@ def _claim(archive: zipfile.ZipFile, member: str) -> tuple[np.dtype[Any], tuple[
     dtype = np.dtype(begin[1].decode())
     shape = tuple(int(length) for length in begin[2].decode().split(",") if length.strip())
     size = begin.end() + math.prod(shape) * dtype.itemsize
-    if size != info.file_size or size > _DEFLATED_AT_MOST * (info.compress_size + 1):
+    if size != info.file_size or size > _MAX_DEFLATE_RATIO * (info.compress_size + 1):
         raise ContentError(f"{member} claims {size:,} bytes and has none of them")
     return dtype, shape
 
@@ -240,7 +240,7 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ContentError(f"its header holds the number {name}")
 
 
-_DAMAGE = (
+_READ_ERRORS = (
     OSError,
     EOFError,
     ArithmeticError,

@@ -44,7 +44,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(target.parent.resolve())
-        prefix = f"{_TEMPORARY}{os.getpid()}-"
+        prefix = f"{_PREFIX}{os.getpid()}-"
         handle, name = tempfile.mkstemp(prefix=prefix, suffix=target.suffix, dir=target.parent)
     except OSError as error:
         raise _unwritable(target, error) from error
@@ -61,7 +61,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder for results and see that it can be written, before the work rather than after.
+    """Make a folder for results, and raise SeipError where it cannot be written.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def check_folder(folder: Path) -> None:
 
 
 def lock_folder(folder: Path) -> int:
-    """Keep other processes from writing into a folder until this one ends, however it ends.
+    """Lock a folder against other processes until this one ends, however it ends.
 
     Parameters
     ----------
@@ -96,17 +96,17 @@ def lock_folder(folder: Path) -> int:
         Another process holds the lock.
     """
     windows = sys.platform == "win32"  # which opens no folders as files
-    held = os.open(folder / ".seip-lock", os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
+    handle = os.open(folder / ".seip-lock", os.O_RDWR | os.O_CREAT) if windows else os.open(folder, os.O_RDONLY)
     try:
-        _lock(held)
+        _lock(handle)
     except OSError as error:
-        if error.errno not in _LOCKED:  # a file system without locks
-            return held
-        os.close(held)
+        if error.errno not in _LOCK_ERRORS:  # a file system without locks
+            return handle
+        os.close(handle)
         raise SeipError(
             f"another run is writing to {folder}: wait until it has ended, or choose another folder"
         ) from error
-    return held
+    return handle
 
 
 def save_json(path: str | os.PathLike[str], value: object) -> None:
@@ -151,13 +151,13 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     return state.hexdigest()
 
 
-_TEMPORARY = ".seip-"
+_PREFIX = ".seip-"
 """How the names of unfinished files begin; the number of the process that writes them follows."""
 
-_OLD = 86400.0
+_STALE_SECONDS = 86400.0
 """Seconds after which an unfinished file is nobody's, where processes cannot be asked for."""
 
-_LOCKED = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
+_LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 
 if sys.platform == "win32":
     import msvcrt
@@ -176,14 +176,14 @@ def _remove_leftovers(folder: Path) -> None:
     """Remove unfinished files of processes that were killed, once in a process."""
     with os.scandir(folder) as entries:
         for entry in entries:
-            number, dash, _ = entry.name.removeprefix(_TEMPORARY).partition("-")
-            if entry.name.startswith(_TEMPORARY) and dash and number.isdecimal() and _is_nobodys(entry, int(number)):
+            number, dash, _ = entry.name.removeprefix(_PREFIX).partition("-")
+            if entry.name.startswith(_PREFIX) and dash and number.isdecimal() and _is_nobodys(entry, int(number)):
                 Path(entry).unlink(missing_ok=True)
 
 
 def _is_nobodys(entry: os.DirEntry[str], process: int) -> bool:
     if sys.platform == "win32":  # asking for a process there means stopping it
-        return time.time() - entry.stat().st_mtime > _OLD
+        return time.time() - entry.stat().st_mtime > _STALE_SECONDS
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):
@@ -199,10 +199,10 @@ def _umask() -> int:
     return mask
 
 
-_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_SPACE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 def _unwritable(path: Path, error: OSError) -> SeipError:
     reason = error.strerror or str(error)
-    cure = "make room there" if error.errno in _FULL else "choose a folder that you may write to"
+    cure = "make room there" if error.errno in _SPACE_ERRORS else "choose a folder that you may write to"
     return SeipError(f"cannot write {path}: {reason}; {cure}")

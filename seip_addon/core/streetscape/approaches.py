@@ -15,11 +15,11 @@ from ..arrays import Float
 from ..opendrive import LaneSurface
 from .road_surface import by_road, cut_along, in_groups
 
-JOINT, LEAST_JOINT = 0.3, 0.5
+JOINT_GAP, MIN_JOINT = 0.3, 0.5
 """Ends of roads within so many metres, along so many metres of their width, lead into each other."""
-STEP = 1.0
+MIN_HEIGHT_STEP = 1.0
 """Metres of height between ends that do not."""
-STRAIGHT_ON = math.radians(35.0)
+MAX_STRAIGHT_TURN = math.radians(35.0)
 """An approach goes on through other junctions on lanes that turn by less than this."""
 
 Key = tuple[str, int]
@@ -84,7 +84,7 @@ def _street(lanes: Sequence[LaneSurface]) -> _ApproachRoad:
     first = _end([(lane, 0) for lane in lanes if lane.s[0] == start])
     last = _end([(lane, -1) for lane in lanes if lane.s[-1] == stop])
     turn = math.acos(float(np.clip(first.along @ last.along, -1.0, 1.0)))
-    return _ApproachRoad(start, stop, (first, last), lanes[0].junction_id is None or turn < STRAIGHT_ON)
+    return _ApproachRoad(start, stop, (first, last), lanes[0].junction_id is None or turn < MAX_STRAIGHT_TURN)
 
 
 def _end(rows: Sequence[tuple[LaneSurface, int]]) -> _End:
@@ -102,9 +102,9 @@ def _joints(streets: Mapping[str, _ApproachRoad]) -> dict[Key, list[Key]]:
     ends = [streets[road].ends[which] for road, which in keys]
     lines = [end.across for end in ends]
     joints: dict[Key, list[Key]] = {key: [] for key in keys}
-    for a, b in shapely.STRtree(lines).query(lines, predicate="dwithin", distance=JOINT).T.tolist():
-        level = abs(ends[a].height - ends[b].height) < STEP
-        if a != b and level and lines[a].buffer(JOINT, cap_style="flat").intersection(lines[b]).length > LEAST_JOINT:
+    for a, b in shapely.STRtree(lines).query(lines, predicate="dwithin", distance=JOINT_GAP).T.tolist():
+        level = abs(ends[a].height - ends[b].height) < MIN_HEIGHT_STEP
+        if a != b and level and lines[a].buffer(JOINT_GAP, cap_style="flat").intersection(lines[b]).length > MIN_JOINT:
             joints[keys[a]].append(keys[b])
     return joints
 

@@ -24,16 +24,16 @@ from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, rea
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
 
-LARGEST = 100_000.0
+MAX_SIZE = 100_000.0
 """Metres (or degrees, or a weight) that nothing described may exceed."""
 
-HIGHEST = 1_000.0
+MAX_HEIGHT = 1_000.0
 """Metres that nothing described is high."""
 
-LARGEST_RADIUS = 5_000.0
+MAX_RADIUS = 5_000.0
 """Metres from the middle of the place to the end of its region at most."""
 
-LONGEST_ROW = 10_000
+MAX_ROW_LENGTH = 10_000
 """Trees or lights of a row beyond which its spacing is a slip."""
 
 
@@ -224,8 +224,8 @@ def describe_place(
         along = None if junction is None else described.approaches
         described = replace(described, near=near, junction=junction, region=None, approaches=along)
     for name, length in (("radius", radius), ("length of the approaches", approaches)):
-        if length is not None and not 0 < length <= LARGEST_RADIUS:
-            raise SeipError(f"the {name} must be above 0 m and at most {LARGEST_RADIUS:g} m, not {length:g}")
+        if length is not None and not 0 < length <= MAX_RADIUS:
+            raise SeipError(f"the {name} must be above 0 m and at most {MAX_RADIUS:g} m, not {length:g}")
     if radius is not None or approaches is not None:
         described = replace(described, radius=radius, approaches=approaches, region=None)
     if described.approaches is not None and described.junction is None:
@@ -289,8 +289,8 @@ def _outline(value: object) -> Polygon:
     if not polygon.is_valid or polygon.area == 0.0:
         reason = explain_validity(polygon) if not polygon.is_valid else "no area"
         raise ValueError(f"must be the outline of an area that does not cross itself ({reason})")
-    if polygon.length > LARGEST:
-        raise ValueError(f"must be an outline of at most {LARGEST:g} m, not {polygon.length:.3g} m")
+    if polygon.length > MAX_SIZE:
+        raise ValueError(f"must be an outline of at most {MAX_SIZE:g} m, not {polygon.length:.3g} m")
     return polygon
 
 
@@ -298,8 +298,8 @@ def _region(value: object) -> MultiPolygon:
     rings = value if isinstance(value, list) and value and not _is_point(value[0]) else [value]
     region = MultiPolygon([_outline(ring) for ring in rings])
     low_x, low_y, high_x, high_y = region.bounds
-    if max(high_x - low_x, high_y - low_y) > 2 * LARGEST_RADIUS:
-        raise ValueError(f"must be at most {2 * LARGEST_RADIUS:g} m across")
+    if max(high_x - low_x, high_y - low_y) > 2 * MAX_RADIUS:
+        raise ValueError(f"must be at most {2 * MAX_RADIUS:g} m across")
     return region
 
 
@@ -328,20 +328,20 @@ def _positions(row: Mapping[str, Any]) -> Float:
         raise ValueError("give either position = [x, y] or a row with from, to and spacing")
     ends, spacing = np.array([row["from"], row["to"]]), row["spacing"]
     length = float(np.hypot(*(ends[1] - ends[0])))
-    if length / spacing > LONGEST_ROW:
-        raise ValueError(f"this row has {length / spacing:.3g} places; make it {LONGEST_ROW:,} at most")
+    if length / spacing > MAX_ROW_LENGTH:
+        raise ValueError(f"this row has {length / spacing:.3g} places; make it {MAX_ROW_LENGTH:,} at most")
     gaps = int(length / spacing + 1e-9)  # a row ends on its last whole step in spite of rounding
     along = np.arange(gaps + 1) * (spacing / length if length > 0 else 0.0)
     positions: Float = ends[0] + along[:, None] * (ends[1] - ends[0])
     return positions
 
 
-_SIZE = number(above=0.0, most=LARGEST)
-_HEIGHT = number(above=0.0, most=HIGHEST)
-_EXTENT = Key(number(above=0.0, most=LARGEST_RADIUS), None)
+_SIZE = number(above=0.0, most=MAX_SIZE)
+_HEIGHT = number(above=0.0, most=MAX_HEIGHT)
+_EXTENT = Key(number(above=0.0, most=MAX_RADIUS), None)
 _ROW = {"position": Key(_point, None), "from": Key(_point, None), "to": Key(_point, None), "spacing": Key(_SIZE, None)}
-_POLE = _ROW | {"heading": Key(number(most=LARGEST), None)}
-_ARM = number(least=0.0, most=LARGEST)
+_POLE = _ROW | {"heading": Key(number(most=MAX_SIZE), None)}
+_ARM = number(least=0.0, most=MAX_SIZE)
 _AREA = {"name": Key(text, "Area"), "polygon": Key(_outline)}
 
 _PLACE = {
@@ -366,7 +366,10 @@ _LISTED: Mapping[str, tuple[Callable[..., Any], Mapping[str, Key]]] = {
             "junction": Key(text, None),
         },
     ),
-    "building": (Building, {"outline": Key(_outline), "height": Key(_HEIGHT), "base": Key(number(most=HIGHEST), 0.0)}),
+    "building": (
+        Building,
+        {"outline": Key(_outline), "height": Key(_HEIGHT), "base": Key(number(most=MAX_HEIGHT), 0.0)},
+    ),
     "tree": (_trees, _ROW | {"height": Key(_HEIGHT, 8.0), "crown_diameter": Key(_SIZE, None)}),
     "wall": (Wall, {"line": Key(_line), "height": Key(_HEIGHT, 2.0), "thickness": Key(_SIZE, 0.25)}),
     "street_light": (_poles, _POLE | {"height": Key(_HEIGHT, 8.0), "arm": Key(_ARM, 1.5)}),

@@ -14,11 +14,11 @@ from ..opendrive import LaneSurface, RoadMap
 from ..opendrive.geo_reference import middle_of_reference, projection
 from .description import SiteDescription
 
-AROUND = 1000.0
+MAX_ROAD_DISTANCE = 1000.0
 """Metres beyond the roads of a map within which a place may be meant."""
-APART = 10.0
+SAME_PLACE = 10.0
 """A pair of numbers that is the same place in degrees and in metres, but for so much (metres), is meant in metres."""
-NEAR_ORIGIN = 0.05
+MAX_ORIGIN_OFFSET = 0.05
 """Degrees from the origin of a map's reference within which its roads lie."""
 
 
@@ -64,12 +64,12 @@ def _converted(
     if to_metres is None or road_map.header_offset[3]:
         return None
     points = np.concatenate([np.concatenate([lane.left, lane.right])[:, :2] for lane in surfaces])
-    low, high = points.min(axis=0) - AROUND, points.max(axis=0) + AROUND
+    low, high = points.min(axis=0) - MAX_ROAD_DISTANCE, points.max(axis=0) + MAX_ROAD_DISTANCE
     for latitude, longitude in (near, near[::-1]):
         if abs(latitude) < 90.0:
             projected = np.array(to_metres(math.radians(latitude), math.radians(longitude)))
             for place in (projected - road_map.header_offset[:2], projected):
-                if _is_within(place, low, high) and np.hypot(*(place - near)) > APART:
+                if _is_within(place, low, high) and np.hypot(*(place - near)) > SAME_PLACE:
                     return float(place[0]), float(place[1])
     return None
 
@@ -83,7 +83,7 @@ def _refuse_near_origin(near: tuple[float, float], road_map: RoadMap) -> None:
     whole = all(float(value).is_integer() for value in near)
     if origin is None or whole or projection(road_map.geo_reference) is not None:
         return
-    if any(math.dist(pair, origin) < NEAR_ORIGIN for pair in (near, near[::-1])):
+    if any(math.dist(pair, origin) < MAX_ORIGIN_OFFSET for pair in (near, near[::-1])):
         raise SeipError(
             f"{near[0]:g}, {near[1]:g} look like latitude and longitude, but map {road_map.name!r} counts in metres "
             "and names no projection to convert them with: give map coordinates, or a junction"

@@ -1,4 +1,4 @@
-"""Grade separation: the roads on the studied level of a place, from how roads connect and from their heights."""
+"""Grade separation: the roads on the studied level of a place, from their connections and heights."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..opendrive import LaneSurface
-from .road_surface import SEAM, by_road, group, is_near
+from .road_surface import MAX_SEAM, by_road, group, is_near
 from .terrain import Terrain
 
-JOINED = 1.0
+MAX_JOINT_STEP = 1.0
 """Roads that meet within so many metres of height lead into each other."""
-APART = 2.0
+MIN_LEVEL_HEIGHT = 2.0
 """A road that lies more than this (metres) above another one crosses it on a level of its own."""
-LEAST_OVERLAP = 1.0
+MIN_OVERLAP = 1.0
 """Square metres in plan: roads that overlap less do not cross."""
 
 
@@ -162,14 +162,14 @@ def _crossings(roads: Mapping[str, _RoadArea]) -> tuple[Crossing, ...]:
     found = []
     for one, other in _pairs(roads, 0.0):
         first, second = roads[one], roads[other]
-        if max(first.heights[1] - second.heights[0], second.heights[1] - first.heights[0]) < APART:
+        if max(first.heights[1] - second.heights[0], second.heights[1] - first.heights[0]) < MIN_LEVEL_HEIGHT:
             continue
         for part in shapely.get_parts(first.outline.intersection(second.outline)):
-            if part.area < LEAST_OVERLAP:
+            if part.area < MIN_OVERLAP:
                 continue
             points = _points_in(part)
             rise = first.terrain.height(points) - second.terrain.height(points)
-            if np.abs(rise).min() > APART:
+            if np.abs(rise).min() > MIN_LEVEL_HEIGHT:
                 above, below = (one, other) if rise[0] > 0 else (other, one)
                 x, y = part.centroid.coords[0]
                 found.append(Crossing(above, below, float(np.abs(rise).min()), (x, y)))
@@ -179,12 +179,12 @@ def _crossings(roads: Mapping[str, _RoadArea]) -> tuple[Crossing, ...]:
 def _joined(roads: Mapping[str, _RoadArea]) -> dict[str, set[str]]:
     """Return for each road those that meet it in plan and in height."""
     joined: dict[str, set[str]] = {road: set() for road in roads}
-    for one, other in _pairs(roads, SEAM):
+    for one, other in _pairs(roads, MAX_SEAM):
         first, second = roads[one], roads[other]
-        common = first.outline.buffer(SEAM).intersection(second.outline.buffer(SEAM))
+        common = first.outline.buffer(MAX_SEAM).intersection(second.outline.buffer(MAX_SEAM))
         points = np.concatenate([np.empty((0, 2)), *map(_points_in, shapely.get_parts(common))])
         rise = np.abs(first.terrain.height(points) - second.terrain.height(points))
-        if rise.min(initial=math.inf) < JOINED:
+        if rise.min(initial=math.inf) < MAX_JOINT_STEP:
             joined[one].add(other)
             joined[other].add(one)
     return joined
@@ -224,7 +224,7 @@ def _next_to(road: str, roads: Mapping[str, _RoadArea], reached: Iterable[str]) 
     for other in sorted(reached, key=lambda name: (float(own.outline.distance(roads[name].outline)), name)):
         ends = shapely.get_coordinates(shapely.shortest_line(own.outline, roads[other].outline))
         rise = own.terrain.height(ends[:1]) - roads[other].terrain.height(ends[1:])
-        if abs(float(rise[0])) < APART:
+        if abs(float(rise[0])) < MIN_LEVEL_HEIGHT:
             return other
     return ""
 

@@ -14,23 +14,23 @@ from ..arrays import Float
 from ..opendrive import Outline, PlacedObject
 from ..site.scene_geometry import FROM_MAP
 from . import street_furniture
-from .object_kinds import SIGN_WORDS, THIN, VAGUE, Kind, Post, height_of, kind_of, post_of, size_of
+from .object_kinds import MAX_POST_THICKNESS, SIGN_WORDS, VAGUE_TYPES, Kind, Post, height_of, kind_of, post_of, size_of
 from .parts import Part, Role
 from .street_furniture import Solid
 
-LEAST_HEIGHT = 0.2
+MIN_HEIGHT = 0.2
 """Outlines lower than this (metres) hide nothing that matters."""
 POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
 """Posts from this height and thickness up (metres) can carry a sensor: a traffic sign's of 5 to 6 cm cannot."""
 
 TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
-LEAST_CROWN_SHARE = 0.15
+MIN_CROWN_SHARE = 0.15
 """A tree that is more slender than this is given by its trunk: its crown follows from its height."""
 LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
 POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
 """Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
 
-LARGEST_FACADE = 200_000.0
+MAX_FACADE_AREA = 200_000.0
 """Square metres of walls beyond which a building has no windows: there would be too many."""
 FACADES = ("facade brick", "facade plaster", "facade sand", "facade grey")
 
@@ -55,7 +55,7 @@ def building_parts(name: str, base: Float, height: Float, number: int) -> tuple[
     block = Part(name, walls, (Role.OCCLUDERS,))
     level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1
     facade = float(np.hypot(*np.diff(base[:, :2], axis=0, append=base[:1, :2]).T).sum()) * float(height[0])
-    if not level or height[0] < street_furniture.STOREY or facade > LARGEST_FACADE:
+    if not level or height[0] < street_furniture.STOREY_HEIGHT or facade > MAX_FACADE_AREA:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
     return (block, Part(f"{name} windows", panes, (Role.DRESSING,))) if panes.faces else (block,)
@@ -82,7 +82,7 @@ def local_objects(objects: Iterable[PlacedObject], origin: Float) -> tuple[Place
 def is_trunk(placed: PlacedObject) -> bool:
     """Return whether what a map gives as the size of a tree can be no more than its trunk."""
     height, size = height_of(placed) or TREE_HEIGHT, size_of(placed)
-    return kind_of(placed) is Kind.TREE and 0 < size < LEAST_CROWN_SHARE * height
+    return kind_of(placed) is Kind.TREE and 0 < size < MIN_CROWN_SHARE * height
 
 
 def can_carry(post: Post) -> bool:
@@ -112,11 +112,11 @@ def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tup
         crown = size if size and not is_trunk(placed) else CROWN_SHARE * height
         return (tree_part(name, _middle(placed), height, crown, number),)
     post = post_of(placed)
-    if post is not None and (size <= THIN or not placed.outlines):
+    if post is not None and (size <= MAX_POST_THICKNESS or not placed.outlines):
         return _post(name, placed, post, carriageway)
     if placed.outlines:
         return tuple(part for outline in placed.outlines for part in _outlined(placed, outline, name, number))
-    return _boxed(placed, name, number) if size > 0 and placed.height >= LEAST_HEIGHT else ()
+    return _boxed(placed, name, number) if size > 0 and placed.height >= MIN_HEIGHT else ()
 
 
 def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
@@ -132,7 +132,7 @@ def _boxed(placed: PlacedObject, name: str, number: int) -> tuple[Part, ...]:
 
 
 def _outlined(placed: PlacedObject, outline: Outline, name: str, number: int) -> tuple[Part, ...]:
-    if outline.height.max() < LEAST_HEIGHT:
+    if outline.height.max() < MIN_HEIGHT:
         return ()
     height = np.maximum(outline.height, 0.0)
     if outline.closed and len(outline.base) >= 3:
@@ -148,7 +148,7 @@ def _block(placed: PlacedObject, name: str, number: int, base: Float, height: Fl
 
 
 def _post(name: str, placed: PlacedObject, post: Post, carriageway: BaseGeometry) -> tuple[Part, ...]:
-    if post.height == 0 and not post.is_lamp and placed.kind in VAGUE:
+    if post.height == 0 and not post.is_lamp and placed.kind in VAGUE_TYPES:
         return ()  # nothing but a name
     height = round(post.height or LIGHT_HEIGHT, 2)
     lit = post.is_lamp or "light" in name.lower()

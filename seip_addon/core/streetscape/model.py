@@ -21,12 +21,12 @@ from ..opendrive import (
     placed_signals,
 )
 from ..progress import Progress
-from ..site.obstruction import BARE, can_hide
+from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.scene_geometry import ASSUMED, DESCRIBED
 from . import road_surface, street_furniture
 from .description import Poles, SiteDescription
 from .geographic_position import in_metres
-from .levels import APART, Levels
+from .levels import MIN_LEVEL_HEIGHT, Levels
 from .map_furniture import (
     CROWN_SHARE,
     arm_heading,
@@ -38,7 +38,7 @@ from .map_furniture import (
     tree_part,
 )
 from .parts import Part, Role
-from .place import MARGIN, Place, shifted
+from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
 from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
@@ -51,12 +51,12 @@ CANDIDATE_MARGIN = 15.0
 VERGE_STRIP = (0.8, 2.3)
 """Where new posts may stand beside a road without pavements: metres from the carriageway."""
 VERGE_BELOW = 0.03
-GARDEN = 5.0
+GROUND_MARGIN = 5.0
 """How far the ground goes on around what stands outside the extent (metres)."""
-FARTHEST_GARDEN = 300.0
+MAX_GROUND_DISTANCE = 300.0
 """How far from the extent (metres) it goes on at most: a wall may run on along the whole map."""
 VERGE_SPACING = 12.0
-VEIL_SPACING = 4.0
+OVERLAY_SPACING = 4.0
 """As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
@@ -111,7 +111,7 @@ class SiteModel:
 
 @dataclass(frozen=True, eq=False)
 class _Surroundings:
-    """What everything else of a site stands on and leans against, in local axes."""
+    """Ground, roadside and region that the parts of a site are placed by, in local axes."""
 
     origin: Float
     lanes: tuple[LaneSurface, ...]
@@ -160,12 +160,12 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     around = shifted(street.extent, origin)
     placed = local_objects(placed_objects(road_map, area=around), origin)
     away = levels.other_roads()
-    hung = [
+    local_signals = [
         replace(one, position=one.position - origin)
         for one in placed_signals(road_map, area=around)
         if one.road_id not in away
     ]
-    others, lights = split_posts(placed, hung, street.roadside)
+    others, lights = split_posts(placed, local_signals, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
     things = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
     other_levels, below = _other_level_parts(levels.others, street)
@@ -196,7 +196,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
         notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
-        warnings=() if any(_hides(part) for part in (*furniture, *other_levels)) else (BARE,),
+        warnings=() if any(_hides(part) for part in (*furniture, *other_levels)) else (NO_OBSTACLES_MESSAGE,),
     )
 
 
@@ -205,7 +205,7 @@ def _hides(part: Part) -> bool:
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
-    """Say what was made up of furniture that the map does not describe."""
+    """Return notes on posts and tree crowns that are assumed, since the map does not give them."""
     assumed = sum(part.source == ASSUMED for part in signals)
     if assumed:
         posts = f"{assumed} posts of traffic lights are" if assumed > 1 else "1 post of traffic lights is"
@@ -245,13 +245,13 @@ def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> 
         Part("Roads above", _solid(triangles[above], "asphalt"), (Role.OCCLUDERS,)),
         Part("Roads below", _solid(triangles[~above], "asphalt"), (Role.GROUND,)),
     ]
-    return parts, outline(triangles[~above], road_surface.GRID)
+    return parts, outline(triangles[~above], road_surface.SNAP_GRID)
 
 
 def _on_level(part: Part, street: _Surroundings) -> Part:
     """Return a part of the map; a pole that stands on another level carries no sensor."""
     x, y, z = part.foot
-    if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > APART:
+    if Role.POLES in part.roles and abs(z - float(street.terrain.height(np.array([[x, y]]))[0])) > MIN_LEVEL_HEIGHT:
         return replace(part, roles=(Role.OCCLUDERS,), source="")
     return part
 
@@ -264,7 +264,7 @@ def _origin(place: Place) -> Float:
 
 
 def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
-    extent = region.convex_hull.buffer(MARGIN, quad_segs=16)
+    extent = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
     lanes = road_surface.local_strips(surfaces, origin, extent)
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
@@ -308,7 +308,7 @@ def _pavement_parts(street: _Surroundings, below: BaseGeometry) -> tuple[list[Pa
             f"the pavements are closed round the corners of junctions, where the map leaves gaps: {added:,.0f} m² are "
             f"added to its {had:,.0f} m²"
         )
-    bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.GRID))
+    bare = road_surface.bare_sides(street.roadside, shapely.union_all(plan, grid_size=road_surface.SNAP_GRID))
     verge = _verge_strip(street, bare, below)
     if verge.solid.faces:
         parts.append(verge)
@@ -333,10 +333,10 @@ def _verge_part(street: _Surroundings, furniture: Sequence[Part], below: BaseGeo
     """Return the ground beside all lanes and under all furniture, a little below the lanes and under their seams."""
     corners = [part.solid.vertices[:, :2] + part.foot[:2] for part in furniture]
     built_up = shapely.convex_hull(shapely.multipoints(np.concatenate([np.empty((0, 2)), *corners])))
-    gardens = built_up.buffer(GARDEN).intersection(street.extent.buffer(FARTHEST_GARDEN))
+    gardens = built_up.buffer(GROUND_MARGIN).intersection(street.extent.buffer(MAX_GROUND_DISTANCE))
     ground = street.extent if built_up.is_empty else street.extent.union(gardens).convex_hull
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
-    lanes = covered.buffer(-road_surface.SEAM, join_style="mitre").union(below)
+    lanes = covered.buffer(-road_surface.MAX_SEAM, join_style="mitre").union(below)
     beside = road_surface.without_crumbs(without(ground, lanes))
     triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
@@ -425,9 +425,9 @@ def _on_ground(plan: Float, street: _Surroundings) -> Float:
 def _area_part(
     name: str, area: BaseGeometry, role: Role, street: _Surroundings, *, weight: float | None = None
 ) -> Part:
-    """Return an area in plan as a veil over the ground."""
+    """Return an area in plan as an overlay on the ground."""
     above, material = AREA_OVERLAYS[role]
-    triangles = street.terrain.drape(area, spacing=VEIL_SPACING, above=above)
+    triangles = street.terrain.drape(area, spacing=OVERLAY_SPACING, above=above)
     return Part(name, _solid(triangles, material), (role,), weight=weight)
 
 

@@ -1,4 +1,4 @@
-"""What an object of a map is: by its type where it has one, else by its name and its shape."""
+"""Classification of a map's objects: by type where there is one, else by name and shape."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..opendrive import PlacedObject
 
 
 class Kind(Enum):
-    """What is built of an object."""
+    """Kinds of objects that are modelled."""
 
     FLAT = "flat"
     """Paint and surfaces: nothing stands there."""
@@ -27,7 +27,7 @@ class Kind(Enum):
 
 
 FLAT_KINDS = {"crosswalk", "parkingspace", "roadmark", "roadsurface", "patch"}
-OF_TYPE = {
+KIND_OF_TYPE = {
     "tree": Kind.TREE,
     "vegetation": Kind.PLANTS,
     "pole": Kind.POST,
@@ -37,10 +37,10 @@ OF_TYPE = {
 }
 UNTYPED = {"-1", "none", ""}
 """Types that say nothing: name and shape decide."""
-VAGUE = UNTYPED | {"obstacle"}
+VAGUE_TYPES = UNTYPED | {"obstacle"}
 """Types of which name and shape say more."""
 
-OF_WORD = {
+WORDS_OF_KIND = {
     Kind.LAMP: {"lamp", "lamps", "streetlamp", "streetlight", "lantern", "luminaire", "laterne", "leuchte"},
     Kind.TREE: {
         *("tree", "trees", "baum", "oak", "pine", "palm", "birch", "maple", "linden", "poplar", "spruce", "fir"),
@@ -54,7 +54,7 @@ SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel"
 """Words in the name of a post that say that it carries traffic lights."""
 SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
 
-TALL, THIN, SLENDER = 2.0, 0.6, 6.0
+MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0
 """A post is at least so high, at most so thick (metres), and at least so many times as high as thick."""
 
 
@@ -94,17 +94,17 @@ def kind_of(placed: PlacedObject) -> Kind:
     words = words_of(placed.name)
     if "lamp" in placed.name.lower() or {"street", "light"} <= words:
         return Kind.LAMP
-    if placed.kind in OF_TYPE:
-        return OF_TYPE[placed.kind]
+    if placed.kind in KIND_OF_TYPE:
+        return KIND_OF_TYPE[placed.kind]
     if "building" in placed.name.lower():
         return Kind.BUILDING
-    return _kind_by_looks(placed, words) if placed.kind in VAGUE else Kind.OTHER
+    return _kind_by_looks(placed, words) if placed.kind in VAGUE_TYPES else Kind.OTHER
 
 
 def _kind_by_looks(placed: PlacedObject, words: frozenset[str]) -> Kind:
     """Return what an object is by the words of its name and its shape."""
-    named = next((kind for kind, of_kind in OF_WORD.items() if words & of_kind), None)
-    if named is Kind.POST and size_of(placed) > THIN:
+    named = next((kind for kind, of_kind in WORDS_OF_KIND.items() if words & of_kind), None)
+    if named is Kind.POST and size_of(placed) > MAX_POST_THICKNESS:
         return Kind.OTHER
     return named or (Kind.POST if _is_slender(placed) else Kind.OTHER)
 
@@ -139,4 +139,4 @@ def _thickness(placed: PlacedObject) -> float:
 
 def _is_slender(placed: PlacedObject) -> bool:
     height, size = height_of(placed), size_of(placed)
-    return height >= TALL and 0 < size <= THIN and height >= SLENDER * size
+    return height >= MIN_POST_HEIGHT and 0 < size <= MAX_POST_THICKNESS and height >= MIN_POST_SLENDERNESS * size

@@ -9,7 +9,7 @@ from .street_furniture import Solid
 
 
 class Role(Enum):
-    """What a part means to the placement: its collection in the scene contract."""
+    """Role of a part in the placement: its collection in the scene contract."""
 
     REGION = "region of interest"
     ROADS = "roads"

@@ -20,9 +20,9 @@ from .description import DEFAULT_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
 from .levels import Levels, split_levels
 
-MARGIN = 40.0
+SCENE_MARGIN = 40.0
 """How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
-NEAR_CROSSING = 10.0
+MAX_ROAD_DISTANCE = 10.0
 """Roads this near to the middle of the place (metres) may each be the one that is meant."""
 
 
@@ -67,13 +67,13 @@ class Place:
 
     def levels(self) -> Levels:
         """Return the lanes on the level of the place, and those that cross above or below."""
-        around = self.within.convex_hull.buffer(MARGIN, quad_segs=16)
+        around = self.within.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
         if self.description.near is None and self.description.junction is not None:
             anchors = {lane.road_id for lane in self.surfaces if lane.junction_id == self._junction.id}
         else:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             away = shapely.distance([lane.polygon for lane in driving], shapely.Point(self.centre))
-            least = max(away.min(initial=np.inf), NEAR_CROSSING)
+            least = max(away.min(initial=np.inf), MAX_ROAD_DISTANCE)
             anchors = {lane.road_id for lane, distance in zip(driving, away, strict=True) if distance <= least}
         return split_levels(self.surfaces, around, anchors, self.description.level)
 

@@ -32,36 +32,36 @@ GROUPS = {
 """Group of each OpenDRIVE lane type (ASAM OpenDRIVE 1.8, table of e_laneType); ``none`` has no surface."""
 
 CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
-LONGEST_STEP = 10.0
+MAX_STEP = 10.0
 CORNER_NOTCH = 3.0
 """Notches up to twice this (metres) at the corners of a junction are pavement."""
-LONGEST_CORNER, WIDEST_ENDS = 40.0, 20.0
+MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
 MARKING_ABOVE = 0.012
-DASH, GAP = 3.0, 6.0
+DASH_LENGTH, DASH_GAP = 3.0, 6.0
 STOP_LINE_WIDTH = 0.4
 STOP_LINE_SETBACK = 1.0
-GRID = 1e-4
+SNAP_GRID = 1e-4
 """Grid (metres) that plans snap to when they are joined."""
-NARROW = 1.0
+MIN_MARKED_WIDTH = 1.0
 """Lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them."""
-SEAM = 0.05
+MAX_SEAM = 0.05
 """Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
 
-ISLAND = 400.0
+MAX_ISLAND_AREA = 400.0
 """Holes of the carriageway smaller than this (m²) are islands, on which no post is assumed."""
-MEDIAN = 12.0
+MAX_MEDIAN_WIDTH = 12.0
 """Holes narrower than this (metres) are medians: likewise."""
-OPEN_MEDIAN = 6.0
+MAX_OPEN_MEDIAN_WIDTH = 6.0
 """Gaps between carriageways narrower than this (metres) are medians though no junction closes them."""
 
-BESIDE = 6.0
+MAX_PAVEMENT_DISTANCE = 6.0
 """A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
-SIDE_STEP, LEAST_SIDE = 2.0, 10.0
+SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0
 """Sides of roads are looked at in steps (metres), and count as bare where they are so from this length on."""
 
 
@@ -86,7 +86,7 @@ class Roadside:
 
     def sides(self) -> BaseGeometry:
         """Return the edges of the filled carriageway, as lines, without its mouths."""
-        edges = without(shapely.boundary(self.filled), self.mouths.buffer(2 * SEAM))
+        edges = without(shapely.boundary(self.filled), self.mouths.buffer(2 * MAX_SEAM))
         return shapely.line_merge(edges) if edges.geom_type == "MultiLineString" else edges
 
 
@@ -97,13 +97,13 @@ def roadside(surfaces: Sequence[LaneSurface]) -> Roadside:
     junctions = sorted({lane.junction_id for lane in paved if lane.junction_id is not None})
     inside = [lane_outline([lane for lane in paved if lane.junction_id == junction]) for junction in junctions]
     whole = shapely.union_all([carriageway, *map(_without_holes, inside)])
-    medians = without(closed(whole, OPEN_MEDIAN / 2), whole)
-    filled = _without_holes(closed(whole.union(medians), SEAM), least=ISLAND, narrow=MEDIAN)
+    medians = without(closed(whole, MAX_OPEN_MEDIAN_WIDTH / 2), whole)
+    filled = _without_holes(closed(whole.union(medians), MAX_SEAM), least=MAX_ISLAND_AREA, narrow=MAX_MEDIAN_WIDTH)
     ends = [lane.left[[row], :2].tolist() + lane.right[[row], :2].tolist() for lane in paved for row in (0, -1)]
     across = shapely.linestrings(np.array(ends).reshape(-1, 2, 2))
-    at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * SEAM)))
+    at_edge = shapely.length(shapely.intersection(across, shapely.boundary(filled).buffer(2 * MAX_SEAM)))
     length = shapely.length(across)
-    return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * SEAM) & (at_edge > length / 2)]))
+    return Roadside(carriageway, filled, shapely.union_all(across[(length > 2 * MAX_SEAM) & (at_edge > length / 2)]))
 
 
 def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
@@ -115,19 +115,19 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     start, stop = (np.concatenate([line[cut] for line in lines]) for cut in (slice(-1), slice(1, None)))
     along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
     aside = np.column_stack([-along[:, 1], along[:, 0]])
-    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * SEAM * aside)
-    outwards = BESIDE * np.where(inner[:, None], -aside, aside)
+    inner = shapely.contains_xy(roadside.filled, (start + stop) / 2 + 2 * MAX_SEAM * aside)
+    outwards = MAX_PAVEMENT_DISTANCE * np.where(inner[:, None], -aside, aside)
     beside = shapely.polygons(np.stack([start, stop, stop + outwards, start + outwards], axis=1))
     shapely.prepare(pavement)
     is_bare = ~shapely.intersects(pavement, beside)
     bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
-    return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= LEAST_SIDE])
+    return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
 
 
 def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
     """Return whether a notch lies round a corner between the ends of pavements, and along neither for long."""
-    along = notch.buffer(2 * SEAM)
-    return bool(kerb.intersection(along).length <= LONGEST_CORNER and walked.intersection(along).length <= WIDEST_ENDS)
+    along = notch.buffer(2 * MAX_SEAM)
+    return bool(kerb.intersection(along).length <= MAX_CORNER and walked.intersection(along).length <= MAX_ENDS)
 
 
 def _without_holes(area: BaseGeometry, *, least: float = np.inf, narrow: float = 0.0) -> BaseGeometry:
@@ -198,7 +198,7 @@ def is_near(surface: LaneSurface, area: BaseGeometry) -> bool:
 
 def lane_outline(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
     """Return the area in plan that lanes cover, with seams and crumbs closed."""
-    return without_crumbs(closed(_plan(surfaces), SEAM).simplify(0.01))
+    return without_crumbs(closed(_plan(surfaces), MAX_SEAM).simplify(0.01))
 
 
 def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
@@ -225,7 +225,7 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
             area = without_crumbs(without(area, _plan([lane for lane in driving if lane.junction_id == junction])))
         terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
         pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
-    beyond = shapely.box(*extent.buffer(10 * LONGEST_STEP).bounds).difference(extent)
+    beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
     return cut(np.concatenate(pieces), beyond)
 
 
@@ -233,7 +233,7 @@ def kerb_faces(pavement: Float) -> Float:
     """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3)."""
     if len(pavement) == 0:
         return pavement
-    plan = without_crumbs(closed(outline(pavement, GRID), SEAM).simplify(0.01))
+    plan = without_crumbs(closed(outline(pavement, SNAP_GRID), MAX_SEAM).simplify(0.01))
     terrain = Terrain(pavement)
     parts = map(orient, shapely.get_parts(plan))
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
@@ -251,21 +251,21 @@ def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriagew
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
         return np.empty((0, 3, 3))
-    walked = outline(pavement, GRID)
+    walked = outline(pavement, SNAP_GRID)
     own = _plan([lane for lane in in_groups(surfaces, ["sidewalk"]) if lane.junction_id is not None])
     kerb = shapely.boundary(carriageway)
-    street = closed(_plan(surfaces).union(walked, grid_size=GRID), SEAM)
+    street = closed(_plan(surfaces).union(walked, grid_size=SNAP_GRID), MAX_SEAM)
     notches = without(closed(street, CORNER_NOTCH), street)
     corners = [
         notch
         for notch in shapely.get_parts(notches)
         if notch.area > 1.0
-        and notch.distance(inside) < SEAM
-        and notch.distance(walked) < SEAM
+        and notch.distance(inside) < MAX_SEAM
+        and notch.distance(walked) < MAX_SEAM
         and not notch.distance(own) < CORNER_NOTCH
         and _is_corner(notch, kerb, shapely.boundary(walked))
     ]
-    return Terrain(pavement).drape(shapely.union_all(corners), spacing=LONGEST_STEP)
+    return Terrain(pavement).drape(shapely.union_all(corners), spacing=MAX_STEP)
 
 
 def markings(surfaces: Sequence[LaneSurface]) -> Float:
@@ -336,7 +336,7 @@ def _with_kerbs(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
 
 
 def _plan(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
-    return shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=GRID)
+    return shapely.union_all([shapely.make_valid(surface.polygon) for surface in surfaces], grid_size=SNAP_GRID)
 
 
 def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
@@ -345,7 +345,7 @@ def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
 
 def _densified(surface: LaneSurface) -> LaneSurface:
     steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
-    pieces = np.maximum(1, np.ceil(steps / LONGEST_STEP).astype(int))
+    pieces = np.maximum(1, np.ceil(steps / MAX_STEP).astype(int))
     rows = np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))])
     s = np.interp(rows, np.arange(len(surface.s)), surface.s)
     return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
@@ -382,7 +382,7 @@ def _junctions(surfaces: Sequence[LaneSurface]) -> BaseGeometry:
 
 
 def _is_taper(lane: LaneSurface) -> bool:
-    return bool(np.hypot(*(lane.left - lane.right)[:, :2].T).min() < NARROW)
+    return bool(np.hypot(*(lane.left - lane.right)[:, :2].T).min() < MIN_MARKED_WIDTH)
 
 
 def _line(edge: Float, unpainted: BaseGeometry, *, dashed: bool) -> list[Float]:
@@ -395,8 +395,8 @@ def _line(edge: Float, unpainted: BaseGeometry, *, dashed: bool) -> list[Float]:
 
 def _dashes(path: Float) -> list[Float]:
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    begins = np.arange(0.0, travelled[-1] - DASH, DASH + GAP)
-    ends = np.stack([begins, begins + DASH], axis=1).reshape(-1)
+    begins = np.arange(0.0, travelled[-1] - DASH_LENGTH, DASH_LENGTH + DASH_GAP)
+    ends = np.stack([begins, begins + DASH_LENGTH], axis=1).reshape(-1)
     return list(_interpolated(ends, travelled, path).reshape(-1, 2, 3))
 
 

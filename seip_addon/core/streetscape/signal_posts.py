@@ -14,18 +14,18 @@ from ..opendrive import PlacedObject, PlacedSignal
 from ..site.scene_geometry import ASSUMED, FROM_MAP
 from . import street_furniture
 from .map_furniture import arm_heading, can_carry
-from .object_kinds import OF_WORD, SIGNAL_WORDS, Kind, Post, post_of, words_of
+from .object_kinds import SIGNAL_WORDS, WORDS_OF_KIND, Kind, Post, post_of, words_of
 from .parts import Part, Role
 from .road_surface import Roadside
 from .terrain import Terrain
 
-HEIGHT = 6.0
+DEFAULT_HEIGHT = 6.0
 """Of a post (metres) whose height the map does not give."""
-MAST_ARM, LONGEST_ARM = 4.5, 12.0
-LEAST_HEIGHT_OF_ARM = 4.5
+MAST_ARM, MAX_ARM = 4.5, 12.0
+MIN_HEIGHT_FOR_ARM = 4.5
 """A lower post (metres) has no arm over traffic."""
 KERB_CLEARANCE = 0.6
-SAME_POLE = 3.0
+SAME_POLE_DISTANCE = 3.0
 """Signals whose poles would stand nearer than this (metres) share one; a post of any kind so near carries a signal."""
 MAST_REACH = 12.0
 """A post whose name tells of signals carries one up to so far away (metres)."""
@@ -89,7 +89,7 @@ def signal_parts(
     poles: list[_SignalPost] = []
     for signal, own in lights:
         pole = _post_for(signal, own, roadside)
-        if all(np.hypot(*(pole.foot - other.foot)) > SAME_POLE for other in poles):
+        if all(np.hypot(*(pole.foot - other.foot)) > SAME_POLE_DISTANCE for other in poles):
             poles.append(pole)
     return tuple(_parts(poles, terrain))
 
@@ -111,7 +111,7 @@ def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside:
 
     def reach(post: Post) -> float:
         tells = post.words & SIGNAL_WORDS and not post.is_lamp
-        return MAST_REACH if tells or (hangs and not post.is_lamp and can_carry(post)) else SAME_POLE
+        return MAST_REACH if tells or (hangs and not post.is_lamp and can_carry(post)) else SAME_POLE_DISTANCE
 
     near = [(float(np.hypot(*(post.xy - xy))), number, post) for number, post in posts]
     eligible = [entry for entry in near if entry[0] <= reach(entry[2])]
@@ -124,20 +124,18 @@ def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside:
 def _post_for(signal: PlacedSignal, own: Post | None, roadside: Roadside) -> _SignalPost:
     xy = signal.position[:2]
     hangs = bool(roadside.filled.contains(shapely.Point(xy)))
-    height, carries = HEIGHT, True
+    height, carries = DEFAULT_HEIGHT, True
     if own is not None:
         foot, source = own.xy, FROM_MAP
-        height, carries = own.height or HEIGHT, can_carry(own)
+        height, carries = own.height or DEFAULT_HEIGHT, can_carry(own)
     elif hangs:
         foot, source = _beside(xy, roadside), ASSUMED
     else:
-        named = words_of(signal.name) & OF_WORD[Kind.POST]
+        named = words_of(signal.name) & WORDS_OF_KIND[Kind.POST]
         foot, source = xy, FROM_MAP if named else ASSUMED
     heading, arm = _arm(foot, xy, signal.yaw, roadside, hangs=hangs)
     faces_left = math.sin(signal.yaw + math.pi - heading) >= 0  # the lamps look against the traffic
-    return _SignalPost(
-        foot, heading, arm if height >= LEAST_HEIGHT_OF_ARM else 0.0, height, faces_left, source, carries
-    )
+    return _SignalPost(foot, heading, arm if height >= MIN_HEIGHT_FOR_ARM else 0.0, height, faces_left, source, carries)
 
 
 def _beside(xy: Float, roadside: Roadside) -> Float:
@@ -160,5 +158,5 @@ def _arm(foot: Float, xy: Float, travel: float, roadside: Roadside, *, hangs: bo
     else:
         heading, length = square, MAST_ARM
     tip = foot + length * np.array([math.cos(heading), math.sin(heading)])
-    reaches = length <= LONGEST_ARM and roadside.carriageway.covers(shapely.Point(tip))
+    reaches = length <= MAX_ARM and roadside.carriageway.covers(shapely.Point(tip))
     return heading, length if reaches else 0.0

@@ -14,9 +14,9 @@ from ..arrays import Float
 
 POST_SIDES = 6
 TRUNK_SIDES = 6
-STOREY = 3.2
-BAY = 3.4
-WINDOW_PROUD = 0.03
+STOREY_HEIGHT = 3.2
+WINDOW_SPACING = 3.4
+WINDOW_OFFSET = 0.03
 """How far window panes stand before the wall, so that they are drawn before it."""
 
 
@@ -102,9 +102,9 @@ def fence(base: Float, height: Float, thickness: float, *, side: str) -> Solid:
 def windows(outline: Float, base: float, height: float) -> Solid:
     """Return the panes of a block: one in each bay of each storey, wide ones on the ground floor."""
     ring = outline[::-1] if _signed_area(outline) < 0 else outline
-    storeys = int(height / STOREY + 0.1)  # a low top storey has windows too
+    storeys = int(height / STOREY_HEIGHT + 0.1)  # a low top storey has windows too
     panes = [
-        _panes(start, stop, base + storey * STOREY, shop=storey == 0)
+        _panes(start, stop, base + storey * STOREY_HEIGHT, shop=storey == 0)
         for start, stop in zip(ring, np.roll(ring, -1, axis=0), strict=True)
         for storey in range(storeys)
     ]
@@ -203,14 +203,14 @@ def _panes(start: Float, stop: Float, floor: float, *, shop: bool) -> Float:
     """Return (n, 4, 3) panes of one storey of one side, seen from outside counter-clockwise."""
     along = stop - start
     length = float(np.hypot(*along))
-    bays = int(length / BAY)
+    bays = int(length / WINDOW_SPACING)
     if bays == 0:
         return np.empty((0, 4, 3))
     along = along / length
     outwards = np.array([along[1], -along[0]])
     wide, sill, head = (0.82 * length / bays, 0.3, 2.7) if shop else (1.5, 0.95, 2.45)
     middles = (np.arange(bays) + 0.5) * length / bays
-    low = start + outwards * WINDOW_PROUD + (middles - wide / 2)[:, None] * along
+    low = start + outwards * WINDOW_OFFSET + (middles - wide / 2)[:, None] * along
     high = low + wide * along
     corners = np.stack([low, high, high, low], axis=1)
     heights = np.broadcast_to(floor + np.array([sill, sill, head, head]), (bays, 4))

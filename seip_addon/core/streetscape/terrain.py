@@ -10,9 +10,9 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..geometry.plan import plane_height, signed_area
 
-LEAST_AREA = 1e-6
+MIN_AREA = 1e-6
 """Triangles smaller than this in plan (m²) carry nothing and are left out."""
-GRID = 1e-6
+SNAP_GRID = 1e-6
 """Grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated."""
 
 
@@ -26,7 +26,7 @@ class Terrain:
     """
 
     def __init__(self, triangles: Float) -> None:
-        self._triangles = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
         self._plan = shapely.polygons(self._triangles[:, :, :2])
         self._tree = shapely.STRtree(self._plan)
 
@@ -85,8 +85,8 @@ def _cells(area: BaseGeometry, spacing: float) -> NDArray[np.object_]:
     shapely.prepare(area)
     squares = shapely.box(x, y, x + spacing, y + spacing)
     met = squares[shapely.intersects(area, squares)]
-    parts = shapely.get_parts(shapely.intersection(met, area, grid_size=GRID))
-    kept: NDArray[np.object_] = parts[shapely.area(parts) > LEAST_AREA]
+    parts = shapely.get_parts(shapely.intersection(met, area, grid_size=SNAP_GRID))
+    kept: NDArray[np.object_] = parts[shapely.area(parts) > MIN_AREA]
     return kept
 
 
@@ -96,7 +96,7 @@ def triangulate(area: BaseGeometry | NDArray[np.object_]) -> Float:
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
     area = signed_area(corners)
     corners[area < 0] = corners[area < 0, ::-1]
-    kept: Float = corners[np.abs(area) > LEAST_AREA]
+    kept: Float = corners[np.abs(area) > MIN_AREA]
     return kept
 
 
@@ -107,10 +107,10 @@ def cut(triangles: Float, away: BaseGeometry) -> Float:
     plan = shapely.polygons(triangles[:, :, :2])
     shapely.prepare(away)
     touched = shapely.intersects(away, plan)
-    rests = shapely.difference(plan[touched], away, grid_size=GRID)
+    rests = shapely.difference(plan[touched], away, grid_size=SNAP_GRID)
     pieces = [triangles[~touched]]
     for triangle, rest in zip(triangles[touched], rests, strict=True):
-        if rest.area > LEAST_AREA:
+        if rest.area > MIN_AREA:
             corners = triangulate(rest)
             flat = corners.reshape(-1, 2)
             height = plane_height(np.broadcast_to(triangle, (len(flat), 3, 3)), flat)

@@ -1,4 +1,4 @@
-"""Road users, where they are at any time, and what they look like to a LiDAR."""
+"""Road users: their trajectories, and their bodies as a LiDAR sees them."""
 
 from .trajectories import CATEGORIES, RoadUser, Snapshot, Trajectories
 

@@ -31,7 +31,7 @@ REFLECTIVITY: Mapping[str, float] = {
 }
 """Share of near infrared (905 nm) that each material sends back, assumed; paint and clothes have the road user's."""
 
-COLOURS = (
+PAINT_COLOURS = (
     (0.12, "black"),
     (0.24, "blue"),
     (0.34, "green"),
@@ -42,7 +42,7 @@ COLOURS = (
 )
 """Up to which reflectivity paint and clothes are shown in which colour."""
 
-PAINTED = ("paint", "cloth")
+PAINTED_MATERIALS = ("paint", "cloth")
 """Materials that have the road user's reflectivity; in a body a colour follows: ``paint red``."""
 
 
@@ -101,13 +101,13 @@ def fitted_body(user: RoadUser) -> Body:
 
 def colour_of(paint: float) -> str:
     """Return the colour in which a reflectivity of paint or clothes is shown."""
-    return next((name for limit, name in COLOURS if paint <= limit), COLOURS[-1][1])
+    return next((name for limit, name in PAINT_COLOURS if paint <= limit), PAINT_COLOURS[-1][1])
 
 
 @functools.cache
 def _painted(category: str, length: float, width: float, height: float, paint: float) -> Body:
     triangles, material = _stretched(category, length, width, height)
-    painted = np.isin(material, PAINTED)
+    painted = np.isin(material, PAINTED_MATERIALS)
     reflectivity = np.array([paint if own else REFLECTIVITY[name] for name, own in zip(material, painted, strict=True)])
     named = np.where(painted, np.char.add(material, f" {colour_of(paint)}"), material)
     for array in (reflectivity, named):
@@ -175,8 +175,8 @@ def read_mesh(path: Path) -> tuple[Float, Text]:
         raise SeipError(f"{path.name} is no Wavefront OBJ mesh ({error}); export it again") from error
     if not (np.isfinite(triangles).all() and np.ptp(triangles, axis=(0, 1)).min() > 0.0):
         raise SeipError(f"{path.name} has no length, width and height; correct its vertices")
-    unknown = set(material) - REFLECTIVITY.keys() - set(PAINTED)
+    unknown = set(material) - REFLECTIVITY.keys() - set(PAINTED_MATERIALS)
     if unknown:
-        known = ", ".join(sorted({*REFLECTIVITY, *PAINTED}))
+        known = ", ".join(sorted({*REFLECTIVITY, *PAINTED_MATERIALS}))
         raise SeipError(f"{path.name}: unknown material {min(unknown)!r}; known are {known}")
     return triangles, np.array(material)

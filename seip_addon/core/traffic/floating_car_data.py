@@ -24,19 +24,19 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from ..storage.files import digest
-from .sumo_files import FARTHEST, Attributes, opened, quoted, read_tags, short
+from .sumo_files import MAX_COORDINATE, Attributes, opened, quoted, read_tags, short
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
-_NAMED = 5
+_MAX_NAMED = 5
 """As many road users a message names; the others it counts."""
 
-_LINES = 20_000  # of csv between two reports of progress
+_LINES_PER_REPORT = 20_000  # of csv between two reports of progress
 
 
 @dataclass(frozen=True, eq=False)
 class FloatingCarData:
-    """What a file of floating car data says, one road user after the other; u road users, n samples.
+    """Content of a file of floating car data, one road user after the other; u road users, n samples.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class FloatingCarData:
 
 
 class Extent(NamedTuple):
-    """What of a file to keep: a span of the simulation in seconds, and a rectangle of the map in metres."""
+    """Part of a file to read: a span of the simulation in seconds, and a rectangle of the map in metres."""
 
     begin: float = -math.inf
     end: float = math.inf
@@ -111,7 +111,7 @@ def read_floating_car_data(
 def read_trajectories(
     data: FloatingCarData, types: Mapping[str, VehicleType], origin: Float, source: str
 ) -> tuple[Trajectories, tuple[str, ...]]:
-    """Give road users their sizes and put their middles where they are, in local axes.
+    """Return trajectories of road users with their sizes, in local axes.
 
     Parameters
     ----------
@@ -166,8 +166,8 @@ def read_trajectories(
 
 def listed(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
-    more = len(names) - _NAMED
-    return ", ".join(short(name) for name in names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - _MAX_NAMED
+    return ", ".join(short(name) for name in names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def unwrapped(yaw: Float, first: Integer) -> Float:
@@ -231,8 +231,8 @@ class _Rows:
         if not self._window.begin <= self._time <= self._window.end:
             return
         name = row.get("id", "")
-        x = self._number(row.get("x", ""), "x", name, FARTHEST) - self._shift_x
-        y = self._number(row.get("y", ""), "y", name, FARTHEST) - self._shift_y
+        x = self._number(row.get("x", ""), "x", name, MAX_COORDINATE) - self._shift_x
+        y = self._number(row.get("y", ""), "y", name, MAX_COORDINATE) - self._shift_y
         left, low, right, high = self._window.bounds
         key = (name, walks)
         if not (left <= x <= right and low <= y <= high):
@@ -247,7 +247,7 @@ class _Rows:
             self._time,
             x,
             y,
-            math.nan if z == "nan" else self._number(z, "z", name, FARTHEST),
+            math.nan if z == "nan" else self._number(z, "z", name, MAX_COORDINATE),
             self._number(row.get("angle", ""), "angle", name, 1e4),
             self._number(row.get("speed") or "0", "speed", name, 1e3),
         )
@@ -318,7 +318,7 @@ def _read_csv(path: str | os.PathLike[str], rows: _Rows) -> Generator[Progress, 
                     )
                 if cells:
                     _take_line(dict(zip(columns, cells, strict=True)), rows)
-                if number % _LINES == 0:
+                if number % _LINES_PER_REPORT == 0:
                     yield progress()
         except (UnicodeDecodeError, csv.Error) as error:
             raise SeipError(f"{Path(path).name} is no csv table ({error}); write it again") from error

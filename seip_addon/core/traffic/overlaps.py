@@ -12,7 +12,7 @@ from ..arrays import Float, Integer
 from ..progress import Progress
 from .trajectories import Snapshot, Trajectories
 
-LEAST_OVERLAP = 0.02
+MIN_OVERLAP = 0.02
 """Square metres of two footprints in one place below which they only touch."""
 
 
@@ -68,7 +68,7 @@ def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generato
         one, other = shapely.STRtree(polygons).query(polygons, predicate="intersects")
         one, other = one[one < other], other[one < other]
         area = shapely.area(shapely.intersection(polygons[one], polygons[other]))
-        deep = area > LEAST_OVERLAP
+        deep = area > MIN_OVERLAP
         for pair, value in zip(snapshot.user[np.stack([one, other], axis=1)][deep].tolist(), area[deep], strict=True):
             key = (pair[0], pair[1])
             worst[key] = max(worst.get(key, (0.0, 0.0)), (float(value), time))
@@ -82,7 +82,7 @@ def find_overlaps(trajectories: Trajectories, interval: float = 0.2) -> Generato
 
 
 def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tuple[Trajectories, tuple[str, ...]]]:
-    """Leave road users out until no two are in one place: first who is in the most others' way, then who stays least.
+    """Remove road users until no two overlap: first the one that overlaps most others, then the shortest present.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Road users on the road surface of a scene: heights, slopes, and who is where there is no road."""
+"""Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import shapely
 
 from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
-from ..geometry.plan import LEAST_AREA, heights_over, plane_height, signed_area
+from ..geometry.plan import MIN_AREA, heights_over, plane_height, signed_area
 from ..site.scene_geometry import SceneGeometry, joined
 from .floating_car_data import listed, unwrapped
 from .smooth_walks import out_of_reach
 from .trajectories import LoadedTraffic, RoadUser, Trajectories
 
-TOLERANCE = 1.0
+ROAD_TOLERANCE = 1.0
 """Metres in plan that the middle of a road user may be beside the road and still counts as on it.
 
 As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
 """
 
-WHEELBASE = 0.6
+WHEELBASE_SHARE = 0.6
 """Of the length of a vehicle: its pitch is that of the road between two axles this far apart."""
 
-LONGEST_GAP = 2.5
+MAX_GAP = 2.5
 """Sampling intervals; between samples further apart than this a road user was somewhere else."""
 
 _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
@@ -33,7 +33,7 @@ _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
 
 
 def fit_to_road(trajectories: Trajectories, geometry: SceneGeometry) -> LoadedTraffic:
-    """Put road users on the road of a scene, and leave out where they are off it.
+    """Fit road users to the road of a scene, leaving out samples off the road.
 
     Vehicles stand on the roads, pedestrians on roads and pavements. Where surfaces lie above one another the one that
     is nearest to the height in the trajectories counts, and the highest where they say none. A road user who leaves
@@ -82,7 +82,7 @@ class _RoadSurface:
     """Triangles (n, 3, 3) that road users can stand on."""
 
     def __init__(self, triangles: Float) -> None:
-        self._triangles = triangles[np.abs(signed_area(triangles)) > LEAST_AREA]
+        self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
         self._tree = shapely.STRtree(shapely.polygons(self._triangles[:, :, :2]))
 
     def height(self, plan: Float, hint: Float) -> Float:
@@ -91,7 +91,7 @@ class _RoadSurface:
         height = _nearest_heights(len(plan), point, heights, hint)
         beside = np.flatnonzero(np.isnan(height))
         places = shapely.points(plan[beside])
-        number, triangle = self._tree.query_nearest(places, max_distance=TOLERANCE)
+        number, triangle = self._tree.query_nearest(places, max_distance=ROAD_TOLERANCE)
         nearest = shapely.get_coordinates(
             shapely.get_point(shapely.shortest_line(self._tree.geometries[triangle], places[number]), 0)
         )
@@ -113,7 +113,7 @@ def _nearest_heights(count: int, point: Integer, heights: Float, hint: Float) ->
 
 def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: Float, length: Float) -> Float:
     """Return the slope of the road between the axles, radians; where one of them is off the road, up to the middle."""
-    half = WHEELBASE / 2.0 * length
+    half = WHEELBASE_SHARE / 2.0 * length
     ahead = half[:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     front, rear = height(plan + ahead, z), height(plan - ahead, z)
     rise = np.where(np.isnan(front), z, front) - np.where(np.isnan(rear), z, rear)
@@ -123,7 +123,7 @@ def _pitch(height: Callable[[Float, Float], Float], plan: Float, z: Float, yaw: 
 
 
 def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Boolean) -> tuple[str, ...]:
-    """Count and name who is off the road near the region; refuse traffic that mostly is."""
+    """Return warnings on road users off the road near the region; raise SeipError where most are."""
     count = len(local)
     seen = np.bincount(user[near], minlength=count)
     off = np.bincount(user[near & ~on_road], minlength=count)
@@ -138,14 +138,14 @@ def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Bo
     if mostly > visitors / 2.0:
         raise SeipError(
             f"FCD of another map: {mostly} of {visitors} road users in the region of interest are off the road, "
-            f"by more than {TOLERANCE:g} m ({listed(astray)}); simulate on the scene's own map, and name its .net.xml "
-            "where that has a netOffset"
+            f"by more than {ROAD_TOLERANCE:g} m ({listed(astray)}); simulate on the scene's own map, and name its "
+            ".net.xml where that has a netOffset"
         )
     if not astray:
         return ()
     sentence = (
-        f"{len(astray)} of {visitors} road users leave the road by more than {TOLERANCE:g} m and are left out there: "
-        f"{listed(astray)}"
+        f"{len(astray)} of {visitors} road users leave the road by more than {ROAD_TOLERANCE:g} m and are left out "
+        f"there: {listed(astray)}"
     )
     return (sentence,)
 
@@ -182,7 +182,7 @@ def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> T
 def _longest_gap(trajectories: Trajectories) -> float:
     """Return how many seconds may lie between two samples of one stay."""
     steps = np.delete(np.diff(trajectories.time), trajectories.first[1:-1] - 1)
-    return LONGEST_GAP * float(np.median(steps)) if len(steps) else 0.0
+    return MAX_GAP * float(np.median(steps)) if len(steps) else 0.0
 
 
 def _visit(user: RoadUser, visit: int) -> RoadUser:

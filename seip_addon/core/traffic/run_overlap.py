@@ -12,10 +12,10 @@ from ..arrays import Float
 from ..errors import SeipError
 from .trajectories import Trajectories
 
-CLOSE = 1.0
+SAME_PLACE = 1.0
 """Metres in plan within which two vehicles are in one place."""
 
-MOST_OVERLAP = 0.5
+MAX_OVERLAP = 0.5
 """Share of the vehicles beyond which two runs are held to be copies. Independent runs queue in the same places."""
 
 _INTERVAL = 1.0
@@ -51,7 +51,7 @@ def vehicle_positions(name: str, trajectories: Trajectories) -> VehiclePositions
 
 
 def overlap_of(one: VehiclePositions, other: VehiclePositions) -> float | None:
-    """Return the share of the vehicles of a run that are within `CLOSE` of one of the other at the same instant.
+    """Return the share of the vehicles of a run that are within `SAME_PLACE` of one of the other at the same instant.
 
     Instants are the same by the clock, or as long after the first: the larger share counts,
     and of the two runs that which has more of its vehicles in the other.
@@ -86,7 +86,7 @@ def _aligned(one: VehiclePositions, other: VehiclePositions, shift: float) -> fl
 
 def _near(xy: Float, others: Float) -> int:
     """How many points (n, 2) have one of others (k, 2) nearby."""
-    nearby = shapely.STRtree(shapely.points(others)).query(shapely.points(xy), predicate="dwithin", distance=CLOSE)
+    nearby = shapely.STRtree(shapely.points(others)).query(shapely.points(xy), predicate="dwithin", distance=SAME_PLACE)
     return len(np.unique(nearby[0]))
 
 
@@ -96,16 +96,16 @@ def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions
     Raises
     ------
     SeipError
-        A pair overlaps by more than `MOST_OVERLAP`.
+        A pair overlaps by more than `MAX_OVERLAP`.
     """
     said = []
     for one, other in pairs:
         share = overlap_of(one, other)
-        if share is not None and share > MOST_OVERLAP:
+        if share is not None and share > MAX_OVERLAP:
             raise SeipError(
                 f"{one.name} and {other.name} are nearly the same traffic: {share:.0%} of the vehicles of one are "
-                f"within {CLOSE:g} m of one of the other at the same instant, and {MOST_OVERLAP:.0%} is the most "
+                f"within {SAME_PLACE:g} m of one of the other at the same instant, and {MAX_OVERLAP:.0%} is the most "
                 "for runs that are to be independent: name runs that were simulated with other demand and other seeds"
             )
         said.append(f"{one.name} and {other.name} {'cannot be told' if share is None else format(share, '.0%')}")
-    return f"vehicles of one run within {CLOSE:g} m of one of another at the same instant: {', '.join(said)}"
+    return f"vehicles of one run within {SAME_PLACE:g} m of one of another at the same instant: {', '.join(said)}"

@@ -1,4 +1,4 @@
-"""Walks without leaps: SUMO's pedestrians leap by a metre or two where a crossing begins, and turn on the spot."""
+"""Smoothing of SUMO's pedestrians, who leap by a metre or two where a crossing begins, and turn on the spot."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from ..arrays import Boolean, Float
 from .trajectories import Trajectories
 
-WINDOW = 1.8
+WINDOW_SECONDS = 1.8
 """Seconds over which a pedestrian's position and heading are averaged."""
 
-FARTHEST_LEAP = 4.0
+MAX_LEAP = 4.0
 """Metres beyond what its speed explains: who moves further than that between two samples was put somewhere else."""
 
 
@@ -24,12 +24,12 @@ def out_of_reach(trajectories: Trajectories) -> Boolean:
     """
     step = np.hypot(*np.diff(trajectories.position[:, :2], axis=0).T)
     speed = np.maximum(trajectories.speed[1:], trajectories.speed[:-1])
-    leaps: Boolean = step > 1.5 * speed * np.abs(np.diff(trajectories.time)) + FARTHEST_LEAP
+    leaps: Boolean = step > 1.5 * speed * np.abs(np.diff(trajectories.time)) + MAX_LEAP
     return leaps
 
 
 def smooth_walks(trajectories: Trajectories) -> Trajectories:
-    """Return the trajectories with pedestrians' positions in plan and headings averaged over `WINDOW`.
+    """Return the trajectories with pedestrians' positions in plan and headings averaged over `WINDOW_SECONDS`.
 
     At the ends of a walk, and where a pedestrian was put somewhere else, the window shrinks to what is there.
     """
@@ -38,7 +38,7 @@ def smooth_walks(trajectories: Trajectories) -> Trajectories:
     for user, begin, end in zip(trajectories.users, trajectories.first[:-1], trajectories.first[1:], strict=True):
         if user.category != "pedestrian" or end - begin < 3:
             continue
-        reach = round(WINDOW / 2.0 / float(np.median(np.diff(trajectories.time[begin:end]))))
+        reach = round(WINDOW_SECONDS / 2.0 / float(np.median(np.diff(trajectories.time[begin:end]))))
         for part in np.split(np.arange(begin, end), leaps[(begin < leaps) & (leaps < end)] - begin):
             position[part, :2] = _averaged(position[part, :2], reach)
             yaw[part] = _averaged(yaw[part, None], reach)[:, 0]

@@ -21,19 +21,19 @@ from .sumo_files import read_net_offset
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
-FAR = 500.0
+MAX_REGION_DISTANCE = 500.0
 """Metres from the region beyond which traffic is another place's."""
 
-MARGIN = 20.0
+ROAD_MARGIN = 20.0
 """Metres beyond the road of the scene within which traffic is read."""
 
-LOOKS = 1.0
+OVERLAP_INTERVAL = 1.0
 """Seconds between two looks for road users in one place, where a file is read."""
 
 
 @dataclass(frozen=True)
 class TrafficFiles:
-    """Where traffic is read from.
+    """Files of traffic.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
     if files.trajectories:
         yield Progress(0, 0, "trajectories")
         return LoadedTraffic(load_trajectories(files.path, geometry), ())
-    window = Extent(files.begin, files.end, road_bounds(geometry, MARGIN))
+    window = Extent(files.begin, files.end, road_bounds(geometry, ROAD_MARGIN))
     read = yield from read_sumo(files, window, geometry.origin, files.path.name)
     fit = fit_to_road(read.trajectories, geometry)
     overlaps = yield from overlap_warnings(fit.trajectories)
@@ -87,7 +87,7 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
     """
     trajectories = Trajectories.load(path).moved_to(geometry.origin)
     left, bottom, right, top = geometry.region.bounds
-    low, high = np.array([left, bottom]) - FAR, np.array([right, top]) + FAR
+    low, high = np.array([left, bottom]) - MAX_REGION_DISTANCE, np.array([right, top]) + MAX_REGION_DISTANCE
     plan = trajectories.position[:, :2]
     if not ((plan >= low) & (plan <= high)).all(axis=1).any():
         raise SeipError(f"all traffic of {path} is far from this scene: name traffic that was made for its map")
@@ -114,7 +114,7 @@ def read_sumo(
 
 def overlap_warnings(trajectories: Trajectories) -> Generator[Progress, None, tuple[str, ...]]:
     """Return a sentence where road users stand in one another."""
-    overlaps = yield from find_overlaps(trajectories, LOOKS)
+    overlaps = yield from find_overlaps(trajectories, OVERLAP_INTERVAL)
     if not len(overlaps):
         return ()
     worst = int(overlaps.area.argmax())

@@ -20,10 +20,10 @@ from ..progress import Progress
 
 Attributes = dict[str, str]
 
-FARTHEST = 1e8
+MAX_COORDINATE = 1e8
 """Metres of a coordinate at most: more than the circumference of the Earth."""
 
-_LONGEST = 60  # characters of a file that a message repeats
+_MAX_QUOTED = 60  # characters of a file that a message repeats
 _CHUNK = 1 << 20
 _GZIP = b"\x1f\x8b"
 
@@ -97,7 +97,7 @@ def read_tags(
 
 def short(text: str) -> str:
     """Return a text out of a file as a message repeats it: cut where it is long."""
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+    return text if len(text) <= _MAX_QUOTED else f"{text[:_MAX_QUOTED]}…"
 
 
 def quoted(text: str) -> str:
@@ -126,6 +126,6 @@ def read_net_offset(path: str | os.PathLike[str]) -> Float:
         x, y = (float(number) for number in found[0].split(","))
     except (IndexError, ValueError):
         x = y = math.nan
-    if not (abs(x) <= FARTHEST and abs(y) <= FARTHEST):
+    if not (abs(x) <= MAX_COORDINATE and abs(y) <= MAX_COORDINATE):
         raise SeipError(f"{Path(path).name} is no SUMO network: it says no netOffset; name a .net.xml")
     return np.array([x, y])

@@ -13,13 +13,13 @@ from ..arrays import Float, Integer
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..storage.files import digest
 
-LARGEST = 100.0
+MAX_USER_SIZE = 100.0
 """Metres of length, width or height of a road user at most."""
 
-LONGEST = 30.0 * 86400.0
+MAX_DURATION = 30.0 * 86400.0
 """Seconds from the first sample of trajectories to the last at most: 30 days."""
 
-WIDEST = 1e6
+MAX_EXTENT = 1e6
 """Metres from one sample to another at most, along each axis."""
 
 _ARRAYS = {
@@ -64,7 +64,7 @@ class RoadUser:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Who is where at one instant; k road users.
+    """Positions and headings of the k road users present at one instant.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _check_users(users: tuple[RoadUser, ...]) -> None:
         sizes = (user.length, user.width, user.height)
         if not isinstance(user.name, str) or user.category not in CATEGORIES:
             raise ContentError(f"road user {str(user.name)[:40]!r} is {str(user.category)[:40]!r}")
-        if not all(isinstance(size, int | float) and 0.0 < size <= LARGEST for size in sizes):
+        if not all(isinstance(size, int | float) and 0.0 < size <= MAX_USER_SIZE for size in sizes):
             raise ContentError(f"road user {user.name[:40]!r} is {str(sizes)[:80]} m large")
         if not (isinstance(user.paint, int | float) and 0.0 <= user.paint <= 1.0):
             raise ContentError(f"the paint of road user {user.name[:40]!r} reflects {str(user.paint)[:40]}")
@@ -236,15 +236,15 @@ def _check_samples(read: Trajectories) -> None:
     if late.any():
         user = int(np.searchsorted(first, np.flatnonzero(late)[0], side="right")) - 1
         raise ContentError(f"the times of road user {read.users[user].name[:40]!r} do not ascend")
-    if (within & (np.abs(np.diff(read.yaw)) > math.pi + _ROUNDED)).any():
+    if (within & (np.abs(np.diff(read.yaw)) > math.pi + _TURN_TOLERANCE)).any():
         raise ContentError("a heading leaps by more than half a turn")
     begin, end = read.span
-    if end - begin > LONGEST:
+    if end - begin > MAX_DURATION:
         raise ContentError(f"it lasts {end - begin:g} s")
     widest = float(np.ptp(read.position, axis=0).max())
-    if widest > WIDEST:
+    if widest > MAX_EXTENT:
         raise ContentError(f"its road users are up to {widest / 1e3:,.0f} km apart")
 
 
-_ROUNDED = 1e-3
+_TURN_TOLERANCE = 1e-3
 """Radians by which rounding may widen a turn."""

@@ -1,4 +1,4 @@
-"""What a SUMO vehicle type is: its category and its size."""
+"""Category and size of SUMO's vehicle types."""
 
 from __future__ import annotations
 

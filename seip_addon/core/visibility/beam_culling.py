@@ -202,7 +202,7 @@ class NearRays:
 
 
 def target_patches(origin: Float, surfaces: NearSurfaces) -> Patches:
-    """Look at the surroundings of each target from a place, given as (3,) float64 in metres."""
+    """Return the patches of targets as seen from a place, given as (3,) float64 in metres."""
     azimuth, distance = _polar(surfaces.xyz - origin)
     radius = np.full(len(distance), surfaces.radius)
     everyone = np.arange(len(distance))
@@ -210,7 +210,7 @@ def target_patches(origin: Float, surfaces: NearSurfaces) -> Patches:
 
 
 def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tuple[Patches, Planes]:
-    """Look at each surface about wanted targets from a place.
+    """Return a patch for each surface about wanted targets, as seen from a place.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float, Integer
 from ..lidar import LidarModel
-from ..progress import PAUSE, Progress
+from ..progress import REPORT_INTERVAL, Progress
 from ..site.candidates import Candidates
 from ..site.site import Site
 from .visibility_model import VisibilityModel
@@ -125,7 +125,7 @@ def compute_chunks(
     pending = set(numbers)
     try:
         while pending:
-            finished, pending = wait(pending, PAUSE, FIRST_COMPLETED)  # so that the caller can cancel soon
+            finished, pending = wait(pending, REPORT_INTERVAL, FIRST_COMPLETED)  # so that the caller can cancel soon
             for future in finished:
                 number = numbers[future]
                 rows[number] = future.result()

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Integer
 from ..lidar import LidarModel, find_models
-from ..progress import PAUSE, Progress
+from ..progress import REPORT_INTERVAL, Progress
 from ..site.site import Site
 from .chunks import Rows, sharing_rays
 from .executors import VisibilityTask, threads_of
@@ -26,18 +26,18 @@ from .ray_casting import Engine, engine_name
 from .settings import VisibilitySettings
 from .triangle_culling import needed_triangles
 
-SAMPLING = 0.8
+SAMPLING_SECONDS = 0.8
 """Seconds that sample places may take, beyond the first of each thread."""
 
 _BYTES_PER_TRIANGLE = {"embree": 750, "bvh": 1100}
 """At the peak, while the ray caster is built; measured on a street of a million triangles."""
-_BYTES_PER_RAY_AND_PLACE = 160
+_BYTES_PER_RAY_AND_POSITION = 160
 """Of a place under way: directions, points, triangles and the bundles beside them."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a visibility grid will take.
+    """Estimated run time and memory of a visibility grid.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def estimate_visibility(
     with threads_of(task, threads) as submit:
         setting_up = time.perf_counter() - began
         yield Progress(1, 2, "sample for the estimate")
-        sample = yield from _look_from(drawn, submit)
+        sample = yield from _compute_from(drawn, submit)
     per_place = sample.seconds / sample.places
     rays = sample.rays / sample.places
     return Estimate(
@@ -135,22 +135,22 @@ class _Sample:
     rays: int
 
 
-def _look_from(
+def _compute_from(
     drawn: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]
 ) -> Generator[Progress, None, _Sample]:
     """Look from the first of some places, then from as many more as there is time for.
 
     The second batch alone counts where it is the larger one: the first pays for what later places find ready.
     """
-    first = yield from _timed(drawn[:_FIRST], submit)
-    more = math.floor(SAMPLING / first.seconds * first.places)
-    rest = drawn[_FIRST : _FIRST + more]
-    if len(rest) < _FIRST:
+    first = yield from _timed(drawn[:_FIRST_POSITIONS], submit)
+    more = math.floor(SAMPLING_SECONDS / first.seconds * first.places)
+    rest = drawn[_FIRST_POSITIONS : _FIRST_POSITIONS + more]
+    if len(rest) < _FIRST_POSITIONS:
         return first
     return (yield from _timed(rest, submit))
 
 
-_FIRST = 4  # places: at least one for each thread
+_FIRST_POSITIONS = 4  # places: at least one for each thread
 
 
 def _timed(some: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]) -> Generator[Progress, None, _Sample]:
@@ -158,13 +158,13 @@ def _timed(some: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]) -
     futures = [submit(poses) for poses in some]
     pending = set(futures)
     while pending:
-        pending = wait(pending, PAUSE).not_done
+        pending = wait(pending, REPORT_INTERVAL).not_done
         yield Progress(1, 2, "sample for the estimate")
     return _Sample(len(some), time.perf_counter() - began, sum(future.result().rays for future in futures))
 
 
 def _memory(task: VisibilityTask, rays_per_place: float, poses: int) -> int:
     triangles = len(task.keep) * _BYTES_PER_TRIANGLE[task.engine]
-    under_way = rays_per_place * _BYTES_PER_RAY_AND_PLACE * _FIRST
+    under_way = rays_per_place * _BYTES_PER_RAY_AND_POSITION * _FIRST_POSITIONS
     grid = poses * len(task.site.targets) * (1 + 1 / 8)  # as bits, and unpacked for the placement
     return math.ceil(triangles + under_way + grid)

@@ -22,14 +22,14 @@ from .visibility_model import VisibilityModel
 
 Submit = Callable[[Integer], Future[Rows]]
 
-_RAYS_BETWEEN_LOOKS = 1 << 15  # a tenth of a second's work or less
-_SECONDS_FOR_AN_ANSWER = 20
-_LOST_WORKERS = 3  # so many die over one chunk before the chunk is held to be the cause
+_RAYS_BETWEEN_CHECKS = 1 << 15  # a tenth of a second's work or less
+_ANSWER_SECONDS = 20
+_MAX_LOST_WORKERS = 3  # so many die over one chunk before the chunk is held to be the cause
 
 
 @dataclass(frozen=True, eq=False)
 class VisibilityTask:
-    """What rows of a visibility grid follow from, to be sent to where they are computed.
+    """Inputs of rows of a visibility grid, to be sent to workers.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def threads_of(task: VisibilityTask, threads: int | None = None) -> Iterator[Sub
 
 
 class StoppableCaster:
-    """Casts rays until it is told to stop, some at a time: then nobody waits for the rest of them.
+    """A ray caster that can be stopped: it casts some rays at a time.
 
     Parameters
     ----------
@@ -92,10 +92,10 @@ class StoppableCaster:
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays; see `RayCaster.cast`."""
         hits = []
-        for begin in range(0, max(len(directions), 1), _RAYS_BETWEEN_LOOKS):
+        for begin in range(0, max(len(directions), 1), _RAYS_BETWEEN_CHECKS):
             if self._stop.is_set():
                 raise CancelledError
-            some = slice(begin, begin + _RAYS_BETWEEN_LOOKS)
+            some = slice(begin, begin + _RAYS_BETWEEN_CHECKS)
             hits.append(self._caster.cast(origin if origin.ndim == 1 else origin[some], directions[some], max_range))
         distance, triangle = zip(*hits, strict=True)
         return np.concatenate(distance), np.concatenate(triangle)
@@ -124,7 +124,7 @@ def cluster(address: str, task: VisibilityTask) -> Iterator[Submit]:
             "a scheduler needs Dask, which is not installed; install the group 'cluster' of pyproject.toml"
         ) from error
     try:
-        client = Client(address, timeout=_SECONDS_FOR_AN_ANSWER, set_as_default=False)
+        client = Client(address, timeout=_ANSWER_SECONDS, set_as_default=False)
     except TypeError as error:  # what distributed raises on an address with TLS, and no certificates
         raise SeipError(
             f"{address} needs certificates: name them in Dask's settings distributed.comm.tls.ca-file, client.cert and "

@@ -14,15 +14,15 @@ import numpy as np
 from ..arrays import Float
 from ..site.scene_geometry import Mesh, SceneGeometry
 
-NOTICEABLE = 1e-3
+MAX_STEP = 1e-3
 """Metres: coarser steps move returns at a grazing incidence by as much as a sensor's own noise of 2 to 3 cm."""
 
-STEP = float(np.finfo(np.float32).eps)
+FLOAT32_STEP = float(np.finfo(np.float32).eps)
 """Largest step of float32 as a share of a coordinate."""
 
 
 def rounding_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
-    """Say where a scene is too far from its origin or too wide for float32.
+    """Return warnings where a scene is too far from its origin or too wide for float32.
 
     Parameters
     ----------
@@ -40,17 +40,18 @@ def rounding_warnings(geometry: SceneGeometry) -> tuple[str, ...]:
     warnings = []
     farthest = max(meshes, key=lambda mesh: float(np.abs(mesh.triangles).max()))
     reach = float(np.abs(farthest.triangles).max())
-    if all(_nearest(mesh) * STEP > NOTICEABLE for mesh in meshes):
+    if all(_nearest(mesh) * FLOAT32_STEP > MAX_STEP for mesh in meshes):
         warnings.append(
             f"the scene lies {reach:,.0f} m from its origin, where Blender keeps coordinates in steps of "
-            f"{STEP * reach * 1e3:.2g} mm: move it to the origin, and note the way in the scene's seip_origin"
+            f"{FLOAT32_STEP * reach * 1e3:.2g} mm: move it to the origin, and note the way in the scene's seip_origin"
         )
         return tuple(warnings)
     extent = float(np.ptp(np.concatenate([_bounds(mesh) for mesh in meshes]), axis=0).max())
-    if extent * STEP > NOTICEABLE:
+    if extent * FLOAT32_STEP > MAX_STEP:
         warnings.append(
-            f"the scene is {extent:,.0f} m wide: rays end in steps of {STEP * extent * 1e3:.2g} mm, many times that "
-            f"on a road at a distance; take {farthest.name!r}, which lies {reach:,.0f} m out, away if it is not needed"
+            f"the scene is {extent:,.0f} m wide: rays end in steps of {FLOAT32_STEP * extent * 1e3:.2g} mm, many "
+            f"times that on a road at a distance; take {farthest.name!r}, which lies {reach:,.0f} m out, "
+            "away if it is not needed"
         )
     return tuple(warnings)
 

@@ -20,7 +20,7 @@ from ..geometry.orientation import turned
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 
-_LEAST_TOLERANCE = 1e-3  # metres
+_MIN_TOLERANCE = 1e-3  # metres
 _FLOAT32_ROUNDINGS = 64
 
 
@@ -157,7 +157,7 @@ def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurface
 
 
 def turned_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -> NearSurfaces:
-    """Return the same surfaces in the axes of a sensor that hangs anywhere and is turned anyhow.
+    """Return the same surfaces in the axes of a sensor at any position and orientation.
 
     Parameters
     ----------
@@ -191,10 +191,10 @@ def _about(targets: Float, radius: float, discs: Discs, tolerance: float) -> Nea
 def caster_tolerance(triangles: Float) -> float:
     """Return how far a float32 ray caster's returns may lie off the triangles, in metres, generously."""
     if len(triangles) == 0:
-        return _LEAST_TOLERANCE
+        return _MIN_TOLERANCE
     points = triangles.reshape(-1, 3)
     extent = float((points.max(axis=0) - points.min(axis=0)).max())
-    return max(_LEAST_TOLERANCE, _FLOAT32_ROUNDINGS * float(np.finfo(np.float32).eps) * extent)
+    return max(_MIN_TOLERANCE, _FLOAT32_ROUNDINGS * float(np.finfo(np.float32).eps) * extent)
 
 
 def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Cuts:

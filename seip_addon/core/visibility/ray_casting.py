@@ -24,17 +24,17 @@ Engine = Literal["auto", "bvh", "embree"]
 
 # Rays are cast a little farther than asked for and cut off afterwards, in float64: a hit at the very end of one ray
 # is then the same as on a longer ray.
-_BEYOND = 1 + 1e-6
+_EXCESS = 1 + 1e-6
 
-_NEEDLE = 1 / 300
+_MAX_NEEDLE_HEIGHT = 1 / 300
 """Height over longest side below which Embree's float32 distances are off by centimetres, though its hits are right."""
 
-MOST_THREADS = min(4, os.cpu_count() or 1)
+MAX_THREADS = min(4, os.cpu_count() or 1)
 """That cast at once to advantage: the work between casts holds Python's lock for a part of the time."""
 
 
 class RayCaster(Protocol):
-    """What casts rays. Both sides of a triangle stop a ray.
+    """Interface of ray casters. Both sides of a triangle stop a ray.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class BvhRayCaster:
         start = (origin - self._centre).tolist()
         starts = itertools.repeat(start) if origin.ndim == 1 else start
         with _no_garbage_collection():
-            hits = list(map(self._tree.ray_cast, starts, directions.tolist(), itertools.repeat(max_range * _BEYOND)))
+            hits = list(map(self._tree.ray_cast, starts, directions.tolist(), itertools.repeat(max_range * _EXCESS)))
             # None, on a miss, becomes NaN
             face = np.array(list(map(_FACE, hits)), dtype=np.float64)
             distance = np.array(list(map(_DISTANCE, hits)), dtype=np.float64)
@@ -163,7 +163,7 @@ class EmbreeRayCaster:
     """
 
     name = "embree"
-    threads = MOST_THREADS
+    threads = MAX_THREADS
 
     def __init__(self, triangles: Float, keep: Boolean | None = None) -> None:
         try:
@@ -184,7 +184,7 @@ class EmbreeRayCaster:
         if self._mesh is None or len(directions) == 0:
             return np.full(len(directions), np.inf), np.full(len(directions), -1, dtype=np.int64)
         start = np.broadcast_to((origin - self._centre).astype(np.float32), directions.shape)
-        reach = np.full(len(directions), max_range * _BEYOND, dtype=np.float32)
+        reach = np.full(len(directions), max_range * _EXCESS, dtype=np.float32)
         hits = self._scene.run(np.ascontiguousarray(start), directions.astype(np.float32), dists=reach, output=True)
         distance, face = hits["tfar"].astype(np.float64), hits["primID"].astype(np.int64)
         if self._any_needle:
@@ -228,7 +228,7 @@ def _needles(corners: Float) -> Boolean:
     sides = corners - np.roll(corners, 1, axis=1)
     longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    thin: Boolean = twice_area < _NEEDLE * longest**2
+    thin: Boolean = twice_area < _MAX_NEEDLE_HEIGHT * longest**2
     return thin
 
 

@@ -21,7 +21,7 @@ from .settings import VisibilitySettings
 
 
 def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings) -> tuple[str, ...]:
-    """Say where coverage counts beams rather than view.
+    """Return warnings where rings are too far apart: coverage there depends on beams, not on line of sight.
 
     Parameters
     ----------

@@ -12,9 +12,9 @@ from ..site.candidates import Candidates
 from ..site.site import Site
 from ..site.target_squares import target_squares
 
-MOST_LINES = 1500
+MAX_LINES = 1500
 """More than these are a carpet, not lines: a sample of the targets is drawn."""
-SEED = 0
+SAMPLE_SEED = 0
 """Of the sample."""
 SAME_PLACE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
@@ -24,14 +24,14 @@ SAME_TURN = 5e-5
 
 @dataclass(frozen=True, eq=False)
 class SightLines:
-    """What one pose sees.
+    """Sight lines of one pose, and its unseen targets in range.
 
     Parameters
     ----------
     eye : (3,) float64, metres
         Optical centre, local site axes.
     ends : (n, 3) float64, metres
-        Targets that it sees, a sample of `MOST_LINES` where there are more.
+        Targets that it sees, a sample of `MAX_LINES` where there are more.
     seen : int
         How many it sees.
     in_range : int
@@ -92,7 +92,7 @@ def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float)
 
 
 def _sample(numbers: Integer) -> Integer:
-    if len(numbers) <= MOST_LINES:
+    if len(numbers) <= MAX_LINES:
         return numbers
-    chosen: Integer = np.sort(np.random.default_rng(SEED).choice(numbers, MOST_LINES, replace=False))
+    chosen: Integer = np.sort(np.random.default_rng(SAMPLE_SEED).choice(numbers, MAX_LINES, replace=False))
     return chosen

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Float, Integer
 
-_MOST_CELLS_PER_SIDE = 2000
+_MAX_CELLS_PER_SIDE = 2000
 
 
 class TargetIndex:
@@ -28,7 +28,7 @@ class TargetIndex:
         self._delta = delta
         low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
         # a little wider than δ, so that rounding cannot put a near point two cells away
-        self._side = max(delta * (1 + 1e-6), float((high - low).max()) / _MOST_CELLS_PER_SIDE)
+        self._side = max(delta * (1 + 1e-6), float((high - low).max()) / _MAX_CELLS_PER_SIDE)
         self._low = low - 2 * self._side
         self._columns, self._rows = (np.ceil((high - low) / self._side).astype(int) + 5).tolist()
         column, row = self._cells(xyz)

@@ -18,7 +18,7 @@ import shapely
 from ..arrays import Boolean, Float
 from .near_surfaces import caster_tolerance
 
-_ROUNDNESS = 1.01  # how much farther than δ the corners of the polygon lie that stands for a circle
+_POLYGON_FACTOR = 1.01  # how much farther than δ the corners of the polygon lie that stands for a circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +43,13 @@ class NeededTriangles:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many there are, are kept, and are dropped for each reason."""
+        """Numbers of all, of kept, and of dropped triangles by reason."""
         reasons = {field.name: int(getattr(self, field.name)) for field in fields(self)[1:]}
         return {"all": len(self.keep), "kept": int(self.keep.sum())} | reasons
 
 
-def triangles_sentence(counts: Mapping[str, int]) -> str:
-    """Say how many triangles rays are cast against and why the others could go, from `NeededTriangles.counts`."""
+def culling_message(counts: Mapping[str, int]) -> str:
+    """Describe how many triangles were kept and dropped, and why, from `NeededTriangles.counts`."""
     reasons = {
         "without_area": "without area",
         "above": "above all lines of sight",
@@ -79,12 +79,12 @@ def needed_triangles(triangles: Float, poses: Float, targets: Float, delta: floa
     NeededTriangles
     """
     tolerance = caster_tolerance(triangles)
-    radius = (delta + tolerance) * _ROUNDNESS
+    radius = (delta + tolerance) * _POLYGON_FACTOR
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     bottom = min(poses[:, 2].min(), targets[:, 2].min() - radius) - tolerance
     top = max(poses[:, 2].max(), targets[:, 2].max() + radius) + tolerance
     around_targets = shapely.MultiPoint(targets[:, :2]).convex_hull.buffer(radius)
-    around_poses = shapely.MultiPoint(poses[:, :2]).convex_hull.buffer(tolerance * _ROUNDNESS)
+    around_poses = shapely.MultiPoint(poses[:, :2]).convex_hull.buffer(tolerance * _POLYGON_FACTOR)
     plan = around_poses.union(around_targets).convex_hull
     shapely.prepare(plan)
     in_plan = shapely.box(*low[:, :2].T, *high[:, :2].T)

@@ -23,7 +23,7 @@ from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
 from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
 from .settings import VisibilitySettings
 
-_LEVEL = 1e-6
+_MAX_LEVEL_ANGLE = 1e-6
 """Radians that an upright sensor's axis may be off: Blender turns objects in single precision."""
 
 
@@ -97,7 +97,7 @@ def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, targets: Float
 
 
 def _is_upright(orientation: Float) -> bool:
-    return bool(orientation[2, 2] > 0 and math.hypot(*orientation[2, :2]) < _LEVEL)
+    return bool(orientation[2, 2] > 0 and math.hypot(*orientation[2, :2]) < _MAX_LEVEL_ANGLE)
 
 
 def _yaw(orientation: Float) -> float:

@@ -21,13 +21,13 @@ from ..traffic import Trajectories
 from ..traffic.bodies import fitted_body
 from ..visibility.ray_casting import engine_name
 
-SAME_TIME = 1e-6
+SAME_TIME_TOLERANCE = 1e-6
 """Seconds between two times that are one: of frames of Blender's timeline, and of a run."""
 
 
 @dataclass(frozen=True)
 class RecordingSettings:
-    """All that a user may choose about a recording.
+    """Settings of a recording.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def make_run(
     settings: RecordingSettings,
     versions: Mapping[str, str],
 ) -> Run:
-    """Gather all that the frames of a recording follow from.
+    """Gather the inputs of a recording's frames.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def frame_number(run: Run, time: float) -> tuple[int, float]:
     """
     number = int(np.abs(run.times - time).argmin())
     own = float(run.times[number])
-    return number, own if abs(own - time) < SAME_TIME else time
+    return number, own if abs(own - time) < SAME_TIME_TOLERANCE else time
 
 
 def record(

@@ -19,27 +19,27 @@ DRAWS_OF_KIND = 100
 
 
 @dataclass(frozen=True, eq=False)
-class RobustPlan:
-    """A plan with the evidence for it.
+class RobustSolution:
+    """A robust solution with the studies that support it.
 
     Parameters
     ----------
-    plan : Solution
+    solution : Solution
         Objective, bound and gap are of what the robustness settings ask for; its notes say so.
     study : RobustStudy
-        It beside the plan that trusts the map.
-    judged : PoseStudy
+        It beside the solution that trusts the map.
+    pose_study : PoseStudy
         What pose errors do to it.
     """
 
-    plan: Solution
+    solution: Solution
     study: RobustStudy
-    judged: PoseStudy
+    pose_study: PoseStudy
 
 
-def check_robust_objective(goal: Objective) -> None:
-    """Raise SeipError where a goal allows no settings."""
-    if goal.cheapest:
+def check_robust_objective(objective: Objective) -> None:
+    """Raise SeipError where an objective allows no settings."""
+    if objective.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
             "is of poses as planned and the empty road"
@@ -47,15 +47,15 @@ def check_robust_objective(goal: Objective) -> None:
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, settings: RobustnessSettings
-) -> Generator[Progress, None, RobustPlan]:
-    """Answer a goal on a survey for what may go wrong.
+    layout: Layout, grid: VisibilityGrid, objective: Objective, settings: RobustnessSettings
+) -> Generator[Progress, None, RobustSolution]:
+    """Optimise a placement for pose errors, failures or multiple looks, and study the result.
 
     Parameters
     ----------
     grid : VisibilityGrid
         Of the poses as planned.
-    goal : Objective
+    objective : Objective
         Of most coverage.
 
     Raises
@@ -63,25 +63,25 @@ def place_robustly(
     SeipError
         As for `check_robust_objective`, `placement_problem` and `solve_robust`.
     """
-    check_robust_objective(goal)
+    check_robust_objective(objective)
     site, models, around = layout.site, layout.models, surroundings(layout)
-    problem = placement_problem(site, grid.visible, models, goal)
+    problem = placement_problem(site, grid.visible, models, objective)
     study = yield from robust_study(around, problem, settings, [settings.risk], layout.settings.limits)
     (chosen,) = study.robust
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
     tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
-    judged = yield from pose_study(around, deployment, tried)
+    under_errors = yield from pose_study(around, deployment, tried)
     note = f"chosen for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
-    notes = (note, *chosen.placement.notes, robust_sentence(study), *pose_warnings(judged))
-    plan = Solution(with_count(goal, site), replace(chosen.placement, notes=notes), None, deployment)
-    return RobustPlan(plan, study, judged)
+    notes = (note, *chosen.placement.notes, robustness_message(study), *pose_warnings(under_errors))
+    solution = Solution(with_count(objective, site), replace(chosen.placement, notes=notes), None, deployment)
+    return RobustSolution(solution, study, under_errors)
 
 
-def robust_sentence(study: RobustStudy) -> str:
-    """Say what a placement for what may go wrong gives away, and what it saves."""
+def robustness_message(study: RobustStudy) -> str:
+    """Describe what a robust placement loses of the planned coverage, and what it saves under errors."""
     (chosen,) = study.robust
     return (
         f"against the placement for poses as planned it gives away {study.price(chosen):.2%} of planned coverage; "
-        f"{chosen.judged_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
+        f"{chosen.evaluated_by.describe_outcome()} is at least {chosen.low.describe()} in nineteen of twenty of "
         f"{study.settings.draws} unseen draws, not {study.beside(chosen).low.describe()}"
     )

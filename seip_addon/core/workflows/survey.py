@@ -285,7 +285,7 @@ def record_of(  # noqa: PLR0913  # what was asked for stands in the record
     traffic : mapping of str to value, optional
         The `TrafficSettings` that the plan was chosen with, by name; None for a plan that was not chosen on traffic.
     """
-    asked = {"goal": asdict(plan.goal), "pose_errors": pose_errors, "render": render}
+    asked = {"goal": asdict(plan.objective), "pose_errors": pose_errors, "render": render}
     if traffic is not None:
         asked["traffic"] = dict(traffic)
     run = Run(

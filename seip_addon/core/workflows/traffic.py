@@ -15,7 +15,7 @@ from ..placement.objective import Objective, Solution, placement_problem, with_c
 from ..progress import Progress
 from ..robustness.traffic_instants import check_runs, spread_instants
 from ..robustness.traffic_presence import road_user_seconds
-from ..robustness.traffic_study import WHAT, TrafficStudy, look_at_traffic, traffic_study, traffic_warnings
+from ..robustness.traffic_study import LAYER_NAMES, TrafficStudy, traffic_scenarios, traffic_study, traffic_warnings
 from ..robustness.visibility_in_traffic import TrafficLayer
 from ..settings import setting
 from ..site.site import Site
@@ -28,12 +28,12 @@ from .survey import Layout, surroundings
 _Run = TypeVar("_Run")
 
 EVALUATION_SHARE = 1 / 3
-"""Share of the runs, the last ones, that placements are evaluated in and not chosen on."""
+"""Share of the runs, the last ones, that placements are evaluated on and not optimised on."""
 
 
 @dataclass(frozen=True)
 class TrafficSettings:
-    """What a placement for traffic is chosen on, and evaluated by.
+    """Settings of placement for traffic: what must be seen, and how many instants are sampled.
 
     Parameters
     ----------
@@ -51,18 +51,20 @@ class TrafficSettings:
     layer: TrafficLayer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
     weights_from_traffic: bool = setting(default=False, help="weigh targets by the time that road users are there")
     instants: int = setting(24, "instants of traffic to choose on", minimum=1, metavar="N")
-    judged_at: int = setting(120, "instants of other runs to evaluate on", minimum=1, metavar="N")
+    evaluation_instants: int = setting(
+        120, "instants of other runs to evaluate on", minimum=1, option="judged-at", metavar="N"
+    )
     seed: int = setting(0, "of the instants; those to evaluate on have the next")
 
     def __post_init__(self) -> None:
-        for number in (self.instants, self.judged_at):
+        for number in (self.instants, self.evaluation_instants):
             if number < 1:
                 raise SeipError(f"ask for one instant of traffic or more, not {number}")
 
 
 @dataclass(frozen=True, eq=False)
 class TrafficRuns:
-    """Runs of traffic by what they are for.
+    """Runs of traffic, split into those to optimise on and those to evaluate on.
 
     Parameters
     ----------
@@ -78,15 +80,15 @@ class TrafficRuns:
 
 
 @dataclass(frozen=True, eq=False)
-class TrafficPlan:
-    """A plan for traffic with the study that it comes from: objective, bound and gap are of coverage in traffic."""
+class TrafficSolution:
+    """A solution for traffic with the study that it comes from: objective, bound and gap are of coverage in traffic."""
 
-    plan: Solution
+    solution: Solution
     study: TrafficStudy
 
 
 def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
-    """Return the runs to choose on, and those to evaluate in."""
+    """Return the runs to optimise on, and those to evaluate on."""
     last = max(1, round(EVALUATION_SHARE * len(runs)))
     return list(runs[:-last]), list(runs[-last:])
 
@@ -147,15 +149,15 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
 
 
 def place_in_traffic(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, runs: TrafficRuns, settings: TrafficSettings
-) -> Generator[Progress, None, TrafficPlan]:
-    """Answer a goal on a survey for the road in traffic, whose vehicles block the view.
+    layout: Layout, grid: VisibilityGrid, objective: Objective, runs: TrafficRuns, settings: TrafficSettings
+) -> Generator[Progress, None, TrafficSolution]:
+    """Optimise a placement for traffic, whose vehicles block the view, and evaluate it on other runs.
 
     Parameters
     ----------
     grid : VisibilityGrid
         Of the empty road.
-    goal : Objective
+    objective : Objective
         Of most coverage.
 
     Raises
@@ -163,29 +165,29 @@ def place_in_traffic(
     SeipError
         As for `check_robust_objective`, `placement_problem` and `spread_instants`.
     """
-    check_robust_objective(goal)
-    problem = placement_problem(layout.site, grid.visible, layout.models, goal)
+    check_robust_objective(objective)
+    problem = placement_problem(layout.site, grid.visible, layout.models, objective)
     if settings.weights_from_traffic:
         seconds = yield from road_user_seconds(layout.site.targets, runs.optimisation)
         problem = replace(problem, weights=problem.weights * seconds)
     around = surroundings(layout)
     chosen_at = spread_instants(runs.optimisation, settings.instants, settings.seed)
-    scenarios = yield from look_at_traffic(around, problem, chosen_at, settings.layer)
-    judged = spread_instants(runs.evaluation, settings.judged_at, settings.seed + 1)
-    study = yield from traffic_study(around, problem, scenarios, judged, layout.settings.limits)
+    scenarios = yield from traffic_scenarios(around, problem, chosen_at, settings.layer)
+    evaluation = spread_instants(runs.evaluation, settings.evaluation_instants, settings.seed + 1)
+    study = yield from traffic_study(around, problem, scenarios, evaluation, layout.settings.limits)
     placement = study.traffic.placement
     note = (
-        f"chosen to see the {WHAT[study.layer]} in traffic, on average over {study.chosen_at} instants: objective, "
-        "bound and gap are of that"
+        f"chosen to see the {LAYER_NAMES[study.layer]} in traffic, on average over {study.chosen_at} instants: "
+        "objective, bound and gap are of that"
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     notes = (note, *weighed, *placement.notes, *traffic_sentences(study), *traffic_warnings(study))
     deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
-    plan = Solution(with_count(goal, layout.site), replace(placement, notes=notes), None, deployment)
-    return TrafficPlan(plan, study)
+    solution = Solution(with_count(objective, layout.site), replace(placement, notes=notes), None, deployment)
+    return TrafficSolution(solution, study)
 
 
 def traffic_sentences(study: TrafficStudy) -> tuple[str, ...]:
     """Say what placing on traffic gains, and whether the instants that this is evaluated on were too few."""
-    gain = f"placing on traffic sees {study.won(study.layer).describe()} more of the {WHAT[study.layer]}"
+    gain = f"placing on traffic sees {study.gain(study.layer).describe()} more of the {LAYER_NAMES[study.layer]}"
     return (gain,) if study.is_converged() else (gain, "every other instant says something else: evaluate on more")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.lidar.rings import DIRECTIONS, beam_rings
+from seip_addon.core.lidar.rings import RING_AZIMUTHS, beam_rings
 
 MODELS = load_catalogue()
 
@@ -61,4 +61,4 @@ def test_the_cone_shows_the_lowest_and_the_highest_channel():
     ways = cone[:, 1] - cone[:, 0]
     elevation = np.degrees(np.arcsin(ways[:, 2] / np.linalg.norm(ways, axis=1)))
     assert sorted(set(np.round(elevation, 6))) == [-15.0, 15.0]
-    assert DIRECTIONS % 12 == 0
+    assert RING_AZIMUTHS % 12 == 0

@@ -11,7 +11,7 @@ from random_cases import cases
 from scipy.integrate import quad, solve_ivp
 from scipy.special import fresnel
 
-from seip_addon.core.opendrive.profile import NONE, profile
+from seip_addon.core.opendrive.profile import ZERO_PROFILE, profile
 from seip_addon.core.opendrive.reference_line import Clothoid, ReferenceLine, param_poly3, poly3
 
 curvatures = st.floats(-0.2, 0.2)
@@ -133,8 +133,8 @@ def test_each_record_of_a_profile_counts_from_its_own_start():
 def test_the_zeros_of_a_profile_are_found_within_its_records():
     records = profile([(0.0, (2.0, -1.0, 0.0, 0.0)), (5.0, (-1.0, 0.0, 1.0, 0.0)), (8.0, (1.0, 1e-300, 0.0, 0.0))])
     np.testing.assert_allclose(np.sort(records.zeros(9.0)), [2.0, 6.0])
-    assert NONE.zeros(9.0).tolist() == []
+    assert ZERO_PROFILE.zeros(9.0).tolist() == []
 
 
 def test_a_profile_without_records_is_zero():
-    np.testing.assert_array_equal(NONE(np.array([0.0, 5.0])), [0.0, 0.0])
+    np.testing.assert_array_equal(ZERO_PROFILE(np.array([0.0, 5.0])), [0.0, 0.0])

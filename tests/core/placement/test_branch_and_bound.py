@@ -49,8 +49,8 @@ def searched(instance, goal, most=10_000):
 def _relax(request):
     """Small problems have few children; relax their nodes none the less, and not at all."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(branch_and_bound, "WIDE", request.param)
-        patch.setattr(branch_and_bound, "RELAXED", 2)
+        patch.setattr(branch_and_bound, "MIN_CHILDREN", request.param)
+        patch.setattr(branch_and_bound, "MIN_SENSORS", 2)
         yield
 
 
@@ -139,7 +139,7 @@ def test_the_bound_falls_while_the_search_goes_on():
 def test_a_full_queue_changes_nothing(monkeypatch):
     instance = make_instance(street_problem(30, 200, seed=4, count=4))[0]
     plain = searched(instance, 0.0)
-    monkeypatch.setattr(branch_and_bound, "WAITING", 100)
+    monkeypatch.setattr(branch_and_bound, "MAX_WAITING_FOLLOWERS", 100)
     deep = searched(instance, 0.0)
     assert {tuple(choice) for choice in deep.found} == {tuple(choice) for choice in plain.found}
 

@@ -4,18 +4,18 @@ import math
 
 import pytest
 
-from seip_addon.core.placement.search_limits import OPERATIONS, Clock
+from seip_addon.core.placement.search_limits import OPERATIONS_PER_UNIT, Clock
 
 
 def test_work_counts_alike_on_every_machine() -> None:
     clock = Clock(math.inf, 3.0)
-    clock.spend(2 * OPERATIONS)
+    clock.spend(2 * OPERATIONS_PER_UNIT)
     assert (clock.elapsed, clock.left) == (pytest.approx(2.0, rel=1e-3), pytest.approx(1.0, rel=1e-3))
 
 
 def test_without_a_limit_of_work_time_is_the_measure() -> None:
     clock = Clock(100.0)
-    clock.spend(50 * OPERATIONS)
+    clock.spend(50 * OPERATIONS_PER_UNIT)
     assert clock.elapsed < 1.0
     assert clock.left > 99.0
 
@@ -27,7 +27,7 @@ def test_time_ends_a_limit_of_work_too() -> None:
 def test_what_a_part_spends_is_spent_of_the_whole() -> None:
     whole = Clock(math.inf, 10.0)
     part = whole.part(4.0)
-    part.spend(3 * OPERATIONS)
+    part.spend(3 * OPERATIONS_PER_UNIT)
     assert (part.left, whole.left) == (pytest.approx(1.0, rel=2e-3), pytest.approx(7.0, rel=1e-3))
     assert whole.part(100.0).left == whole.left
     assert whole.part(0.0, least=2.0).left == 2.0

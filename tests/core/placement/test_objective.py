@@ -60,7 +60,7 @@ def test_the_reverse_problem_reaches_its_coverage_at_the_least_price(example):
 
 def test_a_plan_tells_what_was_asked_and_what_greedy_finds(example):
     plan = finish(optimise(example.site, example.visible, example.models, Objective()))
-    assert plan.goal.count == 4
+    assert plan.objective.count == 4
     assert plan.greedy.objective <= plan.placement.objective
     assert plan.deployment.seen_by.tolist() == example.visible[plan.placement.chosen].sum(axis=0).tolist()
 

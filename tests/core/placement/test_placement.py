@@ -432,8 +432,8 @@ def test_breaking_ties_takes_no_longer_than_the_proof(monkeypatch: pytest.Monkey
         return broken(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(solver, "canonical_optimum", noted)
-    monkeypatch.setattr(solver, "LEAST_FOR_TIES", 0.5)
+    monkeypatch.setattr(solver, "MIN_TIE_BREAKING_WORK", 0.5)
     placement = finish(solver.solve_within(problem, "highs", clock))
     assert placement.status == "optimal"
     assert any("not all ties were broken" in note for note in placement.notes)
-    assert clock.work < proven[0] + 1.1 * max(proven[0], solver.LEAST_FOR_TIES)
+    assert clock.work < proven[0] + 1.1 * max(proven[0], solver.MIN_TIE_BREAKING_WORK)

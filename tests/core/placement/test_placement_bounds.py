@@ -55,9 +55,9 @@ def test_every_placement_that_reaches_the_goal_is_left(problem, share):
     assume(instance is not None)
     reaching = [choice for choice in feasible(instance) if instance.value(choice) >= share * instance.total]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bounds, "REVIEW", 2)
-        patch.setattr(bounds, "WORTHWHILE", 1.0)
-        patch.setattr(bounds, "FEW", 1)
+        patch.setattr(bounds, "REDUCTION_INTERVAL", 2)
+        patch.setattr(bounds, "MAX_KEPT_SHARE", 1.0)
+        patch.setattr(bounds, "MAX_LISTED_CHOICES", 1)
         keep, bound = finish(lagrangian_bound(instance, share * instance.total, forever()))
     assert all(np.isin(choice, keep).all() for choice in reaching)
     assert all(instance.value(choice) <= bound.value + instance.slack for choice in reaching)

@@ -27,7 +27,7 @@ thorough = cases(150)
 quick = cases(40)
 
 
-@pytest.mark.parametrize("listed", [1, tie_breaking.MANY], ids=["ties by programs", "ties listed"])
+@pytest.mark.parametrize("listed", [1, tie_breaking.MAX_SEARCHED_TIES], ids=["ties by programs", "ties listed"])
 @thorough
 @given(st.data())
 def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObject) -> None:
@@ -38,7 +38,7 @@ def test_equals_exhaustive_search_in_every_stage(listed: int, data: st.DataObjec
             finish(solve(problem))
         return
     best = min(feasible, key=lambda choice: merit(problem, choice))
-    with patch.object(tie_breaking, "MANY", listed):
+    with patch.object(tie_breaking, "MAX_SEARCHED_TIES", listed):
         found = finish(solve(problem))
     assert found.status == "optimal"
     assert merit(problem, tuple(found.chosen)) == merit(problem, best)

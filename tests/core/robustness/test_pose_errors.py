@@ -18,7 +18,7 @@ from seip_addon.core.estimates import mean_of, quantile_gain, quantile_of
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.progress import finish
-from seip_addon.core.robustness.pose_errors import KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
+from seip_addon.core.robustness.pose_errors import ERROR_KINDS, PoseDraws, PoseErrors, draw_errors, out_of_objects
 from seip_addon.core.robustness.pose_study import PoseStudySettings, pose_study, pose_warnings
 from seip_addon.core.robustness.visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
@@ -171,7 +171,7 @@ def test_without_errors_every_draw_covers_what_was_planned(placed):
 @pytest.mark.slow
 def test_a_study_says_who_is_to_blame(placed):
     study = study_of(placed, errors=PoseErrors(tilt=math.radians(8)))
-    assert set(study.by_kind) == set(KINDS)
+    assert set(study.by_kind) == set(ERROR_KINDS)
     assert study.together.whole.shape == (40,)
     losses = dict(zip(study.labels, study.loss_by_sensor(), strict=True))
     assert study.worst_sensor()[0] == max(losses, key=lambda label: losses[label].value)

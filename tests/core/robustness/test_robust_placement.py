@@ -128,7 +128,7 @@ def test_no_placement_is_better_where_branches_are_many(risk, count):
 
 @pytest.mark.parametrize("risk", [risk for risk in RISKS if risk.seen_by == 1])
 def test_without_time_the_bound_still_holds(risk, monkeypatch):
-    monkeypatch.setattr("seip_addon.core.robustness.robust_placement.LEAST_SECONDS", 1e-6)
+    monkeypatch.setattr("seip_addon.core.robustness.robust_placement.MIN_SECONDS", 1e-6)
     for seed in range(4):
         problem, views = crowd(seed, 4)
         answer = finish(solve_robust(problem, pack(views), risk, SolverLimits(time_limit=1e-6)))
@@ -141,7 +141,7 @@ def test_without_time_the_bound_still_holds(risk, monkeypatch):
 @pytest.mark.parametrize("risk", [Risk(seen_by=2), Risk(seen_by=3), Risk(seen_by=2, failure="worst")])
 @pytest.mark.parametrize("waiting", [10_000, 3])
 def test_the_bound_only_falls_and_never_below_what_can_be_reached(risk, waiting, monkeypatch):
-    monkeypatch.setattr("seip_addon.core.placement.branch_and_bound.WAITING", waiting)
+    monkeypatch.setattr("seip_addon.core.placement.branch_and_bound.MAX_WAITING_FOLLOWERS", waiting)
     problem, views = crowd(5, 5)
     instance, scale = make_instance(problem)
     instance = replace(instance, cover=risk.cover(5))

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.charts.traffic import negative, save_promise_chart, save_time_map
+from headless.charts.traffic import negative, save_time_map, save_traffic_chart
 from headless.lab.stability.robustness_rows import traffic_rows
 
 import numpy as np
@@ -24,7 +24,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.robustness.robust_placement import at_least
 from seip_addon.core.robustness.traffic_instants import NO_TRAFFIC, WARM_UP, spread_instants
 from seip_addon.core.robustness.traffic_presence import road_user_seconds
-from seip_addon.core.robustness.traffic_study import look_at_traffic, traffic_study, traffic_warnings
+from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study, traffic_warnings
 from seip_addon.core.robustness.visibility_in_traffic import visibility_in_traffic
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
@@ -61,7 +61,7 @@ def laid_out():
 @pytest.fixture(scope="module", params=["road", "height"])
 def study(request, laid_out):
     around, problem = laid_out
-    scenarios = finish(look_at_traffic(around, problem, spread_instants([queue(1), queue(2)], 6, 0), request.param))
+    scenarios = finish(traffic_scenarios(around, problem, spread_instants([queue(1), queue(2)], 6, 0), request.param))
     return scenarios, finish(traffic_study(around, problem, scenarios, spread_instants([queue(3)], 8, 1)))
 
 
@@ -89,7 +89,7 @@ def test_both_are_judged_at_instants_that_nothing_was_chosen_on(laid_out, study)
             assert seen.time == pytest.approx(rows.mean(axis=0), abs=1e-12)
             assert seen.hidden_at == pytest.approx((seen.empty_targets & ~rows).mean(axis=1), abs=1e-12)
             assert seen.hidden.value == pytest.approx(seen.hidden_at.mean() / seen.empty, abs=1e-12)
-            assert seen.hidden.value * seen.empty >= seen.lost.value - 1e-12
+            assert seen.hidden.value * seen.empty >= seen.loss.value - 1e-12
         assert (placed.seen["height"].at <= placed.seen["height"].empty + 1e-12).all()
 
 
@@ -107,14 +107,14 @@ def test_on_the_instants_that_it_was_chosen_on_it_loses_to_none(laid_out, study)
 
 
 def look(around, problem, instants, layer):
-    return finish(look_at_traffic(around, problem, instants, layer)).views.packed[0]
+    return finish(traffic_scenarios(around, problem, instants, layer)).views.packed[0]
 
 
 def test_it_says_what_traffic_hides(study):
     _, found = study
     hidden = found.empty.seen["height"]
-    assert hidden.lost.value > 0.01
-    assert any(f"{hidden.lost.value:.1%} less" in sentence for sentence in traffic_warnings(found))
+    assert hidden.loss.value > 0.01
+    assert any(f"{hidden.loss.value:.1%} less" in sentence for sentence in traffic_warnings(found))
     nothing = replace(hidden, at=np.full_like(hidden.at, hidden.empty - 0.004))
     quiet = replace(found, empty=replace(found.empty, seen={"road": nothing, "height": nothing}))
     quiet = replace(quiet, traffic=quiet.empty)
@@ -129,7 +129,7 @@ def test_it_says_what_traffic_hides(study):
     assert "24 road users at a time" in rows[0].regime
     road = found.empty.seen["road"]
     assert f"of what the empty road promises vehicles hide {road.hidden.describe()}" in rows[0].begins
-    assert f", {found.won(found.layer).as_points()} more" in rows[2].begins
+    assert f", {found.gain(found.layer).as_points()} more" in rows[2].begins
 
 
 def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_empty_road(study):
@@ -145,12 +145,12 @@ def test_a_search_cut_short_returns_nothing_worse_than_the_placement_for_the_emp
 def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
     around, problem = laid_out
     runs = [parked((0.0, 3000.0, 0.0, 0.0, 0.0))]  # somewhere else
-    scenarios = finish(look_at_traffic(around, problem, spread_instants(runs, 2, 0)))
+    scenarios = finish(traffic_scenarios(around, problem, spread_instants(runs, 2, 0)))
     found = finish(traffic_study(around, problem, scenarios, spread_instants(runs, 8, 1)))
     assert found.empty.placement.chosen.tolist() == found.traffic.placement.chosen.tolist()
     for seen in found.empty.seen.values():
         assert (seen.at == seen.empty).all()
-        assert seen.rarely == 0.0
+        assert seen.rarely_seen == 0.0
     assert traffic_warnings(found) == ()
     assert (scenarios.views.seen(0) == finish(visibility_in_traffic(around, np.arange(16), [NO_TRAFFIC])).seen(0))[
         problem.allowed
@@ -159,14 +159,12 @@ def test_without_anyone_on_the_road_nothing_is_lost(laid_out):
 
 def test_instants_near_in_time_count_once():
     random = np.random.default_rng(0)
-    stretch = np.repeat(np.arange(12), 20)
-    values = random.normal(size=12)[stretch] + 0.01 * random.normal(size=240)
-    honest, naive = mean_over_time(values, stretch), mean_of(values)
+    batch = np.repeat(np.arange(12), 20)
+    values = random.normal(size=12)[batch] + 0.01 * random.normal(size=240)
+    honest, naive = mean_over_time(values, batch), mean_of(values)
     assert honest.value == pytest.approx(naive.value)
     assert 3.0 < (honest.high - honest.low) / (naive.high - naive.low) < 6.0
-    assert mean_over_time(values[:60], stretch[:60]) == IntervalEstimate(
-        math.fsum(values[:60]) / 60, -math.inf, math.inf
-    )
+    assert mean_over_time(values[:60], batch[:60]) == IntervalEstimate(math.fsum(values[:60]) / 60, -math.inf, math.inf)
     assert negative(IntervalEstimate(1.0, -2.0, 3.0)) == IntervalEstimate(-1.0, -3.0, 2.0)
 
 
@@ -215,7 +213,7 @@ def test_charts_are_drawn_and_the_same_twice(tmp_path, laid_out, study):
     deployment = deploy(around.site, MODELS, problem.visible, found.traffic.placement.chosen)
     for name in ("one.png", "two.png"):
         save_time_map(tmp_path / name, make_geometry(80.0), around.site, deployment, found.traffic, "A title")
-        save_promise_chart(tmp_path / f"chart {name}", [("1 × a", found), ("2 × a", found)], "A title")
+        save_traffic_chart(tmp_path / f"chart {name}", [("1 × a", found), ("2 × a", found)], "A title")
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
     assert (tmp_path / "chart one.png").read_bytes() == (tmp_path / "chart two.png").read_bytes()
     assert imread(tmp_path / "one.png")[..., :3].std() > 0.05

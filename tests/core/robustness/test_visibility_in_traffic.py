@@ -18,14 +18,14 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import BeamPattern
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_instants import (
+    BATCH_SECONDS,
     NO_TRAFFIC,
-    STRETCH,
     WARM_UP,
     check_runs,
     obstacles_of,
     spread_instants,
 )
-from seip_addon.core.robustness.visibility_in_traffic import HEIGHT, visibility_in_traffic
+from seip_addon.core.robustness.visibility_in_traffic import LAYER_HEIGHT, visibility_in_traffic
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
@@ -105,7 +105,7 @@ def beams_past(bodies, pose):
     (model,) = place.models
     directions = BeamPattern(model, place.yaw).directions(np.arange(model.channels * model.azimuth_count))
     end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
-    points = SITE.targets.xyz + np.array([0.0, 0.0, HEIGHT])
+    points = SITE.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT])
     passed = np.zeros(len(points), dtype=bool)
     for number, point in enumerate(points):
         ahead = directions @ (point - place.origin)
@@ -195,7 +195,7 @@ def test_instants_are_spread_over_all_runs_and_follow_from_the_seed():
     for run in (0, 1):
         part = np.floor((one.time[one.run == run] - WARM_UP) / (10.0 - WARM_UP) * 16)
         assert part.tolist() == list(range(16))
-    assert len(np.unique(one.stretch)) == 2 * max(1, round((10.0 - WARM_UP) / STRETCH))
+    assert len(np.unique(one.batch)) == 2 * max(1, round((10.0 - WARM_UP) / BATCH_SECONDS))
     assert [len(crowd.hulls) for crowd in one.obstacles()] == [1] * 16 + [2] * 16
 
 

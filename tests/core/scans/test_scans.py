@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields, replace
 
-from headless.lab.benchmark.scans import SAME, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
+from headless.lab.benchmark.scans import SLACK, combined, differing, exact_hit, full_scan, grazes, passes_an_edge
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ from seip_addon.core.scans import (
     static_scene,
 )
 from seip_addon.core.scans.beam_culling import BeamWindows
-from seip_addon.core.scans.frame import STATIC
+from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.scans.motion import rotations
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.traffic import RoadUser
@@ -106,7 +106,7 @@ def test_what_no_sensor_sees_is_labelled() -> None:
     wall = box_triangles((5.0, -20.0, 0.0), (6.0, 20.0, 10.0))
     frame = simulation(make_static(ground(), wall), [make_sensor()], parked((20.0, 0.0, 0.0, 0.0, 0.0))).frame(0, 0.0)
     assert (frame.labels.visibility.tolist(), frame.labels.points.tolist()) == ([0.0], [[0]])
-    assert (frame.instance == STATIC).all()
+    assert (frame.instance == STATIC_INSTANCE).all()
 
 
 def test_a_box_on_a_slope_has_its_middle_over_its_underside() -> None:
@@ -157,7 +157,7 @@ def test_merged_returns_are_those_of_a_full_scan(engine, place) -> None:
         rays = differing(scan, full)
         same_place = np.isfinite(full.distance)
         same_place[rays] = False
-        np.testing.assert_allclose(scan.distance[same_place], full.distance[same_place], atol=SAME, rtol=0)
+        np.testing.assert_allclose(scan.distance[same_place], full.distance[same_place], atol=SLACK, rtol=0)
         np.testing.assert_allclose(scan.intensity[same_place], full.intensity[same_place], atol=1e-5)
         for ray in rays:
             assert grazes(scanner.sensor.xyz, scanner.directions[ray], surface.caster.triangles, scan.distance[ray])
@@ -228,7 +228,7 @@ def test_noise_of_what_stands_still_does_not_depend_on_the_traffic() -> None:
     made = simulation(static, [sensor], cars, NOISY)
     with_car, without = made.frame(4, 0.0), made.frame(4, 5.0)
     points = {tuple(point) for point in without.points.tolist()}
-    still = [tuple(point) for point in with_car.points[with_car.instance == STATIC].tolist()]
+    still = [tuple(point) for point in with_car.points[with_car.instance == STATIC_INSTANCE].tolist()]
     assert 0 < len(still) < len(points)
     assert set(still) <= points
 
@@ -244,7 +244,7 @@ def test_runs_of_traffic_have_independent_noise() -> None:
     one, other = (
         simulation(static, [sensor], parked((10.0, y, 0.0, 0.0, 0.0)), NOISY).frame(4, 0.0) for y in (0.0, 1e-3)
     )
-    still, elsewhere = (frame.points[frame.instance == STATIC] for frame in (one, other))
+    still, elsewhere = (frame.points[frame.instance == STATIC_INSTANCE] for frame in (one, other))
     assert len(still) > 1000
     assert share_in(still, elsewhere) < 0.01
 

@@ -9,7 +9,7 @@ from street_map import street_map
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.site.obstruction import BARE
+from seip_addon.core.site.obstruction import NO_OBSTACLES_MESSAGE
 from seip_addon.core.site.scene_geometry import Mesh, Pole
 from seip_addon.core.streetscape.description import SiteDescription, Trees
 from seip_addon.core.streetscape.model import site_model
@@ -32,7 +32,7 @@ POLE = Pole("mast", np.array((0.0, 9.0, 0.1)), 6.0)
 def test_only_what_is_high_and_wide_hides_anything(occluders, bare):
     """The scene has one pole; its own mesh does not count."""
     layout = lay_out(street(poles=(POLE,), occluders=occluders), SETTINGS)
-    assert layout.warnings.count(BARE) == bare
+    assert layout.warnings.count(NO_OBSTACLES_MESSAGE) == bare
 
 
 def test_a_bare_map_says_so_once_when_it_is_built(tmp_path):
@@ -40,5 +40,5 @@ def test_a_bare_map_says_so_once_when_it_is_built(tmp_path):
     path.write_text(street_map(), encoding="utf-8")
     here = SiteDescription(near=(0.0, 0.0), radius=30.0)
     tree = Trees(np.array([[-20.0, 9.0]]), 8.0, 5.0)
-    assert finish(site_model(read_map(path), here)).warnings == (BARE,)
+    assert finish(site_model(read_map(path), here)).warnings == (NO_OBSTACLES_MESSAGE,)
     assert finish(site_model(read_map(path), replace(here, trees=(tree,)))).warnings == ()

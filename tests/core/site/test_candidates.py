@@ -11,20 +11,20 @@ from plain_street import PLAIN, block, street
 from random_cases import cases
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.site.candidates import lay_candidates
+from seip_addon.core.site.candidates import generate_candidates
 from seip_addon.core.site.pavement_sampling import spread
 from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
 
 
 def test_posts_keep_the_setback_and_stand_on_the_pavement():
-    candidates = lay_candidates(street(), replace(PLAIN, setback=1.0))
+    candidates = generate_candidates(street(), replace(PLAIN, setback=1.0))
     assert candidates.position[:, 1].min() >= 8.0 - 1e-6
     np.testing.assert_allclose(candidates.position[:, 2], 0.1)
     np.testing.assert_allclose(candidates.xyz[:, 2], 0.1 + candidates.height)
 
 
 def test_poses_are_positions_by_heights_by_types():
-    candidates = lay_candidates(street(), replace(PLAIN, sensors=("type1", "type3")))
+    candidates = generate_candidates(street(), replace(PLAIN, sensors=("type1", "type3")))
     positions = len(candidates.position)
     assert len(candidates) == positions * 2 * 2
     assert np.bincount(candidates.position_of).tolist() == [4] * positions
@@ -92,7 +92,7 @@ def test_the_work_of_spreading_grows_with_the_positions_alone(monkeypatch):
 
 def test_a_pole_carries_its_sensor_on_a_bracket_towards_the_region():
     pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
-    candidates = lay_candidates(street(candidate_areas=shapely.Polygon(), poles=(pole,)), PLAIN)
+    candidates = generate_candidates(street(candidate_areas=shapely.Polygon(), poles=(pole,)), PLAIN)
     assert candidates.position_name.tolist() == ["signal"]
     assert candidates.on_pole.all()
     np.testing.assert_allclose(candidates.xyz, [(0, 8.6, 3.6), (0, 8.6, 8.1)])
@@ -100,7 +100,7 @@ def test_a_pole_carries_its_sensor_on_a_bracket_towards_the_region():
 
 def test_a_pole_serves_its_surroundings():
     pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
-    candidates = lay_candidates(street(poles=(pole,)), PLAIN)
+    candidates = generate_candidates(street(poles=(pole,)), PLAIN)
     posts = candidates.position[~candidates.on_pole]
     assert np.hypot(posts[:, 0], posts[:, 1] - 9.0).min() >= 2.0 - 1e-6
 
@@ -108,13 +108,13 @@ def test_a_pole_serves_its_surroundings():
 def test_a_pole_serves_half_the_spacing_and_no_more():
     pole = Pole("signal", np.array((0.0, 9.0, 0.1)))
     beside = shapely.box(2.5, 8.5, 3.5, 9.5)
-    candidates = lay_candidates(street(poles=(pole,), candidate_areas=beside), PLAIN)
+    candidates = generate_candidates(street(poles=(pole,), candidate_areas=beside), PLAIN)
     assert candidates.on_pole.tolist().count(False) == 1
 
 
 def test_no_sensor_hangs_above_its_pole():
     poles = (Pole("low", np.array((0.0, 9.0, 0.1)), 6.0), Pole("mark", np.array((20.0, 9.0, 0.1))))
-    candidates = lay_candidates(
+    candidates = generate_candidates(
         street(candidate_areas=shapely.Polygon(), poles=poles), replace(PLAIN, heights=(3.5, 6.5, 6.6, 8.0))
     )
     heights = {name: candidates.height[candidates.position_of == i] for i, name in enumerate(candidates.position_name)}
@@ -125,7 +125,7 @@ def test_no_sensor_hangs_above_its_pole():
 
 def test_what_lies_inside_an_object_is_dropped_and_counted():
     shed = Mesh("shed", block((-5, 6.5, 0), (5, 12, 5)))
-    candidates = lay_candidates(street(occluders=(shed,)), replace(PLAIN, heights=(3.5,)))
+    candidates = generate_candidates(street(occluders=(shed,)), replace(PLAIN, heights=(3.5,)))
     assert (np.abs(candidates.position[:, 0]) > 5).all()
     assert candidates.dropped["inside an object"] >= 2
 
@@ -133,14 +133,14 @@ def test_what_lies_inside_an_object_is_dropped_and_counted():
 def test_posts_keep_clear_of_walls_but_low_kerbs_are_none():
     wall = Mesh("wall", block((-40, 9.5, 0), (40, 9.6, 2)))
     kerb = Mesh("kerb", block((-40, 7.0, 0), (40, 8.0, 0.25)))
-    candidates = lay_candidates(street(occluders=(wall, kerb)), replace(PLAIN, clearance=1.0, setback=0.2))
+    candidates = generate_candidates(street(occluders=(wall, kerb)), replace(PLAIN, clearance=1.0, setback=0.2))
     assert candidates.position[:, 1].max() <= 8.5 + 1e-6
     assert candidates.position[:, 1].min() < 8.0
 
 
 def test_a_crown_stops_the_tall_post_and_lets_the_low_one_stand():
     crown = Mesh("crown", block((-40, 6, 5), (40, 12, 7)))
-    candidates = lay_candidates(street(occluders=(crown,)), PLAIN)
+    candidates = generate_candidates(street(occluders=(crown,)), PLAIN)
     assert set(candidates.height) == {3.5}
     assert candidates.dropped["too close to a wall or object"] > 0
 
@@ -151,16 +151,16 @@ def test_a_sensor_keeps_its_clearance_from_what_is_above_it(above, free):
     roof = Mesh("roof", block((-60, 0, low), (60, 20, low + 1)))
     settings = replace(PLAIN, heights=(3.5,), clearance=0.3)
     if free:
-        assert len(lay_candidates(street(occluders=(roof,)), settings))
+        assert len(generate_candidates(street(occluders=(roof,)), settings))
     else:
         with pytest.raises(SeipError, match="too close to a wall or object"):
-            lay_candidates(street(occluders=(roof,)), settings)
+            generate_candidates(street(occluders=(roof,)), settings)
 
 
 def test_forbidden_areas_and_poles_are_left_out():
     poles = (Pole("a", np.array((0.0, 9.0, 0.1)), forbidden=True), Pole("b", np.array((9.0, 9.0, 0.1))))
     area = NamedArea("museum", shapely.box(-40, 0, -10, 20))
-    candidates = lay_candidates(street(poles=poles, forbidden_areas=(area,)), PLAIN)
+    candidates = generate_candidates(street(poles=poles, forbidden_areas=(area,)), PLAIN)
     assert "a" not in candidates.position_name
     assert "b" in candidates.position_name
     assert candidates.position[:, 0].min() > -10
@@ -171,7 +171,7 @@ def test_forbidden_areas_and_poles_are_left_out():
 def test_mandatory_places_become_groups():
     poles = (Pole("signal", np.array((0.0, 9.0, 0.1)), mandatory=True),)
     area = NamedArea("school", shapely.box(10, 0, 20, 20))
-    candidates = lay_candidates(street(poles=poles, mandatory_areas=(area,)), PLAIN)
+    candidates = generate_candidates(street(poles=poles, mandatory_areas=(area,)), PLAIN)
     assert candidates.mandatory_name.tolist() == ["signal", "school"]
     assert candidates.mandatory[0].sum() == 1
     inside = (candidates.position[:, 0] >= 10) & (candidates.position[:, 0] <= 20)
@@ -182,8 +182,8 @@ def test_mandatory_places_become_groups():
 def test_names_and_order_of_poles_change_no_place(order):
     feet = np.array([(x, 9.0, 0.1) for x in (-20.0, -3.0, 5.0, 17.0)])
     poles = tuple(Pole(f"pole {i}", feet[i]) for i in range(4))
-    one = lay_candidates(street(poles=poles), PLAIN)
-    two = lay_candidates(street(poles=tuple(replace(poles[i], name=f"x{i}") for i in order)), PLAIN)
+    one = generate_candidates(street(poles=poles), PLAIN)
+    two = generate_candidates(street(poles=tuple(replace(poles[i], name=f"x{i}") for i in order)), PLAIN)
     assert one.xyz.tobytes() == two.xyz.tobytes()
 
 
@@ -220,4 +220,4 @@ def test_names_and_order_of_poles_change_no_place(order):
 )
 def test_each_fault_has_its_sentence(changes, options, sentence):
     with pytest.raises(SeipError, match=sentence):
-        lay_candidates(street(**changes), replace(PLAIN, **options))
+        generate_candidates(street(**changes), replace(PLAIN, **options))

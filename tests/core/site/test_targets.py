@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.plan import surface_height
 from seip_addon.core.site.scene_geometry import NamedArea
-from seip_addon.core.site.targets import lay_targets
+from seip_addon.core.site.targets import generate_targets
 
 
 def rectangle(low_x, low_y, high_x, high_y, slope=0.0):
@@ -19,20 +19,20 @@ def rectangle(low_x, low_y, high_x, high_y, slope=0.0):
 
 
 def test_a_square_holds_a_centred_grid():
-    targets = lay_targets(shapely.box(0, 0, 4, 2), rectangle(-10, -10, 10, 10), 1.0)
+    targets = generate_targets(shapely.box(0, 0, 4, 2), rectangle(-10, -10, 10, 10), 1.0)
     assert len(targets) == 4 * 2
     assert targets.xyz.min(axis=0).tolist() == [0.5, 0.5, 0]
     assert targets.xyz.max(axis=0).tolist() == [3.5, 1.5, 0]
 
 
 def test_targets_off_the_road_are_left_out():
-    targets = lay_targets(shapely.box(0, 0, 10, 10), rectangle(0, 0, 5, 10), 1.0)
+    targets = generate_targets(shapely.box(0, 0, 10, 10), rectangle(0, 0, 5, 10), 1.0)
     assert targets.xyz[:, 0].max() <= 5
     assert len(targets) == 5 * 10
 
 
 def test_the_height_is_the_roads():
-    targets = lay_targets(shapely.box(0, 0, 10, 2), rectangle(-20, -20, 20, 20, slope=0.1), 1.0)
+    targets = generate_targets(shapely.box(0, 0, 10, 2), rectangle(-20, -20, 20, 20, slope=0.1), 1.0)
     np.testing.assert_allclose(targets.xyz[:, 2], 0.1 * targets.xyz[:, 0], atol=1e-6)
 
 
@@ -46,7 +46,7 @@ def test_the_highest_of_two_roads_counts():
 
 def test_weights_multiply_where_regions_overlap():
     regions = (NamedArea("a", shapely.box(-1, -1, 2, 9), 2.0), NamedArea("b", shapely.box(1, -1, 9, 9), 3.0))
-    targets = lay_targets(shapely.box(0, 0, 4, 0.5), rectangle(-9, -9, 9, 9), 1.0, regions)
+    targets = generate_targets(shapely.box(0, 0, 4, 0.5), rectangle(-9, -9, 9, 9), 1.0, regions)
     assert targets.weight.tolist() == [2, 6, 3, 3]
     assert targets.central.all()
 
@@ -58,8 +58,8 @@ def test_weights_multiply_where_regions_overlap():
 def test_moving_the_scene_moves_the_targets(shift, spacing):
     move = np.array((*shift, 0.0))
     region, road = shapely.box(0, 0, 7.3, 4.1), rectangle(-20, -20, 20, 20)
-    still = lay_targets(region, road, spacing)
-    moved = lay_targets(shapely.transform(region, lambda xy: xy + move[:2]), road + move, spacing)
+    still = generate_targets(region, road, spacing)
+    moved = generate_targets(shapely.transform(region, lambda xy: xy + move[:2]), road + move, spacing)
     assert len(moved) == len(still)
     np.testing.assert_allclose(moved.xyz - move, still.xyz, atol=2e-6)
 
@@ -77,10 +77,10 @@ def test_moving_the_scene_moves_the_targets(shift, spacing):
 )
 def test_each_fault_has_its_sentence(region, spacing, sentence):
     with pytest.raises(SeipError, match=sentence):
-        lay_targets(region, rectangle(-10, -10, 10, 10), spacing)
+        generate_targets(region, rectangle(-10, -10, 10, 10), spacing)
 
 
 def test_a_weight_must_be_positive():
     regions = (NamedArea("centre", shapely.box(0, 0, 1, 1), -1.0),)
     with pytest.raises(SeipError, match="weight of 'centre'"):
-        lay_targets(shapely.box(0, 0, 4, 4), rectangle(-10, -10, 10, 10), 1.0, regions)
+        generate_targets(shapely.box(0, 0, 4, 4), rectangle(-10, -10, 10, 10), 1.0, regions)

@@ -168,7 +168,7 @@ def test_a_claim_of_64_gib_costs_no_memory(stored):
 
 
 def test_a_file_that_does_not_fit_into_memory_is_refused_by_its_size(stored, monkeypatch):
-    monkeypatch.setattr(array_file, "LARGEST", 400)
+    monkeypatch.setattr(array_file, "MAX_BYTES", 400)
     with pytest.raises(SeipError, match="it holds more than"):
         Trajectories.load(stored)
 

@@ -12,7 +12,7 @@ from street_map import street_map
 
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.site.candidates import assumed_pole_warnings, lay_candidates
+from seip_addon.core.site.candidates import assumed_pole_warnings, generate_candidates
 from seip_addon.core.site.scene_geometry import ASSUMED, DESCRIBED, FROM_MAP, Pole
 from seip_addon.core.streetscape.description import Poles, SiteDescription
 from seip_addon.core.streetscape.model import site_model
@@ -171,7 +171,7 @@ def test_objects_without_a_type_count_by_their_name_and_shape(tmp_path, kind, na
 
 def test_assumed_poles_are_no_candidates_unless_asked_for():
     scene = street(poles=(Pole("a", np.array((0.0, 9.0, 0.1)), source=ASSUMED), Pole("b", np.array((9.0, 9.0, 0.1)))))
-    plain, asked = lay_candidates(scene, PLAIN), lay_candidates(scene, replace(PLAIN, assumed_poles=True))
+    plain, asked = generate_candidates(scene, PLAIN), generate_candidates(scene, replace(PLAIN, assumed_poles=True))
     assert "a" not in plain.position_name
     assert plain.dropped["assumed poles"] == 1
     assert "1 pole is assumed" in assumed_pole_warnings(scene, plain)[0]
@@ -183,4 +183,4 @@ def test_assumed_poles_are_no_candidates_unless_asked_for():
 
 def test_an_assumed_pole_that_is_marked_mandatory_is_meant():
     scene = street(poles=(Pole("a", np.array((0.0, 9.0, 0.1)), source=ASSUMED, mandatory=True),))
-    assert "a" in lay_candidates(scene, PLAIN).position_name
+    assert "a" in generate_candidates(scene, PLAIN).position_name

@@ -75,12 +75,12 @@ def test_lamps_face_the_side_that_is_asked_for(faces_left, side):
 def test_windows_stand_just_before_each_side():
     square = np.array([[0, 0], [12, 0], [12, 12], [0, 12]], dtype=float)
     panes = furniture.windows(square, 1.0, 9.6)
-    bays, storeys = int(12 / furniture.BAY), 3
+    bays, storeys = int(12 / furniture.WINDOW_SPACING), 3
     assert len(panes.faces) == 4 * bays * storeys
     assert panes.vertices[:, 2].min() > 1.0
     assert panes.vertices[:, 2].max() < 1.0 + 9.6
     distance = np.maximum(-panes.vertices[:, :2], panes.vertices[:, :2] - 12).max(axis=1)
-    np.testing.assert_allclose(distance, furniture.WINDOW_PROUD, atol=1e-9)
+    np.testing.assert_allclose(distance, furniture.WINDOW_OFFSET, atol=1e-9)
 
 
 def test_joining_keeps_every_face():

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import CATEGORIES, RoadUser
-from seip_addon.core.traffic.bodies import COLOURS, MESHES, REFLECTIVITY, colour_of, fitted_body, read_mesh
+from seip_addon.core.traffic.bodies import MESHES, PAINT_COLOURS, REFLECTIVITY, colour_of, fitted_body, read_mesh
 
 USUAL = {
     "hatchback": ("car", 3.9, 1.75, 1.48),
@@ -256,7 +256,7 @@ def test_users_of_one_size_share_arrays_that_cannot_be_written():
 
 
 def test_every_reflectivity_has_a_colour():
-    assert [colour_of(limit) for limit, _ in COLOURS] == [name for _, name in COLOURS]
+    assert [colour_of(limit) for limit, _ in PAINT_COLOURS] == [name for _, name in PAINT_COLOURS]
     assert colour_of(0.0) == "black"
     assert colour_of(1.2) == "white"
 

@@ -14,7 +14,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.traffic import RoadUser, Trajectories
 from seip_addon.core.traffic.overlaps import find_overlaps, footprints, without_overlaps
-from seip_addon.core.traffic.road_fit import TOLERANCE, fit_to_road
+from seip_addon.core.traffic.road_fit import ROAD_TOLERANCE, fit_to_road
 from seip_addon.core.traffic.smooth_walks import smooth_walks
 
 GRADE = 0.05
@@ -113,11 +113,11 @@ def test_pedestrians_walk_on_pavements_and_vehicles_do_not():
 
 def test_a_little_beside_the_road_still_counts():
     region = shapely.box(-80.0, -9.0, 80.0, 9.0)
-    near = fit_to_road(moving([10.0, 11.0], 4.0 + 0.9 * TOLERANCE), scene(region=region))
+    near = fit_to_road(moving([10.0, 11.0], 4.0 + 0.9 * ROAD_TOLERANCE), scene(region=region))
     assert not near.warnings
     np.testing.assert_allclose(near.trajectories.position[:, 2], [0.5, 0.55], atol=1e-3)
     with pytest.raises(SeipError, match="off the road"):
-        fit_to_road(moving([10.0, 11.0], 4.0 + 1.1 * TOLERANCE), scene(region=region))
+        fit_to_road(moving([10.0, 11.0], 4.0 + 1.1 * ROAD_TOLERANCE), scene(region=region))
 
 
 def test_who_leaves_the_road_is_named_and_cut_in_two():
@@ -125,7 +125,7 @@ def test_who_leaves_the_road_is_named_and_cut_in_two():
     y = np.where(np.abs(np.arange(-20.0, 21.0)) < 3.0, 15.0, 0.0)
     fit = fit_to_road(together(moving(np.arange(-20.0, 21.0), y), moving([0.0, 1.0], 0.0)), scene(region=region))
     assert fit.warnings == (
-        f"1 of 2 road users leave the road by more than {TOLERANCE:g} m and are left out there: car",
+        f"1 of 2 road users leave the road by more than {ROAD_TOLERANCE:g} m and are left out there: car",
     )
     assert [user.name for user in fit.trajectories.users] == ["car", "car/2", "car"]
     assert np.diff(fit.trajectories.first).tolist() == [18, 18, 2]
@@ -138,7 +138,7 @@ def test_who_leaves_the_scene_and_comes_back_is_no_mistake():
     fit = fit_to_road(together(moving(x, 0.0), moving([0.0, 1.0], 0.0)), scene())
     assert not fit.warnings
     assert [user.name for user in fit.trajectories.users] == ["car", "car/2", "car"]
-    assert fit.trajectories.position[:, 0].max() <= 100.0 + TOLERANCE
+    assert fit.trajectories.position[:, 0].max() <= 100.0 + ROAD_TOLERANCE
 
 
 def test_a_gap_in_time_ends_a_stay():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from random_cases import cases
 
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.visibility.triangle_culling import needed_triangles, triangles_sentence
+from seip_addon.core.visibility.triangle_culling import culling_message, needed_triangles
 
 
 @each_engine
@@ -43,7 +43,7 @@ def test_each_reason_is_counted_and_said() -> None:
     assert needed.keep.tolist() == [True, False, False, False, False, False]
     reasons = {"without_area": 1, "above": 1, "below": 1, "beside": 1, "out_of_range": 1}
     assert needed.counts == {"all": 6, "kept": 1} | reasons
-    sentence = triangles_sentence(needed.counts)
+    sentence = culling_message(needed.counts)
     assert sentence.startswith("rays are cast against 1 of 6 triangles; dropped: 1 without area, 1 above")
 
 

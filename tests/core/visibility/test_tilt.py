@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from headless.convergence import Judge
+from headless.convergence import Evaluator
 from headless.lab.stability.criterion import in_view
 
 import numpy as np
@@ -25,7 +25,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.robustness.pose_errors import PoseDraws
 from seip_addon.core.robustness.visibility_under_errors import Surroundings, visibility_under_errors
 from seip_addon.core.scans.sensor import level_orientation
-from seip_addon.core.site.candidates import CandidateSettings, lay_candidates, tilts_of
+from seip_addon.core.site.candidates import CandidateSettings, generate_candidates, tilts_of
 from seip_addon.core.site.scene_geometry import Mesh, Pole, SceneGeometry
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.storage.files import digest
@@ -136,8 +136,8 @@ def test_rays_are_turned_to_the_same_bits_in_every_batch():
 
 
 def test_upright_rows_are_those_of_the_upright_candidates_alone():
-    alone = lay_candidates(street(), CHOICE)
-    both = lay_candidates(street(), replace(CHOICE, tilts=(0.0, math.radians(12))))
+    alone = generate_candidates(street(), CHOICE)
+    both = generate_candidates(street(), replace(CHOICE, tilts=(0.0, math.radians(12))))
     upright = both.tilt == 0
     for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt"):
         assert getattr(both, name)[upright].tobytes() == getattr(alone, name).tobytes()
@@ -151,7 +151,7 @@ def test_upright_rows_are_those_of_the_upright_candidates_alone():
 
 
 def test_the_key_of_an_upright_grid_is_as_it_was_before_there_were_tilts():
-    site = street_site(lay_candidates(street(), CHOICE))
+    site = street_site(generate_candidates(street(), CHOICE))
     poses, model = site.candidates, MODELS["type1"]
     pattern = [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
     pattern += [float(model.min_range), float(model.max_range), float(model.attenuation)]
@@ -201,7 +201,7 @@ def street_site(candidates):
 def test_poses_are_positions_by_heights_by_tilts_by_types_and_tilted_ones_face_the_region():
     pole = Pole("signal", np.array((35.0, 9.0, 0.1)))
     tilts = (math.radians(10), 0.0, math.radians(-5))
-    candidates = lay_candidates(street(poles=(pole,)), replace(CHOICE, sensors=("type1", "type3"), tilts=tilts))
+    candidates = generate_candidates(street(poles=(pole,)), replace(CHOICE, sensors=("type1", "type3"), tilts=tilts))
     assert len(candidates) == len(candidates.position) * 2 * 3 * 2
     assert candidates.sensor[:6].tolist() == ["type1", "type3"] * 3
     assert np.degrees(candidates.tilt[:6]) == pytest.approx([-5, -5, 0, 0, 10, 10])
@@ -270,7 +270,7 @@ def test_a_draw_turns_a_tilted_pose_about_itself():
 
 def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
     geometry = street()
-    candidates = lay_candidates(geometry, replace(CHOICE, tilts=(math.radians(20),)))
+    candidates = generate_candidates(geometry, replace(CHOICE, tilts=(math.radians(20),)))
     site = street_site(candidates)
     visible = grid_of(site).visible
     deployment = deploy(site, MODELS, visible, [0, 5])
@@ -283,17 +283,17 @@ def test_a_chosen_sensor_is_turned_as_its_candidate_and_judged_so():
 
 def test_a_placement_of_tilted_sensors_is_judged_as_they_hang():
     settings = SurveySettings(candidates=replace(CHOICE, heights=(5.0,), tilts=(math.radians(20),)), engine=ANY)
-    judge = Judge(street(), settings, Objective(count=1))
-    plan = finish(judge.plan(street_site(lay_candidates(street(), settings.candidates)), settings))
-    (sensor,) = plan.deployment.sensors
-    looks = VisibilityModel(judge.site, SIGHT, make_ray_caster(judge.site.triangles, ANY))
+    evaluator = Evaluator(street(), settings, Objective(count=1))
+    solution = finish(evaluator.solve(street_site(generate_candidates(street(), settings.candidates)), settings))
+    (sensor,) = solution.deployment.sensors
+    looks = VisibilityModel(evaluator.site, SIGHT, make_ray_caster(evaluator.site.triangles, ANY))
     as_it_hangs = looks.see(sensor.model, sensor.xyz, sensor.orientation).mean()
-    assert judge.judge(plan) == pytest.approx(as_it_hangs, abs=1e-12)
+    assert evaluator.evaluate(solution) == pytest.approx(as_it_hangs, abs=1e-12)
     assert as_it_hangs != looks.see(sensor.model, sensor.xyz, level_orientation(sensor.yaw)).mean()
 
 
 def test_what_is_in_view_turns_with_the_sensor():
-    caster, model = make_ray_caster(street_site(lay_candidates(street(), CHOICE)).triangles, ANY), MODELS["type1"]
+    caster, model = make_ray_caster(street_site(generate_candidates(street(), CHOICE)).triangles, ANY), MODELS["type1"]
     xyz, near = (
         np.array([0.0, 0.0, 5.0]),
         np.array([[8.0, 0.0, 0.0]]),
@@ -304,7 +304,7 @@ def test_what_is_in_view_turns_with_the_sensor():
 
 
 def test_a_sensor_hangs_at_the_pose_of_its_own_tilt():
-    candidates = lay_candidates(street(), replace(CHOICE, tilts=(0.0, 0.1, 0.2)))
+    candidates = generate_candidates(street(), replace(CHOICE, tilts=(0.0, 0.1, 0.2)))
     for pose in (0, 1, 2, 7):
         xyz, turn = candidates.xyz[pose] + 1e-4, candidates.orientation(pose) + 1e-7
         assert pose_at(candidates, "type1", xyz, turn) == pose
