@@ -46,7 +46,8 @@ def main(argv: list[str]) -> None:
         )
         sensors = f"{len(solution.deployment.sensors)} sensors"
         save_traffic_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
-        survey.save_solution(surveyed, solution, options.output, render=not options.no_render, traffic=asdict(settings))
+        asked = {"render": not options.no_render, "traffic": asdict(settings)}
+        survey.save_solution(surveyed, solution, options.output, asked)
     runtime.print_line(f"written to {options.output}/")
 
 

@@ -38,9 +38,8 @@ def main(argv: list[str]) -> None:
     solution = surveyed.stopwatch.run("placement", steps)
     runtime.print_line(_in_words(solution))
     with runtime.incomplete_if_interrupted(options.output):
-        survey.save_solution(
-            surveyed, solution, options.output, render=not options.no_render, pose_errors=options.pose_errors
-        )
+        asked = {"render": not options.no_render, "pose_errors": options.pose_errors}
+        survey.save_solution(surveyed, solution, options.output, asked)
     runtime.print_line(f"written to {options.output}/")
 
 

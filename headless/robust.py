@@ -41,7 +41,8 @@ def main(argv: list[str]) -> None:
         save_spread_chart(options.output / CHARTS[0], study, f"{layout.site.name}: coverage under pose errors")
         save_blame_chart(options.output / CHARTS[1], robust.pose_study, f"{layout.site.name}: what costs coverage")
         save_frontier_chart(options.output / CHARTS[2], study, f"{layout.site.name}: what robustness costs and saves")
-        survey.save_solution(surveyed, solution, options.output, render=not options.no_render)
+        asked = {"render": not options.no_render, "robustness": robustness.as_record()}
+        survey.save_solution(surveyed, solution, options.output, asked)
     runtime.print_line(f"written to {options.output}/")
 
 

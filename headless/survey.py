@@ -24,14 +24,14 @@ from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Sensor
 from seip_addon.core.placement.objective import Solution
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.results.placement_record import versions
+from seip_addon.core.results.placement_record import Provenance, versions
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.triangle_culling import culling_message
-from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
+from seip_addon.core.workflows.survey import Layout, SurveySettings, lay_out, record_of, see
 from seip_addon.core.workflows.traffic import runs_in, traffic_folder
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
@@ -137,16 +137,8 @@ def survey(
     return Survey(layout, grid, watch)
 
 
-def save_solution(
-    surveyed: Survey,
-    solution: Solution,
-    folder: Path,
-    *,
-    render: bool,
-    pose_errors: bool = False,
-    traffic: Mapping[str, object] | None = None,
-) -> None:
-    """Write a solution of a survey, with its record (see `record_of`), to the folder of results."""
+def save_solution(surveyed: Survey, solution: Solution, folder: Path, asked: Mapping[str, object]) -> None:
+    """Write a solution of a survey, with its record, to the folder of results; for what was asked see `record_of`."""
     layout, grid = surveyed.layout, surveyed.grid
     now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
@@ -155,10 +147,10 @@ def save_solution(
         layout.geometry,
         layout.site,
         solution,
-        record_of(layout, grid, solution, now, render=render, pose_errors=pose_errors, traffic=traffic),
+        record_of(layout, grid, solution, now, asked),
         visible=grid.visible,
         models=layout.models,
-        render=render,
+        render=bool(asked["render"]),
     )
 
 

@@ -31,10 +31,10 @@ DELAY = 0.02
 def start(scene: bpy.types.Scene, survey: SceneSurvey, visibility: VisibilityModel) -> None:
     """Follow the sensors of a scene from now on, from what the placement's own see."""
     stop()
-    if survey.plan is None or survey.grid is None:
+    if survey.solution is None or survey.grid is None:
         raise RuntimeError("there is no placement to follow")
     session.following = FollowedSensors(
-        scene.session_uid, survey, visibility, _as_placed(survey.plan.deployment, survey.grid.visible)
+        scene.session_uid, survey, visibility, _as_placed(survey.solution.deployment, survey.grid.visible)
     )
     for event, handler in _handlers():
         getattr(bpy.app.handlers, event).append(handler)
@@ -83,8 +83,8 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
 
 
 def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
-    plan = followed.survey.plan
-    placed = {} if plan is None else {sensor.label: sensor for sensor in plan.deployment.sensors}
+    solution = followed.survey.solution
+    placed = {} if solution is None else {sensor.label: sensor for sensor in solution.deployment.sensors}
     return tuple(
         label for label, sensor in sensors.items() if label not in placed or not _same(sensor, _mounted(placed[label]))
     )

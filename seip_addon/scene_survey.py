@@ -22,7 +22,7 @@ from .core.progress import Progress
 from .core.results.placement_record import PlacementRecord, parsed_record
 from .core.visibility.grid import VisibilityGrid
 from .core.workflows.moved_sensors import restored_by_hand
-from .core.workflows.survey import SurveySettings, inputs_of, lay_out, restored_plan, see
+from .core.workflows.survey import SurveySettings, inputs_of, lay_out, restored_solution, see
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, is_of, obstacle, same_grid
@@ -44,28 +44,28 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
     resources = Resources(preferences.cache_folder(), preferences.cores())
-    known = session.survey_of(scene)
-    if known is not None and not known.watch.look(scene) and known.catalogues == catalogues:
-        if same_grid(settings, known.layout.settings):
-            layout = replace(known.layout, settings=settings)
-            return _nothing_to_do(replace(known, layout=layout, resources=resources))
-        reading = SceneReading(known.layout.geometry, known.warnings)
-        return _laid_out(reading, settings, known.watch, resources, catalogues)
+    surveyed = session.survey_of(scene)
+    if surveyed is not None and not surveyed.watch.look(scene) and surveyed.catalogues == catalogues:
+        if same_grid(settings, surveyed.layout.settings):
+            layout = replace(surveyed.layout, settings=settings)
+            return _nothing_to_do(replace(surveyed, layout=layout, resources=resources))
+        reading = SceneReading(surveyed.layout.geometry, surveyed.warnings)
+        return _laid_out(reading, settings, surveyed.watch, resources, catalogues)
     began = time.perf_counter()
     watching = watch(scene)
     reading = read_scene(scene)
     return _laid_out(reading, settings, watching, resources, catalogues, time.perf_counter() - began)
 
 
-def with_visibility(known: SceneSurvey) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
+def with_visibility(surveyed: SceneSurvey) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
     """Compute the visibility grid of a survey, or take it from the cache; return the survey with it, and it alone."""
-    if known.grid is not None:
-        return known, known.grid
+    if surveyed.grid is not None:
+        return surveyed, surveyed.grid
     began = time.perf_counter()
-    known.resources.check()
-    file = known.resources.grid_file(known.inputs["visibility"])
-    grid = yield from see(known.layout, file, threads=known.resources.cores)
-    return replace(known, grid=grid, durations=known.timed("visibility", began)), grid
+    surveyed.resources.check()
+    file = surveyed.resources.grid_file(surveyed.inputs["visibility"])
+    grid = yield from see(surveyed.layout, file, threads=surveyed.resources.cores)
+    return replace(surveyed, grid=grid, durations=surveyed.timed("visibility", began)), grid
 
 
 def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
@@ -88,9 +88,9 @@ def with_grid_of_placement(scene: bpy.types.Scene) -> Generator[Progress, None, 
     return _grid_again(survey(scene), parsed_record(scene.seip.result.record))
 
 
-def _nothing_to_do(known: SceneSurvey) -> Generator[Progress, None, SceneSurvey]:
+def _nothing_to_do(surveyed: SceneSurvey) -> Generator[Progress, None, SceneSurvey]:
     yield from ()
-    return known
+    return surveyed
 
 
 def _laid_out(
@@ -113,24 +113,24 @@ def _laid_out(
 def _grid_again(
     surveying: Generator[Progress, None, SceneSurvey], record: PlacementRecord
 ) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
-    known = yield from surveying
-    if not is_of(record, known):
+    surveyed = yield from surveying
+    if not is_of(record, surveyed):
         raise SeipError("the scene or its settings have changed since the placement: place again")
-    if known.grid is None and not known.resources.grid_file(known.inputs["visibility"]).exists():
+    if surveyed.grid is None and not surveyed.resources.grid_file(surveyed.inputs["visibility"]).exists():
         raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
-    return (yield from with_visibility(known))
+    return (yield from with_visibility(surveyed))
 
 
 def _restored(surveying: Generator[Progress, None, SceneSurvey], text: str) -> Generator[Progress, None, SceneSurvey]:
     record = parsed_record(text)
-    known, grid = yield from _grid_again(surveying, record)
-    if known.record == text and known.plan is not None:
-        return known
+    surveyed, grid = yield from _grid_again(surveying, record)
+    if surveyed.record == text and surveyed.solution is not None:
+        return surveyed
     if record.objective.status == MOVED:
-        plan = yield from restored_by_hand(known.layout, grid, record)
+        solution = yield from restored_by_hand(surveyed.layout, grid, record)
     else:
-        plan = restored_plan(known.layout, grid, record)
-    return replace(known, plan=plan, record=text)
+        solution = restored_solution(surveyed.layout, grid, record)
+    return replace(surveyed, solution=solution, record=text)
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
@@ -149,7 +149,7 @@ def _compare() -> None:
             with (
                 bpy.context.temp_override(window=window),
                 suppress(RuntimeError),
-            ):  # the panel says that it is not known
+            ):  # the panel says that nothing is known
                 bpy.ops.seip.compare_scene("INVOKE_DEFAULT")
             return
 

@@ -89,10 +89,10 @@ class SceneSurvey:
         Of that layout.
     estimate : Estimate or None
         Of what the grid will take.
-    plan : Solution or None
+    solution : Solution or None
         Of that grid: the one that the scene's result tells of.
     record : str
-        The result that the plan was taken from.
+        The result that the solution was taken from.
     durations : mapping of str to float, seconds
         How long each step took.
     """
@@ -105,7 +105,7 @@ class SceneSurvey:
     warnings: tuple[str, ...] = ()
     grid: VisibilityGrid | None = None
     estimate: Estimate | None = None
-    plan: Solution | None = None
+    solution: Solution | None = None
     record: str = ""
     durations: Mapping[str, float] = field(default_factory=dict)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -13,17 +14,20 @@ import bpy
 
 from .. import scene_survey, selection
 from ..core.errors import SeipError
-from ..core.placement.objective import Objective, check_objective
+from ..core.placement.objective import Objective, Solution, check_objective
 from ..core.progress import Progress
-from ..core.results.placement_record import versions
+from ..core.results.placement_record import Provenance, versions
 from ..core.robustness.robust_study import RobustnessSettings
+from ..core.visibility.grid import VisibilityGrid
 from ..core.workflows.robust import check_robust_objective, place_robustly
-from ..core.workflows.survey import Layout, Provenance, place, record_of
+from ..core.workflows.survey import Layout, place, record_of
 from ..core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs, runs_in
 from ..scene.write import write_result
 from ..session import SceneSurvey
 from .results import keep_result
 from .work import ForReadyScene, LongWork, Outcome, attempt
+
+_Placing = Callable[[Layout, VisibilityGrid], Generator[Progress, None, Solution]]
 
 
 class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):
@@ -33,67 +37,66 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
     bl_label = "Place Sensors"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
-        """Read the scene where it has changed, and state the goal."""
+        """Read the scene where it has changed, and state the objective."""
         asked = scene.seip.goal
-        robustness, traffic = asked.robustness(), asked.traffic()
-        self._pose_errors = asked.pose_errors and robustness is None and traffic is None
-        self._traffic = None if traffic is None else asdict(traffic)
-        if traffic is None:
-            return _placed(scene_survey.survey(scene), asked.goal(), robustness, pose_errors=self._pose_errors)
-        folder = asked.runs_folder()
-        return _placed_in_traffic(scene_survey.survey(scene), asked.goal(), traffic, folder)
+        objective, robustness, traffic = asked.goal(), asked.robustness(), asked.traffic()
+        if robustness is not None or traffic is not None:
+            check_robust_objective(objective)
+        surveying = scene_survey.survey(scene)
+        self._asked: dict[str, object] = {}
+        if traffic is not None:
+            self._asked = {"traffic": asdict(traffic)}
+            return _placed_in_traffic(surveying, objective, traffic, asked.runs_folder())
+        if robustness is not None:
+            self._asked = {"robustness": robustness.as_record()}
+            return _placed(surveying, objective, partial(_robust, objective=objective, settings=robustness))
+        self._asked = {"pose_errors": asked.pose_errors}
+        return _placed(surveying, objective, partial(place, objective=objective, pose_errors=asked.pose_errors))
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
-        if result.plan is None or result.grid is None:
+        if result.solution is None or result.grid is None:
             raise RuntimeError("the work ended without a placement")
-        deployment = result.plan.deployment
-        circumstances = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(
-            result.layout,
-            result.grid,
-            result.plan,
-            circumstances,
-            render=False,
-            pose_errors=self._pose_errors,
-            traffic=self._traffic,
-        )
+        deployment = result.solution.deployment
+        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        record = record_of(result.layout, result.grid, result.solution, provenance, self._asked)
         write_result(scene, result.layout.site, deployment)
         keep_result(scene, result, record)
         self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
 
 def _placed(
-    surveying: Generator[Progress, None, SceneSurvey],
-    goal: Objective,
-    robustness: RobustnessSettings | None,
-    *,
-    pose_errors: bool = False,
+    surveying: Generator[Progress, None, SceneSurvey], objective: Objective, placing: _Placing
 ) -> Generator[Progress, None, SceneSurvey]:
-    if robustness is not None:
-        check_robust_objective(goal)
-    known = yield from surveying
-    check_objective(known.layout.site, known.layout.models, goal)
-    known, grid = yield from scene_survey.with_visibility(known)
+    return (yield from _placed_on((yield from surveying), objective, placing))
+
+
+def _placed_on(
+    surveyed: SceneSurvey, objective: Objective, placing: _Placing
+) -> Generator[Progress, None, SceneSurvey]:
+    check_objective(surveyed.layout.site, surveyed.layout.models, objective)
+    surveyed, grid = yield from scene_survey.with_visibility(surveyed)
     began = time.perf_counter()
-    if robustness is None:
-        plan = yield from place(known.layout, grid, goal, pose_errors=pose_errors)
-    else:
-        plan = (yield from place_robustly(known.layout, grid, goal, robustness)).solution
-    return replace(known, plan=plan, durations=known.timed("placement", began))
+    solution = yield from placing(surveyed.layout, grid)
+    return replace(surveyed, solution=solution, durations=surveyed.timed("placement", began))
+
+
+def _robust(
+    layout: Layout, grid: VisibilityGrid, objective: Objective, settings: RobustnessSettings
+) -> Generator[Progress, None, Solution]:
+    return (yield from place_robustly(layout, grid, objective, settings)).solution
 
 
 def _placed_in_traffic(
-    surveying: Generator[Progress, None, SceneSurvey], goal: Objective, settings: TrafficSettings, folder: Path
+    surveying: Generator[Progress, None, SceneSurvey], objective: Objective, settings: TrafficSettings, folder: Path
 ) -> Generator[Progress, None, SceneSurvey]:
-    check_robust_objective(goal)
-    known = yield from surveying
-    check_objective(known.layout.site, known.layout.models, goal)
-    runs = yield from _read_runs(folder, known.layout)  # refuses before any ray is cast
-    known, grid = yield from scene_survey.with_visibility(known)
-    began = time.perf_counter()
-    placed = yield from place_in_traffic(known.layout, grid, goal, runs, settings)
-    return replace(known, plan=placed.solution, durations=known.timed("placement", began))
+    surveyed = yield from surveying
+    runs = yield from _read_runs(folder, surveyed.layout)  # refuses before any ray is cast
+
+    def placing(layout: Layout, grid: VisibilityGrid) -> Generator[Progress, None, Solution]:
+        return (yield from place_in_traffic(layout, grid, objective, runs, settings)).solution
+
+    return (yield from _placed_on(surveyed, objective, placing))
 
 
 def _read_runs(folder: Path, layout: Layout) -> Generator[Progress, None, TrafficRuns]:

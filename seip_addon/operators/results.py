@@ -17,14 +17,14 @@ from ..core.geometry.orientation import describe_tilt
 from ..core.placement.objective import Objective, Solution, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.results.placement_record import PlacementRecord, parsed_record, versions
+from ..core.results.placement_record import PlacementRecord, Provenance, parsed_record, versions
 from ..core.results.ranking import Ranked, rank_added, rank_alone
 from ..core.scans.sensor import MountedSensor
 from ..core.storage.files import check_folder, digest
 from ..core.visibility.grid import VisibilityGrid
 from ..core.visibility.visibility_model import VisibilityModel, visibility_model
-from ..core.workflows.moved_sensors import judge
-from ..core.workflows.survey import Provenance, record_of
+from ..core.workflows.moved_sensors import evaluate_moved_sensors
+from ..core.workflows.survey import record_of
 from ..scene.blend_file import save_blend
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
@@ -120,9 +120,9 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ran
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, list[Ranked]]) -> None:
         """Fill the list."""
-        known, lines = result
-        session.keep_survey(scene, known)
-        candidates = known.layout.site.candidates
+        surveyed, lines = result
+        session.keep_survey(scene, surveyed)
+        candidates = surveyed.layout.site.candidates
         ranking = scene.seip.result.ranking
         ranking.clear()
         for one in lines:
@@ -136,20 +136,20 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ran
 def _ranked(
     finding: Generator[Progress, None, SceneSurvey], order: str
 ) -> Generator[Progress, None, tuple[SceneSurvey, list[Ranked]]]:
-    known = yield from finding
-    plan, grid = _plan_and_grid(known)
-    site, visible = known.layout.site, grid.visible
-    weight = target_weights(site, plan.objective)
+    surveyed = yield from finding
+    solution, grid = _solution_and_grid(surveyed)
+    site, visible = surveyed.layout.site, grid.visible
+    weight = target_weights(site, solution.objective)
     if order == "ALONE":
-        return known, rank_alone(visible, weight, MOST_RANKED)
-    free = ~np.isin(site.candidates.position_of, site.candidates.position_of[plan.placement.chosen])
-    return known, rank_added(visible, weight, plan.deployment.seen_by > 0, free, MOST_RANKED)
+        return surveyed, rank_alone(visible, weight, MOST_RANKED)
+    free = ~np.isin(site.candidates.position_of, site.candidates.position_of[solution.placement.chosen])
+    return surveyed, rank_added(visible, weight, solution.deployment.seen_by > 0, free, MOST_RANKED)
 
 
-def _plan_and_grid(known: SceneSurvey) -> tuple[Solution, VisibilityGrid]:
-    if known.plan is None or known.grid is None:
+def _solution_and_grid(surveyed: SceneSurvey) -> tuple[Solution, VisibilityGrid]:
+    if surveyed.solution is None or surveyed.grid is None:
         raise RuntimeError("the work ended without a placement")
-    return known.plan, known.grid
+    return surveyed.solution, surveyed.grid
 
 
 class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
@@ -166,7 +166,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
         """Tell whether it works, and why not."""
         if not super().poll(context):
             return False
-        sentence = not_judged(context.scene)
+        sentence = not_evaluated(context.scene)
         if sentence:
             cls.poll_message_set(sentence)
         return not sentence
@@ -270,74 +270,75 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Visibilit
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, VisibilityModel]) -> None:
         """Begin to follow."""
-        known, model = result
-        session.keep_survey(scene, known)
-        live_coverage.start(scene, known, model)
+        surveyed, model = result
+        session.keep_survey(scene, surveyed)
+        live_coverage.start(scene, surveyed, model)
 
 
 def _set_up(
     finding: Generator[Progress, None, SceneSurvey],
 ) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityModel]]:
-    known = yield from finding
-    settings = known.layout.settings
+    surveyed = yield from finding
+    settings = surveyed.layout.settings
     yield Progress(0, 0, "getting ready to cast")
-    return known, visibility_model(known.layout.site, settings.visibility, settings.engine)
+    return surveyed, visibility_model(surveyed.layout.site, settings.visibility, settings.engine)
 
 
-class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
     """Evaluate the sensors where they are now, moved, deleted and added by hand, and make them the placement"""
 
-    bl_idname = "seip.judge_sensors"
+    bl_idname = "seip.evaluate_sensors"
     bl_label = "Evaluate Moved Sensors"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Read where the sensors hang."""
-        hung = read_sensors(scene, preferences.catalogue(), hidden=True)
-        return _judged(
+        mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
+        return _evaluated(
             scene_survey.with_grid_of_placement(scene),
             parsed_record(scene.seip.result.record).asked.goal,
-            hung,
+            mounted,
             position_names(scene),
         )
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Make them the placement, where they hang."""
-        plan, grid = _plan_and_grid(result)
+        solution, grid = _solution_and_grid(result)
         live_coverage.stop()
-        take_over(scene, result.layout.site, plan.deployment, labelled_sensors(scene, hidden=True))
-        circumstances = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        keep_result(scene, result, record_of(result.layout, grid, plan, circumstances, render=False))
-        self.report({"INFO"}, f"coverage {plan.deployment.coverage:.2%} where the sensors hang")
+        take_over(scene, result.layout.site, solution.deployment, labelled_sensors(scene, hidden=True))
+        provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
+        keep_result(scene, result, record_of(result.layout, grid, solution, provenance, {}))
+        self.report({"INFO"}, f"coverage {solution.deployment.coverage:.2%} where the sensors hang")
 
 
-def _judged(
+def _evaluated(
     finding: Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]],
-    goal: Objective,
-    hung: Sequence[MountedSensor],
+    objective: Objective,
+    mounted: Sequence[MountedSensor],
     places: Mapping[str, str],
 ) -> Generator[Progress, None, SceneSurvey]:
-    known, grid = yield from finding
-    return replace(known, plan=(yield from judge(known.layout, grid, goal, hung, places)))
+    surveyed, grid = yield from finding
+    solution = yield from evaluate_moved_sensors(surveyed.layout, grid, objective, mounted, places)
+    return replace(surveyed, solution=solution)
 
 
-def keep_result(scene: bpy.types.Scene, known: SceneSurvey, record: PlacementRecord) -> None:
+def keep_result(scene: bpy.types.Scene, surveyed: SceneSurvey, record: PlacementRecord) -> None:
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
-    plan, _ = _plan_and_grid(known)
+    solution, _ = _solution_and_grid(surveyed)
     kept = scene.seip.result
     kept.record = record.text()
-    kept.targets = digest(known.layout.site.targets.xyz)
-    kept.seen = packed_counts(plan.deployment.seen_by)
+    kept.targets = digest(surveyed.layout.site.targets.xyz)
+    kept.seen = packed_counts(solution.deployment.seen_by)
     kept.sensors.clear()
-    for sensor in plan.deployment.sensors:
+    for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
     kept.ranking.clear()
-    session.keep_survey(scene, replace(known, record=kept.record))
+    session.keep_survey(scene, replace(surveyed, record=kept.record))
 
 
-def not_judged(scene: bpy.types.Scene) -> str:
-    """Say what was done by hand to the sensors since they were placed or judged; empty if nothing was."""
+def not_evaluated(scene: bpy.types.Scene) -> str:
+    """Say what was done by hand to the sensors since they were placed or evaluated; empty if nothing was."""
     sentence = sensor_edits(scene).describe()
-    return f"{sentence} Press {SEIP_OT_judge_sensors.bl_label}, or undo." if sentence else ""
+    return f"{sentence} Press {SEIP_OT_evaluate_sensors.bl_label}, or undo." if sentence else ""
 
 
 class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
@@ -352,7 +353,7 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
         """Tell whether it works, and why not."""
         if not super().poll(context):
             return False
-        sentence = no_folder(context.scene) or not_judged(context.scene)
+        sentence = no_folder(context.scene) or not_evaluated(context.scene)
         if sentence:
             cls.poll_message_set(sentence)
         return not sentence
@@ -378,15 +379,15 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     with result_files(folder) as part:
         save_blend(part["placed.blend"])
         yield Progress(0, 0, "reading the scene")
-        known = yield from finding
-        plan, grid = _plan_and_grid(known)
-        record = parsed_record(known.record)
+        surveyed = yield from finding
+        solution, grid = _solution_and_grid(surveyed)
+        record = parsed_record(surveyed.record)
         record = replace(record, settings={**record.settings, "render": render})
-        layout = known.layout
-        yield from write_tables(part, layout.geometry, layout.site, plan, record, grid.visible, layout.models)
+        layout = surveyed.layout
+        yield from write_tables(part, layout.geometry, layout.site, solution, record, grid.visible, layout.models)
         if render:
-            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, layout.site, plan.deployment)
-    return known
+            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, layout.site, solution.deployment)
+    return surveyed
 
 
 CLASSES = (
@@ -396,6 +397,6 @@ CLASSES = (
     SEIP_OT_drop_placement,
     SEIP_OT_show_comparison,
     SEIP_OT_follow_sensors,
-    SEIP_OT_judge_sensors,
+    SEIP_OT_evaluate_sensors,
     SEIP_OT_export_result,
 )

@@ -29,7 +29,7 @@ from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneSurvey, SceneTraffic, session
-from .results import no_placement, not_judged
+from .results import no_placement, not_evaluated
 from .work import LongWork, Outcome, Result
 
 INSTANTS = 60
@@ -64,7 +64,7 @@ def why_no_trial(scene: bpy.types.Scene) -> str:
         return no_placement(scene) or NO_LOADED
     record = parsed_record(scene.seip.result.record)
     elsewhere = any(sensor.pose is None for sensor in record.sensors)
-    return NOT_AT_CANDIDATES if elsewhere else not_judged(scene)
+    return NOT_AT_CANDIDATES if elsewhere else not_evaluated(scene)
 
 
 class _Scanning(LongWork[Result]):
@@ -154,30 +154,30 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operat
 
     def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, str]) -> None:
         """Note it with the placement."""
-        known, sentence = result
+        surveyed, sentence = result
         kept = scene.seip.result
         record = parsed_record(kept.record)
         notes = (*(note for note in record.notes if not note.startswith(IN_TRAFFIC)), sentence)
-        plan = known.plan
-        if plan is not None:
-            plan = replace(plan, placement=replace(plan.placement, notes=notes))
+        solution = surveyed.solution
+        if solution is not None:
+            solution = replace(solution, placement=replace(solution.placement, notes=notes))
         kept.record = replace(record, notes=notes).text()
-        session.keep_survey(scene, replace(known, plan=plan, record=kept.record))
+        session.keep_survey(scene, replace(surveyed, solution=solution, record=kept.record))
         self.report({"INFO"}, sentence)
 
 
 def _tried(
     finding: Generator[Progress, None, SceneSurvey], traffic: Trajectories
 ) -> Generator[Progress, None, tuple[SceneSurvey, str]]:
-    known = yield from finding
-    if known.plan is None:
+    surveyed = yield from finding
+    if surveyed.solution is None:
         raise RuntimeError("the work ended without a placement")
-    layout, chosen = known.layout, known.plan.placement.chosen
+    layout, chosen = surveyed.layout, surveyed.solution.placement.chosen
     check_runs([traffic], layout.site.region)
     instants = spread_instants([traffic], INSTANTS, seed=0)
-    weight = target_weights(layout.site, known.plan.objective)
+    weight = target_weights(layout.site, surveyed.solution.objective)
     sentence = yield from traffic_message(surroundings(layout), chosen, weight, instants)
-    return known, sentence
+    return surveyed, sentence
 
 
 class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):

@@ -24,7 +24,7 @@ from ..session import SceneSurvey, session
 from ..viewport import coverage, layers
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
-from .results import ForPlacement, not_judged
+from .results import ForPlacement, not_evaluated
 from .work import LongWork, Outcome, attempt, begun
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
@@ -170,7 +170,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operat
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Tell whether it works, and why not."""
-        return super().poll(context) and _can(cls, not_judged(context.scene))
+        return super().poll(context) and _can(cls, not_evaluated(context.scene))
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Find the placement again, and render it where that is asked for."""
@@ -189,13 +189,13 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operat
         self.report({"INFO"}, f"written {self._path}")
 
 
-def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, held: SceneSurvey) -> None:
+def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, surveyed: SceneSurvey) -> None:
     """Write what a viewport shows, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
 
     from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
 
-    _save_sheet(path, held, Image.fromarray(view_pixels(scene, area)))
+    _save_sheet(path, surveyed, Image.fromarray(view_pixels(scene, area)))
 
 
 def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
@@ -209,33 +209,33 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
         blend, view = (Path(folder) / file for file in ("scene.blend", "view.png"))
         save_blend(blend)
         yield Progress(0, 0, "reading the scene")
-        held = yield from finding
-        yield from render_elsewhere(view, blend, name, held.layout.site, _plan(held).deployment)
+        surveyed = yield from finding
+        yield from render_elsewhere(view, blend, name, surveyed.layout.site, _solution(surveyed).deployment)
         with Image.open(view) as picture:
-            _save_sheet(path, held, picture)
-    return held
+            _save_sheet(path, surveyed, picture)
+    return surveyed
 
 
-def _save_sheet(path: Path, held: SceneSurvey, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
+def _save_sheet(path: Path, surveyed: SceneSurvey, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
     from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
     from ..core.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
 
-    layout, plan = held.layout, _plan(held)
+    layout, solution = surveyed.layout, _solution(surveyed)
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
-        chosen = [sensor.model.key for sensor in plan.deployment.sensors]
-        notes = [plan.certificate, *relevant_warnings(layout.warnings, layout.models, chosen)]
-        save_plan_view(drawn, layout.geometry, layout.site, plan.deployment, notes)
+        chosen = [sensor.model.key for sensor in solution.deployment.sensors]
+        notes = [solution.certificate, *relevant_warnings(layout.warnings, layout.models, chosen)]
+        save_plan_view(drawn, layout.geometry, layout.site, solution.deployment, notes)
         with Image.open(drawn) as picture:
             save_sheet(path, view, picture)
 
 
-def _plan(held: SceneSurvey) -> Solution:
-    if held.plan is None:
-        raise RuntimeError("a placement was found without its plan")
-    return held.plan
+def _solution(surveyed: SceneSurvey) -> Solution:
+    if surveyed.solution is None:
+        raise RuntimeError("a placement was found without its solution")
+    return surveyed.solution
 
 
 def _viewports() -> list[bpy.types.Area]:

@@ -67,15 +67,15 @@ class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneSurvey], bpy.types.Oper
 
 
 def _seen(surveying: Generator[Progress, None, SceneSurvey]) -> Generator[Progress, None, SceneSurvey]:
-    known = yield from surveying
-    known, _ = yield from scene_survey.with_visibility(known)
-    return known
+    surveyed = yield from surveying
+    surveyed, _ = yield from scene_survey.with_visibility(surveyed)
+    return surveyed
 
 
 def _estimated(surveying: Generator[Progress, None, SceneSurvey]) -> Generator[Progress, None, SceneSurvey]:
-    known = yield from surveying
-    found = yield from estimate(known.layout, known.resources.cores)
-    return replace(known, estimate=found)
+    surveyed = yield from surveying
+    found = yield from estimate(surveyed.layout, surveyed.resources.cores)
+    return replace(surveyed, estimate=found)
 
 
 CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility, SEIP_OT_compare_scene)

@@ -10,7 +10,7 @@ from .. import scene_status
 from ..core.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
 from ..core.workflows.traffic import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
-from ..operators.results import SEIP_OT_judge_sensors, no_placement
+from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
@@ -137,7 +137,7 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if doubt and doubt != scene_status.ANOTHER_SITE:
         draw_run(box, SEIP_OT_compare_scene.bl_idname)
     if by_hand:
-        draw_run(box, SEIP_OT_judge_sensors.bl_idname)
+        draw_run(box, SEIP_OT_evaluate_sensors.bl_idname)
     column = box.column(align=True)
     column.active = not (doubt or by_hand)
     for name, value in figures(record):

@@ -167,7 +167,7 @@ class SEIP_PT_results_files(_Result, bpy.types.Panel):
         scene, layout = context.scene, self.layout
         layout.prop(scene.seip.result, "folder", text="")
         layout.prop(scene.seip.result, "render")
-        sentence = results.no_folder(scene) or results.not_judged(scene)
+        sentence = results.no_folder(scene) or results.not_evaluated(scene)
         if sentence:
             draw_sentence(layout, sentence, icon="INFO")
         draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.results import no_placement, not_judged
+from ..operators.results import no_placement, not_evaluated
 from ..operators.view import (
     SEIP_OT_colour_coverage,
     SEIP_OT_hide_sight_lines,
@@ -91,7 +91,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column.row(align=True).prop(view, "picture_of", expand=True)
         column.prop(view, "picture", text="")
         draw_run(column, SEIP_OT_save_picture.bl_idname, icon="IMAGE_DATA")
-        why_not = no_placement(context.scene) or not_judged(context.scene)
+        why_not = no_placement(context.scene) or not_evaluated(context.scene)
         if why_not:
             draw_sentence(column, why_not, icon="INFO")
 

@@ -68,14 +68,14 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     scene: bpy.types.Scene,
     geometry: SceneGeometry,
     site: Site,
-    plan: Solution,
+    solution: Solution,
     record: PlacementRecord,
     *,
     visible: Boolean,
     models: Mapping[str, LidarModel],
     render: bool = True,
 ) -> None:
-    """Write a plan into the scene and all its files into a folder, in place of earlier ones.
+    """Write a solution into the scene and all its files into a folder, in place of earlier ones.
 
     Parameters
     ----------
@@ -90,11 +90,11 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     render : bool
         Whether to render ``view.png``, which takes the longest.
     """
-    deployment = plan.deployment
+    deployment = solution.deployment
     with result_files(folder) as part:
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
-        finish(write_tables(part, geometry, site, plan, record, visible, models))
+        finish(write_tables(part, geometry, site, solution, record, visible, models))
         if render:
             save_rendered_view(part["view.png"], scene, site, deployment)
 
@@ -103,13 +103,13 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     part: Mapping[str, Path],
     geometry: SceneGeometry,
     site: Site,
-    plan: Solution,
+    solution: Solution,
     record: PlacementRecord,
     visible: Boolean,
     models: Mapping[str, LidarModel],
 ) -> Generator[Progress, None, None]:
     """Write all of a result that takes no look at Blender's data; see `write_result_folder`."""
-    deployment = plan.deployment
+    deployment = solution.deployment
     yield Progress(0, 3, "writing tables")
     save_placement_record(part["placement.json"], record)
     save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
@@ -117,4 +117,4 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
     yield Progress(2, 3, "drawing the plan")
     warnings = relevant_warnings(record.warnings, models, (sensor.model.key for sensor in deployment.sensors))
-    save_plan_view(part["plan.png"], geometry, site, deployment, [plan.certificate, *warnings])
+    save_plan_view(part["plan.png"], geometry, site, deployment, [solution.certificate, *warnings])

@@ -64,7 +64,7 @@ def test_moved_sensors_are_judged_where_they_hang(placed):
     before = record(placed)
     move(placed)
     pose = selection.sensor_empties(placed)["S1"].matrix_world.copy()
-    assert bpy.ops.seip.judge_sensors() == {"FINISHED"}
+    assert bpy.ops.seip.evaluate_sensors() == {"FINISHED"}
     assert selection.sensor_empties(placed)["S1"].matrix_world == pose
     assert not sensor_edits(placed)
     now = record(placed)
@@ -96,7 +96,7 @@ def test_moved_sensors_are_judged_where_they_hang(placed):
 def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_path):
     bpy.ops.seip.keep_placement(name="placed")
     move(placed)
-    bpy.ops.seip.judge_sensors()
+    bpy.ops.seip.evaluate_sensors()
     bpy.ops.seip.keep_placement(name="by hand")
     assert [json.loads(one.record)["objective"]["status"] for one in placed.seip.kept] == ["optimal", MOVED]
     placed.seip.active_kept = 0
@@ -124,7 +124,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert comparable(load_placement_record(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
-    assert session.survey_of(scene).plan.certificate == MOVED_MESSAGE
+    assert session.survey_of(scene).solution.certificate == MOVED_MESSAGE
 
 
 def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):
@@ -133,12 +133,12 @@ def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed
     copy.location.x += 5.0
     bpy.data.collections["SEIP Sensors"].objects.link(copy)
     bpy.context.view_layer.update()
-    bpy.ops.seip.judge_sensors()
+    bpy.ops.seip.evaluate_sensors()
     assert [line["id"] for line in record(placed)["sensors"]] == ["S1", "S2", "S3", "S4"]
     first.location.z -= 100.0
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match=r"sensor S1 is 9\d\.\d\d m below the ground: lift it"):
-        bpy.ops.seip.judge_sensors()
+        bpy.ops.seip.evaluate_sensors()
 
 
 def test_undo_brings_the_placement_back_that_was_moved(placed):
@@ -146,7 +146,7 @@ def test_undo_brings_the_placement_back_that_was_moved(placed):
     bpy.ops.ed.undo_push(message="placed")
     move(placed)
     bpy.ops.ed.undo_push(message="moved")
-    bpy.ops.seip.judge_sensors()
+    bpy.ops.seip.evaluate_sensors()
     bpy.ops.ed.undo_push(message="judged")
     bpy.ops.ed.undo()
     bpy.ops.ed.undo()

@@ -69,7 +69,7 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     before = session.survey_of(junction)
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
-    assert len(placed.plan.deployment.sensors) == 3
+    assert len(placed.solution.deployment.sensors) == 3
     for name in ("compute_visibility", "estimate_visibility", "rank_candidates", "follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
         assert session.survey_of(junction) is before
@@ -138,7 +138,7 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     assert labels(scene) == ["S1", "S2"]
     assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
     bpy.ops.seip.rank_candidates()
-    assert len(session.survey_of(scene).plan.deployment.sensors) == 2
+    assert len(session.survey_of(scene).solution.deployment.sensors) == 2
     bpy.ops.ed.redo()
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
 

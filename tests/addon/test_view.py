@@ -38,7 +38,7 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
 
 def test_sight_lines_are_the_row_of_the_grid(placed):
     held = session.survey_of(placed)
-    sensor = held.plan.deployment.sensors[1]
+    sensor = held.solution.deployment.sensors[1]
     assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
     overlay = layers.find(placed, SIGHT)
     faces, lines = overlay.layers

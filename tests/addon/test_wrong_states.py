@@ -72,7 +72,7 @@ def test_a_damaged_record_is_not_shown_and_has_its_sentence(placed, change, word
     change(record)
     placed.seip.result.record = json.dumps(record)
     assert re.search(words, results.no_placement(placed))
-    for button in (bpy.ops.seip.rank_candidates, bpy.ops.seip.judge_sensors, bpy.ops.seip.keep_placement):
+    for button in (bpy.ops.seip.rank_candidates, bpy.ops.seip.evaluate_sensors, bpy.ops.seip.keep_placement):
         assert not button.poll()
     assert not bpy.ops.seip.try_in_traffic.poll()
     bpy.ops.seip.solve_placement()

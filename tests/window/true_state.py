@@ -188,7 +188,7 @@ def _moved_sensors_stay(window: Window) -> Steps:
     assert (yield from _says(window, "By hand: S1 moved"))
     yield from window.find("seip.solve_placement(")
     yield from window.picture("moved")
-    yield from _press(window, "seip.judge_sensors(")
+    yield from _press(window, "seip.evaluate_sensors(")
     assert _places() == there
     assert (yield from _says(window, "Moved by hand"))
     assert not (yield from _says(window, "Proven"))

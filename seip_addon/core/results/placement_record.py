@@ -9,7 +9,7 @@ import os
 import platform
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from functools import cached_property, lru_cache
 from importlib import metadata
@@ -37,31 +37,22 @@ MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 
 
 @dataclass(frozen=True)
-class Run:
-    """What a placement was made with.
+class Provenance:
+    """When and with what a placement was made: what may differ where the placement does not.
 
     Parameters
     ----------
-    settings : mapping
-        All that the user could have set, defaults included, by name; values that JSON can hold.
     created : datetime
-        When, with its time zone.
+        With its time zone.
     durations : mapping of str to float, seconds
         How long each step took.
     versions : mapping of str to str
         Of the program and what it stands on; see `versions`.
-    inputs : mapping of str to str
-        Digests or names of what went in.
-    warnings : tuple of str
-        What the user should know before trusting the figures.
     """
 
-    settings: Mapping[str, object]
     created: datetime
     durations: Mapping[str, float]
     versions: Mapping[str, str]
-    inputs: Mapping[str, str] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
 
 
 def versions(**more: str) -> dict[str, str]:
@@ -253,17 +244,29 @@ class PlacementRecord:
         return json.dumps(self.as_json(), ensure_ascii=False, allow_nan=False)
 
 
-def placement_record(site: Site, plan: Solution, run: Run) -> PlacementRecord:
+def placement_record(
+    site: Site,
+    solution: Solution,
+    provenance: Provenance,
+    *,
+    settings: Mapping[str, object],
+    inputs: Mapping[str, str],
+    warnings: tuple[str, ...],
+) -> PlacementRecord:
     """Return the record of a placement.
 
     Parameters
     ----------
-    plan : Solution
+    solution : Solution
         Of that site.
-    run : Run
-        What it was made with.
+    settings : mapping
+        All that the user could have set, defaults included, by name; values that JSON can hold.
+    inputs : mapping of str to str
+        Digests or names of what went in.
+    warnings : tuple of str
+        What the user should know before trusting the figures.
     """
-    deployment, placement, greedy = plan.deployment, plan.placement, plan.greedy
+    deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
     return PlacementRecord(
         site=RecordedSite(site.name, _metres(site.origin)),
         sensors=tuple(_sensor(sensor, site.origin) for sensor in deployment.sensors),
@@ -275,8 +278,8 @@ def placement_record(site: Site, plan: Solution, run: Run) -> PlacementRecord:
             seen_twice=_share(deployment.seen_twice),
         ),
         objective=RecordedObjective(
-            kind="weighted" if plan.objective.weighted else "vanilla",
-            sought="least price" if plan.objective.cheapest else "most coverage",
+            kind="weighted" if solution.objective.weighted else "vanilla",
+            sought="least price" if solution.objective.cheapest else "most coverage",
             value=_significant(placement.objective),
             bound=_found(placement.bound),
             gap=_found(placement.gap),
@@ -285,15 +288,15 @@ def placement_record(site: Site, plan: Solution, run: Run) -> PlacementRecord:
         ),
         greedy=None if greedy is None else _greedy(greedy, placement),
         counts=_counts(site),
-        settings=dict(run.settings),
+        settings=dict(settings),
         seeds={},  # visibility and placement draw no random numbers
-        inputs=dict(run.inputs),
+        inputs=dict(inputs),
         notes=placement.notes,
-        warnings=run.warnings,
-        versions=dict(run.versions),
+        warnings=warnings,
+        versions=dict(provenance.versions),
         times=RecordedTimes(
-            run.created.isoformat(timespec="seconds"),
-            {step: _rounded(seconds, 3) for step, seconds in run.durations.items()},
+            provenance.created.isoformat(timespec="seconds"),
+            {step: _rounded(seconds, 3) for step, seconds in provenance.durations.items()},
         ),
     )
 

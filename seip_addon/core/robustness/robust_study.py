@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, astuple, dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..estimates import IntervalEstimate, mean_of, quantile_gain, quantile_of
 from ..placement import Placement, PlacementProblem, SolverLimits, solve
 from ..placement.search_limits import DEFAULT_LIMITS
 from ..progress import Progress, within
+from ..results.headings import tilt_degrees
 from ..settings import setting
 from .pose_errors import PoseErrors, require_draws
 from .risk import Risk
@@ -57,6 +58,12 @@ class RobustnessSettings:
     def __post_init__(self) -> None:
         require_draws(self.scenarios)
         require_draws(self.draws)
+
+    def as_record(self) -> dict[str, object]:
+        """Return the settings as records hold them, angles in degrees."""
+        position, height, yaw, tilt = astuple(self.errors)
+        degrees = {"yaw_deg": tilt_degrees(yaw), "tilt_deg": tilt_degrees(tilt)}
+        return asdict(self) | {"errors": {"position_m": position, "height_m": height, **degrees}}
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,18 +29,22 @@ BY_HAND = "by hand"
 """Name of a place that is no position of the site."""
 
 
-def judge(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, hung: Sequence[MountedSensor], places: Mapping[str, str]
+def evaluate_moved_sensors(
+    layout: Layout,
+    grid: VisibilityGrid,
+    objective: Objective,
+    mounted: Sequence[MountedSensor],
+    places: Mapping[str, str],
 ) -> Generator[Progress, None, Solution]:
-    """Find what sensors see where they hang; those at candidate poses see what the grid says.
+    """Find what sensors see from where they are mounted; those at candidate poses see what the grid says.
 
     Parameters
     ----------
     grid : VisibilityGrid
         Of the layout.
-    goal : Objective
+    objective : Objective
         That the placement answered which they were moved from: its weights, and whether a price was sought.
-    hung : sequence of MountedSensor
+    mounted : sequence of MountedSensor
         In the order of their labels.
     places : mapping of str to str
         Names of the places by label, for sensors at no candidate pose.
@@ -63,8 +67,8 @@ def judge(
     eyes: VisibilityModel | None = None
     sensors: list[Sensor] = []
     rows: list[Boolean] = []
-    for done, one in enumerate(hung):
-        yield Progress(done, len(hung), "looking from where the sensors hang")
+    for done, one in enumerate(mounted):
+        yield Progress(done, len(mounted), "looking from where the sensors hang")
         pose = pose_at(site.candidates, one.model.key, one.xyz, one.orientation)
         if pose is not None:
             sensors.append(sensor_at(site, models, one.label, pose))
@@ -77,10 +81,10 @@ def judge(
         rows.append(eyes.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
     deployment = deployment_of(site, sensors, seen)
-    covered = float(target_weights(site, goal)[deployment.seen_by > 0].sum())
+    covered = float(target_weights(site, objective)[deployment.seen_by > 0].sum())
     placement = Placement(
         chosen=np.array([sensor.pose for sensor in sensors if sensor.pose is not None], dtype=np.int64),
-        objective=deployment.price if goal.cheapest else covered,
+        objective=deployment.price if objective.cheapest else covered,
         bound=math.nan,
         gap=math.inf,
         status=MOVED,
@@ -89,25 +93,18 @@ def judge(
         covered=covered,
         price=deployment.price,
     )
-    return Solution(goal, placement, None, deployment)
+    return Solution(objective, placement, None, deployment)
 
 
 def restored_by_hand(
     layout: Layout, grid: VisibilityGrid, record: PlacementRecord
 ) -> Generator[Progress, None, Solution]:
-    """Return the plan that the record of a `judge` tells of.
-
-    Parameters
-    ----------
-    layout : Layout
-        That it was judged on.
-    grid : VisibilityGrid
-        That it was judged with.
-    """
+    """Evaluate the sensors of a record again, on the layout and with the grid that it was made with."""
     sensors = record.sensors
     models = find_models(load_catalogue(layout.settings.catalogue), sorted({one.sensor for one in sensors}))
-    hung = [MountedSensor(one.id, models[one.sensor], np.array(one.local_m), one.orientation) for one in sensors]
-    return (yield from judge(layout, grid, record.asked.goal, hung, {one.id: one.position for one in sensors}))
+    mounted = [MountedSensor(one.id, models[one.sensor], np.array(one.local_m), one.orientation) for one in sensors]
+    places = {one.id: one.position for one in sensors}
+    return (yield from evaluate_moved_sensors(layout, grid, record.asked.goal, mounted, places))
 
 
 def _elsewhere(layout: Layout, one: MountedSensor, place: str) -> Sensor:

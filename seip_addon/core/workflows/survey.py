@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from ..placement.objective import Objective, Solution, optimise, placement_probl
 from ..placement.search_limits import SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
-from ..results.placement_record import PlacementRecord, Run, placement_record
+from ..results.placement_record import PlacementRecord, Provenance, placement_record
 from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
@@ -177,7 +176,7 @@ def grid_key(layout: Layout) -> str:
 def inputs_of(layout: Layout) -> dict[str, str]:
     """Return digests of what a placement follows from: of the visibility grid, and of all else about the site.
 
-    Two layouts with the same digests have the same answers to the same goal.
+    Two layouts with the same digests have the same answers to the same objective.
     """
     targets, candidates = layout.site.targets, layout.site.candidates
     prices = np.array([layout.models[key].price for key in candidates.sensor])
@@ -213,30 +212,24 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
 
 
 def place(
-    layout: Layout, grid: VisibilityGrid, goal: Objective, *, pose_errors: bool = False
+    layout: Layout, grid: VisibilityGrid, objective: Objective, *, pose_errors: bool = False
 ) -> Generator[Progress, None, Solution]:
-    """Answer a goal on a survey, and note how far the answer can be trusted.
+    """Optimise a placement on a survey, and note how far it can be trusted.
 
     The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say
     what it loses where its sensors do not hang quite as planned (`pose_message`): rays are cast for that alone.
     """
     site, models, settings = layout.site, layout.models, layout.settings
-    steps = optimise(
-        site,
-        grid.visible,
-        models,
-        goal,
-        settings.limits,
-    )
-    plan = yield from steps
-    notes = [*plan.placement.notes]
-    if plan.placement.status == "optimal" and not goal.cheapest:
-        top = yield from near_optimal_set(placement_problem(site, grid.visible, models, goal), plan.placement.chosen)
+    solution = yield from optimise(site, grid.visible, models, objective, settings.limits)
+    notes = [*solution.placement.notes]
+    if solution.placement.status == "optimal" and not objective.cheapest:
+        problem = placement_problem(site, grid.visible, models, objective)
+        top = yield from near_optimal_set(problem, solution.placement.chosen)
         notes += [] if top is None else [top.message]
-    if pose_errors and plan.deployment.sensors:
-        study = yield from pose_study(surroundings(layout), plan.deployment, POSES_TRIED)
+    if pose_errors and solution.deployment.sensors:
+        study = yield from pose_study(surroundings(layout), solution.deployment, POSES_TRIED)
         notes.append(pose_message(study))
-    return replace(plan, placement=replace(plan.placement, notes=tuple(notes)))
+    return replace(solution, placement=replace(solution.placement, notes=tuple(notes)))
 
 
 def surroundings(layout: Layout) -> Surroundings:
@@ -245,62 +238,30 @@ def surroundings(layout: Layout) -> Surroundings:
     return Surroundings(layout.site, layout.models, settings.visibility, layout.geometry.occluders, settings.engine)
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """What is no part of an answer, and stands in its record all the same.
-
-    Parameters
-    ----------
-    created : datetime
-        When, with its time zone.
-    durations : mapping of str to float, seconds
-        How long each step took.
-    versions : mapping of str to str
-        See `results.placement_record.versions`.
-    """
-
-    created: datetime
-    durations: Mapping[str, float]
-    versions: Mapping[str, str]
-
-
-def record_of(  # noqa: PLR0913  # what was asked for stands in the record
-    layout: Layout,
-    grid: VisibilityGrid,
-    plan: Solution,
-    circumstances: Provenance,
-    *,
-    render: bool,
-    pose_errors: bool = False,
-    traffic: Mapping[str, object] | None = None,
+def record_of(
+    layout: Layout, grid: VisibilityGrid, solution: Solution, provenance: Provenance, asked: Mapping[str, object]
 ) -> PlacementRecord:
-    """Return what ``placement.json`` holds of a plan.
+    """Return what ``placement.json`` holds of a solution.
 
     Parameters
     ----------
-    render : bool
-        Whether a rendered view goes with it.
-    pose_errors : bool
-        Whether the plan was tried with pose errors; see `place`.
-    traffic : mapping of str to value, optional
-        The `TrafficSettings` that the plan was chosen with, by name; None for a plan that was not chosen on traffic.
+    asked : mapping
+        What was asked for beside the objective, by name: ``render`` for a rendered view, ``pose_errors`` for a trial
+        (see `place`), the settings of ``robustness`` or of ``traffic`` that the solution was chosen with.
     """
-    asked = {"goal": asdict(plan.objective), "pose_errors": pose_errors, "render": render}
-    if traffic is not None:
-        asked["traffic"] = dict(traffic)
-    run = Run(
-        settings=layout.settings.as_record() | asked,
-        created=circumstances.created,
-        durations=circumstances.durations,
-        versions=circumstances.versions,
+    objective = {"goal": asdict(solution.objective), "pose_errors": False, "render": False}
+    return placement_record(
+        layout.site,
+        solution,
+        provenance,
+        settings={**layout.settings.as_record(), **objective, **asked},
         inputs=inputs_of(layout) | {"visibility": grid.key},
         warnings=layout.warnings,
     )
-    return placement_record(layout.site, plan, run)
 
 
-def restored_plan(layout: Layout, grid: VisibilityGrid, record: PlacementRecord) -> Solution:
-    """Return the plan that a record of `record_of` tells of, without asking a solver again.
+def restored_solution(layout: Layout, grid: VisibilityGrid, record: PlacementRecord) -> Solution:
+    """Return the solution that a record of `record_of` tells of, without asking a solver again.
 
     Parameters
     ----------
@@ -319,18 +280,18 @@ def restored_plan(layout: Layout, grid: VisibilityGrid, record: PlacementRecord)
     poses = range(len(layout.site.candidates))
     if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
-    goal, objective = record.asked.goal, record.objective
+    objective, found = record.asked.goal, record.objective
     chosen = np.array([sensor.pose for sensor in record.sensors], dtype=np.int64)
     placement = Placement(
         chosen=chosen,
-        objective=objective.value,
-        bound=math.nan if objective.bound is None else objective.bound,
-        gap=math.inf if objective.gap is None else objective.gap,
-        status=objective.status,
-        solver=objective.solver,
+        objective=found.value,
+        bound=math.nan if found.bound is None else found.bound,
+        gap=math.inf if found.gap is None else found.gap,
+        status=found.status,
+        solver=found.solver,
         seconds=record.times.durations_s.get("placement", 0.0),
-        covered=float(target_weights(layout.site, goal)[grid.times_seen(chosen) > 0].sum()),
+        covered=float(target_weights(layout.site, objective)[grid.times_seen(chosen) > 0].sum()),
         price=record.price_usd,
         notes=record.notes,
     )
-    return Solution(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))
+    return Solution(objective, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))

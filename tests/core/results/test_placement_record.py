@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from seip_addon.core.placement import Placement
 from seip_addon.core.placement.objective import MOVED, Objective, Solution
 from seip_addon.core.results.placement_record import (
     PlacementRecord,
-    Run,
+    Provenance,
     comparable,
     load_placement_record,
     parsed_record,
@@ -41,26 +42,26 @@ def example() -> Example:
 
 
 @pytest.fixture
-def run() -> Run:
-    return Run(
-        settings={
-            "grid_spacing_m": 1.0,
-            "candidates": {"sensors": ("type1", "vlp32c"), "heights": (3.5, 5.4)},
-            "goal": asdict(GOAL),
-        },
-        created=datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
-        durations={"visibility": 12.3456789},
-        versions=versions(blender="4.5.15"),
-        inputs={"visibility": "ab" * 32},
-        warnings=("rings are wide apart",),
-    )
+def run() -> dict[str, Any]:
+    settings = {
+        "grid_spacing_m": 1.0,
+        "candidates": {"sensors": ("type1", "vlp32c"), "heights": (3.5, 5.4)},
+        "goal": asdict(GOAL),
+    }
+    created = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+    return {
+        "provenance": Provenance(created, {"visibility": 12.3456789}, versions(blender="4.5.15")),
+        "settings": settings,
+        "inputs": {"visibility": "ab" * 32},
+        "warnings": ("rings are wide apart",),
+    }
 
 
 def make_record(example, run, **changes) -> PlacementRecord:
     values = {"objective": 512.0, "bound": 530.5, "gap": 18.5 / 512.0, **changes}
     best = solution([sensor.pose for sensor in example.deployment.sensors], **values)
     greedy = solution([1, 2, 3], objective=500.0, bound=531.0, gap=0.05)
-    return placement_record(example.site, Solution(GOAL, best, greedy, example.deployment), run)
+    return placement_record(example.site, Solution(GOAL, best, greedy, example.deployment), **run)
 
 
 def made_by_hand(example, run) -> PlacementRecord:
@@ -69,7 +70,7 @@ def made_by_hand(example, run) -> PlacementRecord:
     turned = replace(first, pose=None, tilt=math.radians(-12.5), roll=math.radians(3.0))
     deployment = replace(example.deployment, sensors=(turned, *others))
     moved = solution([sensor.pose for sensor in others], objective=512.0, bound=math.nan, gap=math.inf, status=MOVED)
-    return placement_record(example.site, Solution(GOAL, moved, None, deployment), run)
+    return placement_record(example.site, Solution(GOAL, moved, None, deployment), **run)
 
 
 @pytest.fixture(params=["placed", "without bound", "by hand"])
@@ -214,7 +215,7 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
 
 def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
     work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
-    record = content_of(make_record(example, replace(run, settings={**run.settings, **work})))
+    record = content_of(make_record(example, {**run, "settings": {**run["settings"], **work}}))
     assert violations(record, SCHEMA) == []
     for name in work:
         assert violations({**record, "settings": {**record["settings"], name: None}}, SCHEMA)
@@ -233,8 +234,8 @@ def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(exampl
 
 
 def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):
-    later = Run(**{**vars(run), "created": datetime(2027, 1, 1, tzinfo=UTC), "durations": {"visibility": 99.0}})
-    first, second = make_record(example, run), make_record(example, later)
+    later = replace(run["provenance"], created=datetime(2027, 1, 1, tzinfo=UTC), durations={"visibility": 99.0})
+    first, second = make_record(example, run), make_record(example, {**run, "provenance": later})
     assert first != second
     assert comparable(first) == comparable(second)
     for name in ("a.json", "b.json"):
