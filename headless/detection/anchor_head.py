@@ -28,8 +28,7 @@ DIRECTION_FROM = math.pi / 4
 SMOOTH_L1_BETA = 1 / 9
 """Where the smooth L1 loss turns from a square into a line."""
 
-INITIAL_SCORE = 0.01
-"""Score that every anchor begins with."""
+INITIAL_SCORE = 0.01  # score that every anchor begins with
 
 MAX_BOXES = 500
 """Boxes of a cloud that are looked at, the best first."""

@@ -20,8 +20,7 @@ TAIL_PROBABILITY = 0.025
 NORMAL_QUANTILE = 1.959963984540054
 """Value that a standard normal variable exceeds with a probability of 2.5 %."""
 
-RESAMPLES = 2000
-"""Of a bootstrap."""
+RESAMPLES = 2000  # of a bootstrap
 
 MIN_BATCHES = 4
 """Of fewer the spread of a mean is not known well enough for an interval."""

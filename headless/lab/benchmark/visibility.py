@@ -27,8 +27,7 @@ from seip_addon.core.visibility.visibility_model import VisibilityModel, seen_by
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
-PROVEN_GAP = 1e-6
-"""Gap below which nothing is better."""
+PROVEN_GAP = 1e-6  # gap below which nothing is better
 
 SENSOR_COUNT = 4
 """Sensors of the placement by which the harm of an error is evaluated."""

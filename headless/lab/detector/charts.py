@@ -17,8 +17,7 @@ from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 from .disturbances import CappedPillars, SensorFailure
 from .study import DisturbanceCurve, LimitsStudy, TransferResult
 
-COLUMNS = 4
-"""Panels in a row."""
+COLUMNS = 4  # panels in a row
 
 PANEL_SIZE = (3.6, 3.0)  # inches
 

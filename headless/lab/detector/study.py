@@ -47,8 +47,7 @@ Series = tuple[Disturbance, ...]
 BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
 """Metres from the border of the region of interest, between which road users are counted."""
 
-COUNTED_FRAMES = 8
-"""Frames in which pillars are counted."""
+COUNTED_FRAMES = 8  # frames in which pillars are counted
 
 
 def full_series(sensor: int) -> tuple[Series, ...]:

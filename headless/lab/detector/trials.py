@@ -189,10 +189,8 @@ def disturbed_frames(
         simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
         for number, time in enumerate(run.times.tolist()):
             random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
-            yield (
-                run,
-                disturbance.disturbed_frame(disturbance.disturbed_scan(simulation, number, time), sensors, random),
-            )
+            scan = disturbance.disturbed_scan(simulation, number, time)
+            yield run, disturbance.disturbed_frame(scan, sensors, random)
 
 
 def _results(

@@ -35,8 +35,7 @@ MAX_ROUNDINGS = 64
 DISTANCES = tuple(10.0 ** (half / 2) for half in range(4, 15))
 """Metres to which an ordinary street is moved, or at which a stray mesh is left."""
 
-RAY_LENGTH = 1e9
-"""Metres that rays go."""
+RAY_LENGTH = 1e9  # metres that rays go
 
 DELTA = 0.5
 TARGETS = 300

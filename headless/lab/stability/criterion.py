@@ -42,8 +42,7 @@ from seip_addon.core.workflows.survey import SurveySettings
 from .rows import Row
 from .shares import Share
 
-DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
-"""Metres."""
+DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # metres
 
 BORDER_RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Distances in multiples of the border, between which targets are counted."""

@@ -17,8 +17,7 @@ GROUND = 128
 STREET_YAW = 0.37
 """Radians by which the street is turned about z."""
 
-ORIGIN = np.array([0.3, -0.2, 5.0])
-"""Where rays start in most scenes."""
+ORIGIN = np.array([0.3, -0.2, 5.0])  # where rays start in most scenes
 
 
 @dataclass(frozen=True, eq=False)

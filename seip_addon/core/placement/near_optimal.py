@@ -16,8 +16,7 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance, make_instance
 from .search_limits import Clock
 
-MAX_LISTED = 10_000
-"""Placements that are listed at most."""
+MAX_LISTED = 10_000  # placements that are listed at most
 
 MAX_BRANCHES = 300
 """Branches that are searched at most: no clock decides what is found."""

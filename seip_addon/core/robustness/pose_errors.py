@@ -88,7 +88,6 @@ class PoseErrors:
 
 
 ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
-"""Kinds of pose errors."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,8 +43,7 @@ class TrafficObstacles:
     hulls: Float
 
 
-NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty((0, 8, 3)))
-"""The empty road."""
+NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty((0, 8, 3)))  # the empty road
 
 
 @dataclass(frozen=True, eq=False)

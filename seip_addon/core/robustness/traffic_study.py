@@ -27,8 +27,7 @@ from .visibility_under_errors import Surroundings
 NOTABLE_LOSS = 0.01
 """Share of the targets' weight whose loss in traffic a user should know of."""
 
-IN_TRAFFIC = "in traffic"
-"""First words of messages about traffic."""
+IN_TRAFFIC = "in traffic"  # first words of messages about traffic
 
 MOSTLY_SEEN_SHARE = 0.9
 """Share of time from which on a target counts as mostly seen."""

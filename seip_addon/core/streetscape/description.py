@@ -27,8 +27,7 @@ DESCRIPTION_SUFFIX = ".toml"
 MAX_SIZE = 100_000.0
 """Metres (or degrees, or a weight) that nothing described may exceed."""
 
-MAX_HEIGHT = 1_000.0
-"""Metres that nothing described is high."""
+MAX_HEIGHT = 1_000.0  # metres that nothing described is high
 
 MAX_RADIUS = 5_000.0
 """Metres from the middle of the place to the end of its region at most."""

@@ -37,8 +37,7 @@ KIND_OF_TYPE = {
 }
 UNTYPED = {"-1", "none", ""}
 """Types that say nothing: name and shape decide."""
-VAGUE_TYPES = UNTYPED | {"obstacle"}
-"""Types of which name and shape say more."""
+VAGUE_TYPES = UNTYPED | {"obstacle"}  # types of which name and shape say more
 
 WORDS_OF_KIND = {
     Kind.LAMP: {"lamp", "lamps", "streetlamp", "streetlight", "lantern", "luminaire", "laterne", "leuchte"},

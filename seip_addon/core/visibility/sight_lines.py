@@ -15,7 +15,6 @@ from ..site.target_squares import target_squares
 MAX_LINES = 1500
 """More than these are a carpet, not lines: a sample of the targets is drawn."""
 SAMPLE_SEED = 0
-"""Of the sample."""
 SAME_PLACE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
 SAME_TURN = 5e-5
