@@ -41,7 +41,7 @@ class Findings:
 
     setting: dict[str, Any]
     costs: Mapping[str, Cost]
-    harms: Mapping[str, Degradation]
+    degradations: Mapping[str, Degradation]
     limits: Mapping[str, float]
     runs: Sequence[SolverRun]
     growths: Sequence[Growth]
@@ -87,7 +87,7 @@ def save_json(path: str | os.PathLike[str], findings: Findings, checks: Sequence
         "setting": findings.setting,
         "bars": [asdict(bar) for bar in checks],
         "visibility": {way: asdict(cost) for way, cost in findings.costs.items()},
-        "harm": {name: asdict(harm) for name, harm in findings.harms.items()},
+        "harm": {name: asdict(degradation) for name, degradation in findings.degradations.items()},
         "times_the_limit": dict(findings.limits),
         "placement": runs,
         "growth": growths,
@@ -122,7 +122,7 @@ def _summary(setting: Mapping[str, Any], checks: Sequence[Bar]) -> list[str]:
 
 
 def _about_visibility(findings: Findings, pictures: str) -> list[str]:
-    setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.harms["exact"]
+    setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.degradations["exact"]
     text = (
         f"{setting['scene']}: {setting['targets']:,} targets, {setting['poses']:,} poses, {setting['triangles']:,} "
         f"triangles. Times are of {setting['places']} places spread evenly over the site, every type at each: the "
@@ -135,14 +135,14 @@ def _about_visibility(findings: Findings, pictures: str) -> list[str]:
         ("way", "times as quick as the plain loop", "s", "s on the clock", "rays", "rays per seen target"),
         [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
     )
-    harm = _table(
+    degradation = _table(
         ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept", ""),
-        [_harm_row(name, harm, exact) for name, harm in findings.harms.items()],
+        [_degradation_row(name, degradation, exact) for name, degradation in findings.degradations.items()],
     )
     times = "; ".join(f"with {engine} it takes {n:.1f} times that" for engine, n in findings.limits.items())
     limit = f"The least that any method can do is to cast one ray for each seen target. Of the lazy engine: {times}."
     picture = f"![processor time against error of visibility]({pictures}/visibility.png)"
-    return ["## Visibility", text, picture, costs, harm, limit]
+    return ["## Visibility", text, picture, costs, degradation, limit]
 
 
 def _about_placement(findings: Findings, pictures: str) -> list[str]:
@@ -220,15 +220,15 @@ def _cost_row(way: str, cost: Cost, plain: Cost) -> tuple[str, ...]:
     )
 
 
-def _harm_row(name: str, harm: Degradation, exact: Degradation) -> tuple[str, ...]:
+def _degradation_row(name: str, degradation: Degradation, exact: Degradation) -> tuple[str, ...]:
     return (
         name,
-        f"{harm.wrong:.2%}",
-        f"{harm.claimed:.2%}",
-        f"{harm.coverage:.2%}",
-        f"{exact.coverage - harm.coverage:.2%}",
-        f"{harm.kept} of {exact.kept}",
-        "" if harm.proven else "placement not proven the best",
+        f"{degradation.wrong:.2%}",
+        f"{degradation.claimed:.2%}",
+        f"{degradation.coverage:.2%}",
+        f"{exact.coverage - degradation.coverage:.2%}",
+        f"{degradation.kept} of {exact.kept}",
+        "" if degradation.proven else "placement not proven the best",
     )
 
 

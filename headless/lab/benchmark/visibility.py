@@ -151,7 +151,7 @@ def visibility_costs(
     return costs
 
 
-def harms(
+def degradations(
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,

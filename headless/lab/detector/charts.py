@@ -41,9 +41,9 @@ def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
     save_chart(path, figure, title, panels[:1])
 
 
-def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
+def save_transfer_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
     """Draw by how much average precision differs where detectors are used beyond what they have learnt."""
-    changes = (*study.foreign, *study.padding)
+    changes = (*study.transfers, *study.padding)
     if not changes:
         raise SeipError("there is nothing foreign to draw: try detectors elsewhere first")
     figure, (panel,) = new_figure(9.0, 1.2 + 0.42 * len(changes), dpi=150)
@@ -59,7 +59,7 @@ def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None
 
 
 def _in_words(one: TransferResult) -> str:
-    return f"{one.learnt}, on {one.tried}, against {one.against}"
+    return f"{one.trained_on}, on {one.tested_on}, against {one.against}"
 
 
 def _draw(panel: Axes, curves: Sequence[DisturbanceCurve], rows: Sequence[int]) -> None:

@@ -174,7 +174,7 @@ def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
     limits_charts.save_solver_chart(scene.charts / "solvers.png", study, "Solvers at their limits")
-    limits_charts.save_flat_top_chart(scene.charts / "flat_top.png", tops, f"{scene.name}: how flat the top is")
+    limits_charts.save_near_optimal_chart(scene.charts / "flat_top.png", tops, f"{scene.name}: how flat the top is")
     return Chapter(
         "Solvers",
         tuple(solver_rows(study, tops)),
@@ -195,7 +195,7 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     deployment = deploy(layout.site, layout.models, scene.surveyed.grid.visible, chosen)
     under_errors = yield from pose_study(around, deployment, scene.scope.poses)
     robust_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
-    robust_charts.save_blame_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
+    robust_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
     robust_charts.save_frontier_chart(
         scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
     )
@@ -263,8 +263,8 @@ def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     study = yield from detector_limits(scene.surveyed, scene.path, scene.others, scene.work, **scene.scope.detector)
     limit_charts.save_limits_chart(scene.charts / "detector.png", study)
     charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
-    if study.foreign:
-        limit_charts.save_foreign_chart(scene.charts / "detector_away.png", study)
+    if study.transfers:
+        limit_charts.save_transfer_chart(scene.charts / "detector_away.png", study)
         charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
 
