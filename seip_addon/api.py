@@ -16,11 +16,11 @@ Examples
 >>> grid = seip.compute_visibility(layout)
 >>> grid.visible.shape
 (36, 306)
->>> plan = seip.place(layout, grid, seip.Objective(count=2))
->>> plan.placement.status, round(plan.deployment.coverage, 4)
+>>> solution = seip.place(layout, grid, seip.Objective(count=2))
+>>> solution.placement.status, round(solution.deployment.coverage, 4)
 ('optimal', 0.8922)
 >>> traffic = seip.load_traffic("scenes/junction_traffic/run-1.npz", geometry)
->>> frame = seip.scan(geometry, plan, traffic, time=30.0)
+>>> frame = seip.scan(geometry, solution, traffic, time=30.0)
 >>> frame.points.dtype, frame.points.shape[1], len(frame.labels.category)
 (dtype('float32'), 3, 50)
 """
@@ -100,7 +100,7 @@ def compute_visibility(layout: Layout, threads: int | None = None) -> Visibility
     return finish(_compute(layout.site, layout.models, settings.visibility, settings.engine, threads=threads))
 
 
-def place(layout: Layout, grid: VisibilityGrid, goal: Objective) -> Solution:
+def place(layout: Layout, grid: VisibilityGrid, objective: Objective) -> Solution:
     """Solve the placement problem.
 
     Returns
@@ -112,9 +112,9 @@ def place(layout: Layout, grid: VisibilityGrid, goal: Objective) -> Solution:
     Raises
     ------
     SeipError
-        The goal contradicts itself or the site.
+        The objective contradicts itself or the site.
     """
-    return finish(_place(layout, grid, goal))
+    return finish(_place(layout, grid, objective))
 
 
 def load_traffic(path: str | os.PathLike[str], geometry: SceneGeometry) -> Trajectories:
@@ -123,7 +123,11 @@ def load_traffic(path: str | os.PathLike[str], geometry: SceneGeometry) -> Traje
 
 
 def scan(
-    geometry: SceneGeometry, plan: Solution, traffic: Trajectories, time: float, settings: ScanSettings | None = None
+    geometry: SceneGeometry,
+    solution: Solution,
+    traffic: Trajectories,
+    time: float,
+    settings: ScanSettings | None = None,
 ) -> Frame:
     """Scan traffic at a time in seconds with the sensors of a placement.
 
@@ -132,6 +136,6 @@ def scan(
     Frame
         Merged point cloud with the boxes of all road users.
     """
-    sensors = [MountedSensor(s.label, s.model, s.xyz, s.orientation) for s in plan.deployment.sensors]
+    sensors = [MountedSensor(s.label, s.model, s.xyz, s.orientation) for s in solution.deployment.sensors]
     run = make_run(geometry, sensors, traffic, RecordingSettings(settings or ScanSettings()), {})
     return finish(simulation_of(run)).frame(*frame_number(run, time))

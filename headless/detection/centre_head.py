@@ -43,7 +43,7 @@ MIN_HEAT = 0.2
 INITIAL_HEAT = 0.01  # heat that every cell begins with
 
 MAX_PEAKS = 500
-"""Peaks of a cloud that are looked at, the highest first."""
+"""Peaks of a cloud before suppression, the highest first."""
 
 OVERLAP_POWER = 0.5
 """Part of the predicted overlap in a score: heat^(1 − part) · overlap^part."""

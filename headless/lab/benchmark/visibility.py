@@ -30,7 +30,7 @@ ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 PROVEN_GAP = 1e-6  # gap below which nothing is better
 
 SENSOR_COUNT = 4
-"""Sensors of the placement by which the harm of an error is evaluated."""
+"""Sensors of the placement in which the degradation is measured."""
 
 
 @dataclass

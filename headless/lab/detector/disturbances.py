@@ -25,10 +25,10 @@ from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.traffic import Trajectories
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
-"""Unit vector along which a sensor is misplaced and about which it is tilted: no street's own direction."""
+"""Unit vector of position and tilt errors, along no street."""
 
 DROP_RANGE = 10.0
-"""Metres from a sensor within which a drop may return enough to be taken for something."""
+"""Metres from a sensor within which a raindrop may cause a return."""
 
 DROP_INTENSITY = 0.05
 """Intensity of a drop's return: at the dark end of what surfaces return."""

@@ -153,7 +153,7 @@ class TransferResult:
     trained_on, tested_on : str
         Sensor type or site of the training, and of the test.
     precision : IntervalEstimate
-        There.
+        On the test.
     change : IntervalEstimate
         Against ``against``.
     against : str
@@ -346,7 +346,7 @@ def limits_study(
     Parameters
     ----------
     home : TrialSite
-        Where they have learnt, with traffic that they have not seen.
+        The site of their training, with unseen traffic.
     configurations : sequence of SensorConfiguration
         The first is driven through everything, the others through the brief series.
     store : path

@@ -51,7 +51,7 @@ SENSOR = LidarModel(
     rotation_rate=10.0,
     price_range=(1.0, 1.0),
 )
-"""What looks at the scenes: few rays, so that float64 can follow all of them."""
+"""Sensor of the test scenes: few rays, so that float64 can follow all of them."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from .robustness_rows import pose_rows, robust_rows, traffic_rows
 from .solver_limits import solver_rows, solver_study
 
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
-"""What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
+"""Risks studied: the loss of a sensor, and targets that two sensors must see."""
 
 DETECTOR_RUNS = 3
 """With more runs of traffic than these a detector can learn and be tried."""

@@ -69,7 +69,7 @@ def save_plan_view(
     deployment : Deployment
         The chosen sensors and what they see.
     notes : sequence of str
-        What a reader of the plan should know, in sentences.
+        Notes for the reader of the plan, one sentence each.
     """
     figure = draw_plan(geometry, site, deployment, notes)
     save_png(path, figure)

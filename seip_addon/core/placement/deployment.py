@@ -23,12 +23,10 @@ class Sensor:
         ``S1``, ``S2``, … in the order in which each adds the most to those before it.
     pose : int or None
         Index among the site's candidates; None where a hand has put it elsewhere.
-    model : LidarModel
-        What hangs there.
     position_name : str
         Name of the pole, or of the sampled place on the sidewalk.
     on_pole : bool
-        Whether it hangs at an existing pole.
+        Whether it is mounted on an existing pole.
     foot : (3,) float64, metres
         Ground point of the position, local site axes.
     xyz : (3,) float64, metres

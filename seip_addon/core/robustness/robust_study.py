@@ -22,7 +22,7 @@ LOW_QUANTILE = 0.05
 """Quantile of coverage by which placements are compared."""
 
 COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
-"""That are compared where nothing else is asked for."""
+"""Compared by default."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class RobustnessSettings:
     Parameters
     ----------
     risk : Risk
-        What is to be large.
+        The risk measure to maximise.
     errors : PoseErrors
         Of the sensors' poses.
     scenarios : int
@@ -45,7 +45,7 @@ class RobustnessSettings:
     Raises
     ------
     SeipError
-        There is nothing to choose on, or nothing to evaluate on.
+        There is no scenario to optimise on, or no draw to evaluate on.
     """
 
     risk: Risk = field(default_factory=Risk)
@@ -66,7 +66,7 @@ class Contender:
     Parameters
     ----------
     name : str
-        What it was chosen for.
+        What it was optimised for.
     planned : float
         Share of the targets' weight that it covers as planned, by one look and without any failure.
     evaluated_by : Risk
@@ -147,7 +147,7 @@ def robust_study(
     problem : PlacementProblem
         Of all candidates of the site.
     risks : sequence of Risk
-        What is to be large, for each placement that is compared.
+        A risk measure for each placement that is compared.
     limits : SolverLimits
         For each placement.
     """

@@ -55,9 +55,9 @@ def visibility_in_traffic(
     poses : (s,) int64
         Among the site's candidates.
     instants : sequence of TrafficObstacles
-        Who stands in the way at each of n instants.
+        Bodies of the vehicles present at each of n instants.
     layer : {"road", "height"}
-        What is to be seen.
+        The layer to be seen.
 
     Yields
     ------

@@ -16,7 +16,7 @@ _TILE = 128
 """Columns and rows of the fine grid that are looked at at once."""
 
 MAX_POSITIONS = 20_000
-"""More positions than these are a slip of the keyboard: each is cast from at every height with every type."""
+"""Limit on positions: each is cast from at every height with every type."""
 
 
 def spread(area: BaseGeometry, spacing: float) -> Float:

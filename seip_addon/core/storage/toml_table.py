@@ -45,7 +45,7 @@ def read_table(content: Mapping[str, Any], where: str, keys: Mapping[str, Key]) 
     Parameters
     ----------
     where : str
-        What people call the table: its file, and its number in it.
+        Name for messages: its file, and its number in it.
 
     Raises
     ------

@@ -33,7 +33,7 @@ MAX_RADIUS = 5_000.0
 """Metres from the middle of the place to the end of its region at most."""
 
 MAX_ROW_LENGTH = 10_000
-"""Trees or lights of a row beyond which its spacing is a slip."""
+"""Limit on the trees or lights of a row."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,7 +88,7 @@ def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tu
     -------
     trajectories : Trajectories
     names : tuple of str
-        Who was left out.
+        Names of the road users removed.
     """
     overlaps = yield from find_overlaps(trajectories)
     pairs = overlaps.pair

@@ -28,7 +28,7 @@ ROAD_MARGIN = 20.0
 """Metres beyond the road of the scene within which traffic is read."""
 
 OVERLAP_INTERVAL = 1.0
-"""Seconds between two looks for road users in one place, where a file is read."""
+"""Seconds between the instants that are searched for overlapping road users."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from .settings import VisibilitySettings
 from .triangle_culling import needed_triangles
 
 SAMPLING_SECONDS = 0.8
-"""Seconds that sample places may take, beyond the first of each thread."""
+"""Seconds for sampled positions beyond the first of each thread."""
 
 _BYTES_PER_TRIANGLE = {"embree": 750, "bvh": 1100}
 """At the peak, while the ray caster is built; measured on a street of a million triangles."""

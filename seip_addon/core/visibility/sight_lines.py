@@ -13,7 +13,7 @@ from ..site.site import Site
 from ..site.target_squares import target_squares
 
 MAX_LINES = 1500
-"""More than these are a carpet, not lines: a sample of the targets is drawn."""
+"""Limit on the lines drawn: of more targets a sample is taken."""
 SAMPLE_SEED = 0
 SAME_PLACE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
@@ -53,8 +53,6 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
     ----------
     pose : int
         Index among the site's candidates.
-    model : LidarModel
-        That hangs there.
     row : (t,) bool
         Which targets it sees: its row of the visibility grid.
     """

@@ -66,9 +66,9 @@ class TrafficRuns:
     Parameters
     ----------
     optimisation, evaluation : list of Trajectories
-        To choose a placement on, and to evaluate it in.
+        To optimise a placement on, and to evaluate it on.
     overlap : str
-        How much the two overlap, as a sentence.
+        Message on how much the two overlap.
     """
 
     optimisation: list[Trajectories]
