@@ -32,7 +32,7 @@ class Recording:
     name : str
         For messages.
     traffic : str
-        What tells the run of traffic from all others: the source of its trajectories, with its seed.
+        Identifier of the run of traffic: the source of its trajectories, with its seed.
     frames : sequence of Frame
         In memory, or read when they are asked for.
     sensors : tuple of str

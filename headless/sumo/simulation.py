@@ -41,7 +41,7 @@ _PERMISSIONS = {
     "biking": 'allow="bicycle"',
     "parking": f'allow="{PARKED_CLASS}"',
 }
-"""Who may use which type of lane; nobody the others."""
+"""Permissions of lane types; all others are closed."""
 
 _CLOSED_LANES = ("shoulder", "restricted", "median", "stop", "none", "border")
 

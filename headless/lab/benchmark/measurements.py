@@ -1,4 +1,4 @@
-"""The sequence of measurements of the benchmark."""
+"""The measurements of the benchmark, in sequence."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class BenchmarkScope:
     largest : tuple of int
         As ``street``, with many sensors.
     places : int
-        From so many places growth is looked at.
+        Number of positions in the measurements of growth.
     multiples : tuple of int
         Of the places, and of what grows in the streets.
     copies : tuple of int

@@ -1,4 +1,4 @@
-"""Charts of where the detector begins to fail."""
+"""Charts of the limits of the detector."""
 
 from __future__ import annotations
 

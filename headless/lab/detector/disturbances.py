@@ -202,7 +202,7 @@ class YawError(OfOneSensor):
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
-        return _turned(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
+        return _rotated(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class TiltError(OfOneSensor):
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
-        return _turned(frame, self, sensors, ERROR_AXIS)
+        return _rotated(frame, self, sensors, ERROR_AXIS)
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def _with_models(
     return tuple(replace(sensor, model=change(sensor.model)) for sensor in sensors)
 
 
-def _turned(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor], axis: Float) -> Frame:
+def _rotated(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor], axis: Float) -> Frame:
     return _moved(
         frame, wrong.sensor, sensors[wrong.sensor].xyz, _rotation(axis, math.radians(wrong.size)), np.zeros(3)
     )
@@ -301,7 +301,7 @@ def _rotation(axis: Float, angle: float) -> Float:
 
 
 def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> Frame:
-    """Return the frame with one sensor's points turned about a place and moved."""
+    """Return the frame with one sensor's points rotated about a position and moved."""
     own = frame.sensor == sensor
     points = frame.points.copy()
     points[own] = ((points[own] - about) @ turn.T + about + by).astype(np.float32)

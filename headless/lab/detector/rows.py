@@ -1,4 +1,4 @@
-"""Where the detector begins to fail, as rows of the page of stability."""
+"""Limits of the detector, as rows of the stability page."""
 
 from __future__ import annotations
 

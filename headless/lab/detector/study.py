@@ -66,7 +66,7 @@ def full_series(sensor: int) -> tuple[Series, ...]:
 
 
 def brief_series(sensor: int) -> tuple[Series, ...]:
-    """Return the disturbances that say whether another sensor type bears as much."""
+    """Return a shorter series of disturbances, for further sensor types."""
     return (
         tuple(RangeNoise(size) for size in (0.05, 0.1, 0.2)),
         tuple(DropOff(size) for size in (0.25, 0.5, 0.75)),
@@ -288,7 +288,7 @@ def training_plan(
     Parameters
     ----------
     configurations : sequence of SensorConfiguration
-        All that an evaluation looks at.
+        All of an evaluation.
     training : TrainingSettings
         Of those who learn from all types.
     padding : bool

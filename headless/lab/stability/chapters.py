@@ -1,4 +1,4 @@
-"""Chapters of the stability page: each drives one method to where it begins to fail."""
+"""Chapters of the stability page: each finds the limits of one method."""
 
 from __future__ import annotations
 

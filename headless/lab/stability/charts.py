@@ -1,4 +1,4 @@
-"""Charts of where the criterion, arithmetic and the solvers begin to fail."""
+"""Charts of the limits of criterion, arithmetic and solvers."""
 
 from __future__ import annotations
 

@@ -239,7 +239,7 @@ def ring_borders(
     Parameters
     ----------
     reach : float, metres
-        Nothing farther away is looked at.
+        Targets farther away are ignored.
     """
     return tuple(
         RingBorder(key, height, delta, unresolved_from(model, height, delta, min(reach, model.max_range)))
@@ -273,8 +273,8 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float
     return free
 
 
-def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle: float) -> Targets:
-    """Lay a grid of targets that is shifted and turned.
+def rotated_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle: float) -> Targets:
+    """Return a grid of targets that is shifted and rotated.
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ def _by_grid_laid(
     """Evaluate the best placement on shifted and rotated grids; optimise anew on a quarter of them."""
     covered, rechosen = [], []
     for draw in range(draws):
-        targets = turned_targets(
+        targets = rotated_targets(
             evaluator.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
         )
         laid = replace(site, targets=targets)

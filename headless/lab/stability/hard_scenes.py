@@ -39,7 +39,7 @@ class HardScene:
 
 
 def hard_scenes(rays: int, random: np.random.Generator) -> list[HardScene]:
-    """Return one scene of each kind that scenes made by hand or read from a map may hold."""
+    """Return one scene of each kind of numerical difficulty."""
     street = _street()
     everywhere = _everywhere(rays, random)
     plain = HardScene("an ordinary street", street, ORIGIN, everywhere)

@@ -1,4 +1,4 @@
-"""A row of the page of stability: one method in one regime."""
+"""A row of the stability page: one method in one regime."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Colours and marks that a plan and its legend share."""
+"""Colours and marks shared by a plan and its legend."""
 
 from __future__ import annotations
 

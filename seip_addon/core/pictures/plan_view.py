@@ -155,7 +155,7 @@ def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
 
 
 def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: BaseGeometry) -> Normalize:
-    """Draw what stands in the way, the higher the darker, and return the scale of heights."""
+    """Draw obstacles, darker the higher they are, and return the scale of heights."""
     triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
     flat = shapely.polygons(triangles[:, :, :2])
     drawn = (shapely.area(flat) > MIN_PLAN_AREA) & shapely.intersects(flat, shown)

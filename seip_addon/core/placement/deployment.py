@@ -64,7 +64,7 @@ class Sensor:
 
     @property
     def orientation(self) -> Float:
-        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
+        """Rotation from the sensor's axes to the site's, (3, 3) float64."""
         return orientation(self.yaw, self.tilt, self.roll)
 
 
@@ -124,7 +124,7 @@ def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deplo
     Parameters
     ----------
     mounted : sequence of Sensor
-        In the order in which each adds to those before it; their own shares are not looked at.
+        In the order in which each adds to those before it; their own shares are ignored.
     rows : (k, t) bool
         What each of them sees.
     """

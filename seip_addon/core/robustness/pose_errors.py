@@ -137,7 +137,7 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
     Parameters
     ----------
     foot : (s, 3) float64, metres
-        Ground point of each sensor's position; equal ones err alike.
+        Ground point of each sensor's position; equal ones have equal errors.
     seed : int
         At least 0.
     """

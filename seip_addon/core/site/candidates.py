@@ -236,7 +236,7 @@ class Candidates:
         return len(self.xyz)
 
     def orientation(self, pose: int) -> Float:
-        """Return how a pose's sensor is turned, (3, 3) float64, from its axes to the site's."""
+        """Return the rotation of a pose's sensor from its axes to the site's, (3, 3) float64."""
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 

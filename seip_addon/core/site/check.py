@@ -60,7 +60,7 @@ class Problem:
     text : str
         The problem and its remedy.
     thing : str
-        Name of the object to look at; empty where it is the scene.
+        Name of the object concerned; empty where it is the scene.
     """
 
     severity: Severity

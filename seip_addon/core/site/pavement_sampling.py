@@ -13,7 +13,7 @@ _FINE_STEPS = 8
 """Fine grid steps per candidate spacing: a strip wider than an eighth of it gets candidates."""
 
 _TILE = 128
-"""Columns and rows of the fine grid that are looked at at once."""
+"""Columns and rows of a tile of the fine grid."""
 
 MAX_POSITIONS = 20_000
 """Limit on positions: each is cast from at every height with every type."""

@@ -50,7 +50,7 @@ WORDS_OF_KIND = {
     Kind.BUILDING: {"building", "house", "haus", "gebaeude", "garage", "church", "school"},
 }
 SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel", "mast", "gantry", "signalpole"}
-"""Words in the name of a post that say that it carries traffic lights."""
+"""Words in the name of a post that carries traffic lights."""
 SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
 
 MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0

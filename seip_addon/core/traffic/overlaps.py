@@ -18,7 +18,7 @@ MIN_OVERLAP = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Overlaps:
-    """Pairs of road users that are in one place at one of the instants looked at; k pairs.
+    """Pairs of road users that overlap at some sampled instant; k pairs.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
     Raises
     ------
     SeipError
-        The file cannot be read, or nobody in it comes near.
+        The file cannot be read, or no road user in it comes near.
     """
     trajectories = Trajectories.load(path).moved_to(geometry.origin)
     left, bottom, right, top = geometry.region.bounds

@@ -18,7 +18,7 @@ SAMPLE_SEED = 0
 SAME_PLACE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
 SAME_TURN = 5e-5
-"""Cosines by which it may be turned otherwise."""
+"""Difference of cosines up to which two orientations are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
 
 
 def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float) -> int | None:
-    """Return the candidate pose of a sensor type at a place and turned so, None where there is none.
+    """Return the candidate pose of a sensor type at a position and orientation, None where there is none.
 
     Parameters
     ----------
