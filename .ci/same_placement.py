@@ -9,7 +9,7 @@ from seip_addon.core.results.placement_record import comparable, load_placement_
 def lines(path: str) -> list[str]:
     """Lines of a record, without what differs from one machine and run to the next."""
     record = load_placement_record(path)
-    if record["objective"]["status"] != "optimal":
+    if record.objective.status != "optimal":
         sys.exit(f"{path} is not proven optimal, so that it depends on the machine's speed")
     return json.dumps(comparable(record), indent=1, sort_keys=True).splitlines()
 

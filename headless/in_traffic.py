@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -18,15 +19,9 @@ from headless.charts.traffic import save_time_map, save_traffic_chart
 from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 
 from seip_addon.core.placement.objective import Solution, check_objective
+from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
-from seip_addon.core.workflows.survey import Layout
-from seip_addon.core.workflows.traffic import (
-    TrafficRuns,
-    TrafficSettings,
-    independent_runs,
-    load_runs,
-    place_in_traffic,
-)
+from seip_addon.core.workflows.traffic import TrafficSettings, place_in_traffic, read_runs
 
 CHARTS = ("time_seen.png", "traffic.png")
 
@@ -37,7 +32,7 @@ def main(argv: list[str]) -> None:
     objective, settings = read_objective(options), read_settings(TrafficSettings, options)
     surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
     layout = surveyed.layout
-    runs = _read_runs(options, layout)
+    runs = finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout))
     runtime.LOG.info(runs.overlap)
     steps = place_in_traffic(layout, surveyed.grid, objective, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)
@@ -51,22 +46,14 @@ def main(argv: list[str]) -> None:
         )
         sensors = f"{len(solution.deployment.sensors)} sensors"
         save_traffic_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
-        survey.save_solution(surveyed, solution, options.output, render=not options.no_render)
+        survey.save_solution(surveyed, solution, options.output, render=not options.no_render, traffic=asdict(settings))
     runtime.print_line(f"written to {options.output}/")
-
-
-def _read_runs(options: argparse.Namespace, layout: Layout) -> TrafficRuns:
-    paths = options.traffic or survey.runs_beside(options.scene)
-    loaded = load_runs(paths, layout.geometry.origin)
-    return independent_runs({str(path): run for path, run in zip(paths, loaded, strict=True)}, layout.site)
 
 
 def _in_words(study: TrafficStudy, solution: Solution) -> str:
     sensors = [survey.describe_sensor(sensor) for sensor in solution.deployment.sensors]
     seen = [f"chosen for {placed.name}: {_share(placed)}" for placed in (study.empty, study.traffic)]
-    gain = f"placing on traffic sees {study.gain(study.layer).describe()} more of the {LAYER_NAMES[study.layer]}"
-    doubt = () if study.is_converged() else ("every other instant says something else: take more (--judged-at)",)
-    return "\n".join([*sensors, *seen, gain, solution.certificate, *doubt, *solution.placement.notes])
+    return "\n".join([*sensors, *seen, solution.certificate, *solution.placement.notes])
 
 
 def _share(placed: TrafficEvaluation) -> str:

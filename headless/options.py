@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from types import NoneType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -15,16 +15,48 @@ from seip_addon.core.settings import Setting, settings_of
 Options = TypeVar("Options")
 
 
-class HelpWithDefaults(argparse.ArgumentDefaultsHelpFormatter):
-    """Help that names the default of each option that has one."""
+class _BriefHelp(argparse.HelpFormatter):
+    """Help of a line for most options, with the default of each that has one."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=30)
+
+    def add_usage(
+        self,
+        usage: str | None,
+        actions: Iterable[argparse.Action],
+        groups: Iterable[argparse._MutuallyExclusiveGroup],
+        prefix: str | None = None,
+    ) -> None:
+        """Add what must be given; the options have lines of their own."""
+        needed = [action for action in actions if action.required or not action.option_strings]
+        super().add_usage(usage or f"%(prog)s {self._format_actions_usage(needed, [])} [options]", [], groups, prefix)
+
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        if not action.option_strings or action.nargs == 0:
+            return super()._format_action_invocation(action)
+        values = self._format_args(action, self._get_default_metavar_for_optional(action))
+        return f"{', '.join(action.option_strings)} {values}"
+
+    def _format_args(self, action: argparse.Action, default_metavar: str) -> str:
+        several = action.nargs == "+" and isinstance(action.metavar, str)
+        return f"{action.metavar} ..." if several else super()._format_args(action, default_metavar)
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        return action.help if action.default in (None, [], math.inf) else super()._get_help_string(action)
+        default = action.default
+        if not action.option_strings or isinstance(default, bool) or default in (None, [], argparse.SUPPRESS, math.inf):
+            return action.help
+        shown = default if isinstance(default, tuple | list) else [default]
+        return f"{action.help} (default: {' '.join(map(_as_typed, shown))})"
+
+
+def _as_typed(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def new_parser(prog: str, description: str) -> argparse.ArgumentParser:
-    """Return a parser whose help names defaults."""
-    return argparse.ArgumentParser(prog=prog, description=description, formatter_class=HelpWithDefaults)
+    """Return a parser whose help is brief and names defaults."""
+    return argparse.ArgumentParser(prog=prog, description=description, formatter_class=_BriefHelp)
 
 
 def add_settings(group: argparse._ActionsContainer, kind: type, *names: str) -> None:

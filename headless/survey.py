@@ -6,7 +6,7 @@ import argparse
 import logging
 import math
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -32,6 +32,7 @@ from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.triangle_culling import culling_message
 from seip_addon.core.workflows.survey import Layout, Provenance, SurveySettings, lay_out, record_of, see
+from seip_addon.core.workflows.traffic import runs_in, traffic_folder
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
@@ -96,17 +97,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
-    """Return the runs in the folder that stands beside a scene: ``junction_traffic`` beside ``junction.blend``.
-
-    Parameters
-    ----------
-    scene : path or None
-        None for the scene that is open.
-    kind : str
-        What else the folder's name ends with: ``_dense`` for ``junction_traffic_dense``.
-    """
-    path = Path(bpy.data.filepath) if scene is None else scene
-    return sorted((path.parent / f"{path.stem}_traffic{kind}").glob("*.npz"))
+    """Return the runs in the `traffic_folder` of a scene, or of the one that is open."""
+    return runs_in(traffic_folder(Path(bpy.data.filepath) if scene is None else scene, kind))
 
 
 Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
@@ -146,9 +138,15 @@ def survey(
 
 
 def save_solution(
-    surveyed: Survey, solution: Solution, folder: Path, *, render: bool, pose_errors: bool = False
+    surveyed: Survey,
+    solution: Solution,
+    folder: Path,
+    *,
+    render: bool,
+    pose_errors: bool = False,
+    traffic: Mapping[str, object] | None = None,
 ) -> None:
-    """Write a solution of a survey, with its record, to the folder of results."""
+    """Write a solution of a survey, with its record (see `record_of`), to the folder of results."""
     layout, grid = surveyed.layout, surveyed.grid
     now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
@@ -157,7 +155,7 @@ def save_solution(
         layout.geometry,
         layout.site,
         solution,
-        record_of(layout, grid, solution, now, render=render, pose_errors=pose_errors),
+        record_of(layout, grid, solution, now, render=render, pose_errors=pose_errors, traffic=traffic),
         visible=grid.visible,
         models=layout.models,
         render=render,

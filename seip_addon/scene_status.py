@@ -7,7 +7,7 @@ from dataclasses import replace
 import bpy
 
 from .core.errors import SeipError
-from .core.results.placement_record import Record, parsed_record
+from .core.results.placement_record import PlacementRecord, parsed_record
 from .core.workflows.survey import SurveySettings
 from .scene import contract
 from .session import SceneSurvey, session
@@ -89,9 +89,9 @@ def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
     return _without_search(one) == _without_search(other)
 
 
-def is_of(record: Record, survey: SceneSurvey) -> bool:
+def is_of(record: PlacementRecord, survey: SceneSurvey) -> bool:
     """Return whether a record's placement was made on a survey; an older record holds fewer digests."""
-    return all(survey.inputs.get(name) == key for name, key in record["inputs"].items())
+    return all(survey.inputs.get(name) == key for name, key in record.inputs.items())
 
 
 def _without_search(settings: SurveySettings) -> SurveySettings:

@@ -19,7 +19,7 @@ from . import preferences
 from .core.errors import SeipError
 from .core.placement.objective import MOVED
 from .core.progress import Progress
-from .core.results.placement_record import Record, parsed_record
+from .core.results.placement_record import PlacementRecord, parsed_record
 from .core.visibility.grid import VisibilityGrid
 from .core.workflows.moved_sensors import restored_by_hand
 from .core.workflows.survey import SurveySettings, inputs_of, lay_out, restored_plan, see
@@ -111,7 +111,7 @@ def _laid_out(
 
 
 def _grid_again(
-    surveying: Generator[Progress, None, SceneSurvey], record: Record
+    surveying: Generator[Progress, None, SceneSurvey], record: PlacementRecord
 ) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
     known = yield from surveying
     if not is_of(record, known):
@@ -126,7 +126,7 @@ def _restored(surveying: Generator[Progress, None, SceneSurvey], text: str) -> G
     known, grid = yield from _grid_again(surveying, record)
     if known.record == text and known.plan is not None:
         return known
-    if record["objective"]["status"] == MOVED:
+    if record.objective.status == MOVED:
         plan = yield from restored_by_hand(known.layout, grid, record)
     else:
         plan = restored_plan(known.layout, grid, record)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 import numpy as np
 
 from .core.arrays import Float
 from .core.errors import SeipError
-from .core.results.placement_record import parsed_record
-from .core.workflows.moved_sensors import BY_HAND, recorded_orientation
+from .core.results.placement_record import RecordedSensor, parsed_record
+from .core.workflows.moved_sensors import BY_HAND
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of
 
@@ -48,7 +46,7 @@ class SensorEdits:
 def sensor_edits(scene: bpy.types.Scene) -> SensorEdits:
     """Compare the sensors in a scene, hidden or not, with its placement."""
     text = scene.seip.result.record
-    placed = {line["id"]: line for line in parsed_record(text)["sensors"]} if text else {}
+    placed = {sensor.id: sensor for sensor in parsed_record(text).sensors} if text else {}
     there = labelled_sensors(scene, hidden=True)
     return SensorEdits(
         tuple(label for label, thing in there.items() if label in placed and not _is_there(thing, placed[label])),
@@ -76,10 +74,10 @@ def _moved_from(name: str) -> str:
     return name if not name or name.startswith(BY_HAND) else f"{BY_HAND}, from {name}"
 
 
-def _is_there(thing: bpy.types.Object, line: Mapping[str, Any]) -> bool:
+def _is_there(thing: bpy.types.Object, sensor: RecordedSensor) -> bool:
     try:
         pose = pose_of(thing)
     except SeipError:  # it has no proper transform any more
         return False
-    recorded = np.array(line["local_m"]), recorded_orientation(line)
-    return same_pose(pose, recorded) and thing.get(contract.SENSOR) == line["sensor"]
+    recorded = np.array(sensor.local_m), sensor.orientation
+    return same_pose(pose, recorded) and thing.get(contract.SENSOR) == sensor.sensor

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Literal
 
 import bpy
@@ -17,7 +18,8 @@ from ..core.progress import Progress
 from ..core.results.placement_record import versions
 from ..core.robustness.robust_study import RobustnessSettings
 from ..core.workflows.robust import check_robust_objective, place_robustly
-from ..core.workflows.survey import Provenance, place, record_of
+from ..core.workflows.survey import Layout, Provenance, place, record_of
+from ..core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs, runs_in
 from ..scene.write import write_result
 from ..session import SceneSurvey
 from .results import keep_result
@@ -33,9 +35,13 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Read the scene where it has changed, and state the goal."""
         asked = scene.seip.goal
-        robustness = asked.robustness()
-        self._pose_errors = asked.pose_errors and robustness is None
-        return _placed(scene_survey.survey(scene), asked.goal(), robustness, pose_errors=self._pose_errors)
+        robustness, traffic = asked.robustness(), asked.traffic()
+        self._pose_errors = asked.pose_errors and robustness is None and traffic is None
+        self._traffic = None if traffic is None else asdict(traffic)
+        if traffic is None:
+            return _placed(scene_survey.survey(scene), asked.goal(), robustness, pose_errors=self._pose_errors)
+        folder = asked.runs_folder()
+        return _placed_in_traffic(scene_survey.survey(scene), asked.goal(), traffic, folder)
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
@@ -44,7 +50,13 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
         deployment = result.plan.deployment
         circumstances = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
         record = record_of(
-            result.layout, result.grid, result.plan, circumstances, render=False, pose_errors=self._pose_errors
+            result.layout,
+            result.grid,
+            result.plan,
+            circumstances,
+            render=False,
+            pose_errors=self._pose_errors,
+            traffic=self._traffic,
         )
         write_result(scene, result.layout.site, deployment)
         keep_result(scene, result, record)
@@ -69,6 +81,29 @@ def _placed(
     else:
         plan = (yield from place_robustly(known.layout, grid, goal, robustness)).solution
     return replace(known, plan=plan, durations=known.timed("placement", began))
+
+
+def _placed_in_traffic(
+    surveying: Generator[Progress, None, SceneSurvey], goal: Objective, settings: TrafficSettings, folder: Path
+) -> Generator[Progress, None, SceneSurvey]:
+    check_robust_objective(goal)
+    known = yield from surveying
+    check_objective(known.layout.site, known.layout.models, goal)
+    runs = yield from _read_runs(folder, known.layout)  # refuses before any ray is cast
+    known, grid = yield from scene_survey.with_visibility(known)
+    began = time.perf_counter()
+    placed = yield from place_in_traffic(known.layout, grid, goal, runs, settings)
+    return replace(known, plan=placed.solution, durations=known.timed("placement", began))
+
+
+def _read_runs(folder: Path, layout: Layout) -> Generator[Progress, None, TrafficRuns]:
+    paths = runs_in(folder)
+    if not paths:
+        raise SeipError(
+            f"there is no run of traffic (.npz) in {folder}: choose another folder, or make two or more runs with "
+            "headless/traffic.py, a seed each"
+        )
+    return (yield from read_runs(paths, layout))
 
 
 class SEIP_OT_add_rule(bpy.types.Operator):

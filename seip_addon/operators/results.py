@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -15,17 +14,17 @@ from mathutils import Vector
 from .. import live_coverage, preferences, scene_status, scene_survey, selection
 from ..core.errors import SeipError
 from ..core.geometry.orientation import describe_tilt
-from ..core.placement.objective import Solution, target_weights
+from ..core.placement.objective import Objective, Solution, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
-from ..core.results.placement_record import Record, parsed_record, versions
+from ..core.results.placement_record import PlacementRecord, parsed_record, versions
 from ..core.results.ranking import Ranked, rank_added, rank_alone
 from ..core.scans.sensor import MountedSensor
 from ..core.storage.files import check_folder, digest
 from ..core.visibility.grid import VisibilityGrid
 from ..core.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.workflows.moved_sensors import judge
-from ..core.workflows.survey import Provenance, record_of, recorded_goal
+from ..core.workflows.survey import Provenance, record_of
 from ..scene.blend_file import save_blend
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
@@ -56,7 +55,13 @@ def no_placement(scene: bpy.types.Scene) -> str:
     """Say that there is no placement that can be shown; empty if there is one."""
     if scene_status.is_newer(scene):
         return scene_status.NEWER
-    return "" if scene.seip.result.record else "There is no placement yet: place sensors first."
+    if not scene.seip.result.record:
+        return "There is no placement yet: place sensors first."
+    try:
+        parsed_record(scene.seip.result.record)
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 def no_folder(scene: bpy.types.Scene) -> str:
@@ -290,7 +295,7 @@ class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
         hung = read_sensors(scene, preferences.catalogue(), hidden=True)
         return _judged(
             scene_survey.with_grid_of_placement(scene),
-            parsed_record(scene.seip.result.record),
+            parsed_record(scene.seip.result.record).asked.goal,
             hung,
             position_names(scene),
         )
@@ -307,19 +312,19 @@ class SEIP_OT_judge_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
 
 def _judged(
     finding: Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]],
-    record: Record,
+    goal: Objective,
     hung: Sequence[MountedSensor],
     places: Mapping[str, str],
 ) -> Generator[Progress, None, SceneSurvey]:
     known, grid = yield from finding
-    return replace(known, plan=(yield from judge(known.layout, grid, recorded_goal(record), hung, places)))
+    return replace(known, plan=(yield from judge(known.layout, grid, goal, hung, places)))
 
 
-def keep_result(scene: bpy.types.Scene, known: SceneSurvey, record: Record) -> None:
+def keep_result(scene: bpy.types.Scene, known: SceneSurvey, record: PlacementRecord) -> None:
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
     plan, _ = _plan_and_grid(known)
     kept = scene.seip.result
-    kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+    kept.record = record.text()
     kept.targets = digest(known.layout.site.targets.xyz)
     kept.seen = packed_counts(plan.deployment.seen_by)
     kept.sensors.clear()
@@ -375,8 +380,8 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         yield Progress(0, 0, "reading the scene")
         known = yield from finding
         plan, grid = _plan_and_grid(known)
-        record = {**parsed_record(known.record)}
-        record["settings"] = {**record["settings"], "render": render}
+        record = parsed_record(known.record)
+        record = replace(record, settings={**record.settings, "render": render})
         layout = known.layout
         yield from write_tables(part, layout.geometry, layout.site, plan, record, grid.visible, layout.models)
         if render:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Generator
 from dataclasses import replace
@@ -64,7 +63,7 @@ def why_no_trial(scene: bpy.types.Scene) -> str:
     if no_placement(scene) or scene.session_uid not in session.traffic:
         return no_placement(scene) or NO_LOADED
     record = parsed_record(scene.seip.result.record)
-    elsewhere = any(line["pose"] is None for line in record["sensors"])
+    elsewhere = any(sensor.pose is None for sensor in record.sensors)
     return NOT_AT_CANDIDATES if elsewhere else not_judged(scene)
 
 
@@ -157,12 +156,12 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operat
         """Note it with the placement."""
         known, sentence = result
         kept = scene.seip.result
-        record = json.loads(kept.record)
-        record["notes"] = [*(note for note in record["notes"] if not note.startswith(IN_TRAFFIC)), sentence]
+        record = parsed_record(kept.record)
+        notes = (*(note for note in record.notes if not note.startswith(IN_TRAFFIC)), sentence)
         plan = known.plan
         if plan is not None:
-            plan = replace(plan, placement=replace(plan.placement, notes=tuple(record["notes"])))
-        kept.record = json.dumps(record, ensure_ascii=False, allow_nan=False)
+            plan = replace(plan, placement=replace(plan.placement, notes=notes))
+        kept.record = replace(record, notes=notes).text()
         session.keep_survey(scene, replace(known, plan=plan, record=kept.record))
         self.report({"INFO"}, sentence)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from .. import scene_status
-from ..core.placement.objective import certificate
-from ..core.results.placement_record import Record, parsed_record, relevant_warnings
+from ..core.results.placement_record import PlacementRecord, parsed_record, relevant_warnings
+from ..core.workflows.traffic import traffic_folder
 from ..operators.placement import SEIP_OT_solve_placement
 from ..operators.results import SEIP_OT_judge_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
@@ -14,6 +16,9 @@ from ..sensor_edits import sensor_edits
 from .run_button import draw_run
 from .sidebar import RowList, Sidebar, settings_column
 from .wrapped_text import draw_sentence
+
+_ERRING = ("position_error", "tilt_error", "seen_by", "failure")
+_IN_TRAFFIC = ("layer", "weights_from_traffic", "instants", "evaluation_instants")
 
 
 class SEIP_UL_rules(RowList, bpy.types.UIList):
@@ -72,9 +77,13 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
         if goal.objective == "PLANNED":
             layout.prop(goal, "pose_errors")
             return
-        for name in ("position_error", "tilt_error", "seen_by", "failure"):
+        in_traffic = goal.objective == "TRAFFIC"
+        if in_traffic:
+            layout.prop(goal, "runs", placeholder=traffic_folder(Path(bpy.data.filepath)).name)
+        for name in _IN_TRAFFIC if in_traffic else _ERRING:
             layout.prop(goal, name)
-        draw_sentence(layout, "This looks from every candidate in twenty draws and takes minutes.", icon="INFO")
+        looks = f"at {goal.instants} instants" if in_traffic else "in twenty draws"
+        draw_sentence(layout, f"This looks from every candidate {looks} and takes minutes.", icon="INFO")
 
 
 class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
@@ -136,38 +145,34 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         row.label(text=name)
         row.label(text=value)
     if column.active:
-        proven = record["objective"]["status"] == "optimal"
-        draw_sentence(box, _certificate(record["objective"]), icon="CHECKMARK" if proven else "INFO")
+        proven = record.objective.status == "optimal"
+        draw_sentence(box, record.objective.certificate, icon="CHECKMARK" if proven else "INFO")
     notes = box.column()
     notes.active = column.active
-    for note in (*record["notes"], *_warnings(record)):
+    for note in (*record.notes, *_warnings(record)):
         draw_sentence(notes, note, icon="INFO")
 
 
-def figures(record: Record) -> list[tuple[str, str]]:
+def figures(record: PlacementRecord) -> list[tuple[str, str]]:
     """Return what a placement is judged by, in words."""
-    coverage, objective = record["coverage"], record["objective"]
-    lines = [("Coverage", f"{coverage['whole']:.2%}")]
-    if coverage["central"] is not None:
-        lines.append(("Central coverage", f"{coverage['central']:.2%}"))
-    if objective["kind"] == "weighted":
-        lines.append(("Weighted coverage", f"{coverage['weighted']:.2%}"))
-    lines += [("Price", f"${record['price_usd']:,.0f}"), ("Sensors", str(len(record["sensors"])))]
-    if objective["bound"] is not None and objective["gap"] is not None:
-        unit = "${:,.0f}" if objective["sought"] == "least price" else "{:,.6g}"
-        lines.append(("Objective", unit.format(objective["value"])))
-        lines.append(("Bound", unit.format(objective["bound"])))
-        lines.append(("Gap", f"{objective['gap']:.2%}"))
+    coverage, objective = record.coverage, record.objective
+    lines = [("Coverage", f"{coverage.whole:.2%}")]
+    if coverage.central is not None:
+        lines.append(("Central coverage", f"{coverage.central:.2%}"))
+    if objective.kind == "weighted":
+        lines.append(("Weighted coverage", f"{coverage.weighted:.2%}"))
+    lines += [("Price", f"${record.price_usd:,.0f}"), ("Sensors", str(len(record.sensors)))]
+    if objective.bound is not None and objective.gap is not None:
+        unit = "${:,.0f}" if objective.cheapest else "{:,.6g}"
+        lines.append(("Objective", unit.format(objective.value)))
+        lines.append(("Bound", unit.format(objective.bound)))
+        lines.append(("Gap", f"{objective.gap:.2%}"))
     return lines
 
 
-def _certificate(objective: Record) -> str:
-    return certificate(objective["status"], objective["gap"], cheapest=objective["sought"] == "least price")
-
-
-def _warnings(record: Record) -> list[str]:
-    chosen = [sensor["sensor"] for sensor in record["sensors"]]
-    return relevant_warnings(record["warnings"], record["settings"]["candidates"]["sensors"], chosen)
+def _warnings(record: PlacementRecord) -> list[str]:
+    chosen = [sensor.sensor for sensor in record.sensors]
+    return relevant_warnings(record.warnings, record.asked.candidates.sensors, chosen)
 
 
 CLASSES = (

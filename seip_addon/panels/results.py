@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.results.placement_record import Record, parsed_record
+from ..core.errors import SeipError
+from ..core.results.placement_record import PlacementRecord, parsed_record
 from ..operators import results
 from ..session import FollowedSensors, session
 from .run_button import draw_run
@@ -20,13 +21,13 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a sensor: label, type, height, place and what it sees."""
         record = parsed_record(bpy.context.scene.seip.result.record)
-        sensor = next((one for one in record["sensors"] if one["id"] == item.name), None)
+        sensor = next((one for one in record.sensors if one.id == item.name), None)
         if sensor is None:
             layout.label(text=item.name)
             return
         row = layout.split(factor=0.75)
-        row.label(text=f"{item.name}  {sensor['sensor']} {sensor['height_m']:g} m {sensor['position']}")
-        row.label(text=f"{sensor['coverage_alone']:.1%}")
+        row.label(text=f"{item.name}  {sensor.sensor} {sensor.height_m:g} m {sensor.position}")
+        row.label(text=f"{sensor.coverage_alone:.1%}")
 
 
 class SEIP_UL_ranked(RowList, bpy.types.UIList):
@@ -127,21 +128,25 @@ class SEIP_PT_results_comparison(_Result, bpy.types.Panel):
         if not 0 <= seip.active_kept < len(seip.kept):
             draw_sentence(layout, "Keep this placement with +, place again, and compare the two.", icon="INFO")
             return
-        kept = parsed_record(seip.kept[seip.active_kept].record)
+        try:
+            kept = parsed_record(seip.kept[seip.active_kept].record)
+        except SeipError as error:
+            draw_sentence(layout, str(error), icon="ERROR")
+            return
         _draw_table(layout, kept, parsed_record(seip.result.record))
         layout.operator("seip.show_comparison").back = False
         layout.operator("seip.show_comparison", text="Show Coverage").back = True
 
 
-def _draw_table(layout: bpy.types.UILayout, kept: Record, present: Record) -> None:
+def _draw_table(layout: bpy.types.UILayout, kept: PlacementRecord, present: PlacementRecord) -> None:
     grid = layout.grid_flow(row_major=True, columns=3, even_columns=True, align=True)
     for text in ("", "Kept", "Present"):
         grid.label(text=text)
     for name, one, other in (
-        ("Coverage", _share(kept["coverage"]["whole"]), _share(present["coverage"]["whole"])),
-        ("Central", _share(kept["coverage"]["central"]), _share(present["coverage"]["central"])),
-        ("Price", f"${kept['price_usd']:,.0f}", f"${present['price_usd']:,.0f}"),
-        ("Sensors", str(len(kept["sensors"])), str(len(present["sensors"]))),
+        ("Coverage", _share(kept.coverage.whole), _share(present.coverage.whole)),
+        ("Central", _share(kept.coverage.central), _share(present.coverage.central)),
+        ("Price", f"${kept.price_usd:,.0f}", f"${present.price_usd:,.0f}"),
+        ("Sensors", str(len(kept.sensors)), str(len(present.sensors))),
     ):
         for text in (name, one, other):
             grid.label(text=text)

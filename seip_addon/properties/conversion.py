@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..core.settings import settings_of
 
-_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: EnumProperty}
 _UNITS = {"m": {"unit": "LENGTH"}, "rad": {"subtype": "ANGLE"}}
 
 
@@ -22,7 +22,7 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
     name : str
         As the panel shows it.
     **more
-        What Blender's property takes beside, or in place of that: soft limits, steps.
+        What Blender's property takes beside, or in place of that: soft limits, steps, the items of a choice.
     """
     about, default = settings_of(kind)[field]
     limits = {"min": about.minimum, "max": about.maximum}

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import selection
+from ..core.errors import SeipError
 from ..core.placement.objective import DEFAULT_COUNT, Objective
 from ..core.robustness.pose_errors import MAX_ANGLE_STD, PoseErrors
 from ..core.robustness.risk import Risk
 from ..core.robustness.robust_study import RobustnessSettings
-from .conversion import as_typed, of_setting
+from ..core.robustness.traffic_study import LAYER_NAMES
+from ..core.workflows.traffic import TrafficSettings, traffic_folder
+from .conversion import absolute, as_typed, of_setting
 
 TAILS = {"EXPECTED": 1.0, "CVAR": 0.25, "WORST": 0.0}
 """Share of the scenarios, the worst ones, that count, by objective."""
@@ -73,6 +77,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("EXPECTED", "Expected Coverage", "Coverage on average over poses that err"),
             ("CVAR", "CVaR of the Worst Quarter", "Coverage on average over the worst quarter of poses that err"),
             ("WORST", "Worst Case", "Coverage in the worst of the poses that were tried"),
+            ("TRAFFIC", "Coverage in Traffic", "Coverage on average over instants at which vehicles block the view"),
         ),
     )
     position_error: of_setting(PoseErrors, "position", "Position Error", min=0.0)
@@ -87,6 +92,25 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
             ("mean", "Any Sensor", "On average over all of them"),
         ),
     )
+    runs: StringProperty(
+        name="Runs",
+        description="Folder with runs of traffic (.npz), two or more: the last third evaluates what is chosen on the "
+        "others. Empty for the folder SCENE_traffic beside the file",
+        subtype="DIR_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    layer: of_setting(
+        TrafficSettings,
+        "layer",
+        "See",
+        items=(
+            ("road", "Road", f"The {LAYER_NAMES['road']}"),
+            ("height", "Vehicles' Height", f"The {LAYER_NAMES['height']}"),
+        ),
+    )
+    weights_from_traffic: of_setting(TrafficSettings, "weights_from_traffic", "Weights from Traffic")
+    instants: of_setting(TrafficSettings, "instants", "Instants")
+    evaluation_instants: of_setting(TrafficSettings, "evaluation_instants", "Evaluation Instants")
     pose_errors: BoolProperty(
         name="Test Pose Errors",
         description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",
@@ -119,18 +143,39 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
         )
 
     def robustness(self) -> RobustnessSettings | None:
-        """Return what the placement is to stand, None where it trusts the map.
+        """Return what the placement is to stand, None where it trusts the poses.
 
         Raises
         ------
         SeipError
             It makes no sense.
         """
-        if self.objective == "PLANNED":
+        if self.objective not in TAILS:
             return None
         position, tilt = as_typed(self.position_error), as_typed(self.tilt_error)
         risk = Risk(TAILS[self.objective], self.seen_by, self.failure)
         return RobustnessSettings(risk, PoseErrors(position, position, tilt, tilt))
+
+    def traffic(self) -> TrafficSettings | None:
+        """Return how the placement is chosen on traffic, None where it is not."""
+        if self.objective != "TRAFFIC":
+            return None
+        return TrafficSettings(self.layer, self.weights_from_traffic, self.instants, self.evaluation_instants)
+
+    def runs_folder(self) -> Path:
+        """Return the folder with the runs of traffic.
+
+        Raises
+        ------
+        SeipError
+            It is beside the file, and the file has not been saved.
+        """
+        if not bpy.data.filepath and (not self.runs or self.runs.startswith("//")):
+            raise SeipError(
+                "the runs of traffic are beside the file, and the file has not been saved: save it first, or choose "
+                "another folder"
+            )
+        return absolute(self.runs) if self.runs else traffic_folder(Path(bpy.data.filepath))
 
     def _weight(self) -> float | Literal["scene"] | None:
         if self.weighting == "SCENE":

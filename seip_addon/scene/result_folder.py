@@ -17,7 +17,7 @@ from ..core.placement.objective import Solution
 from ..core.progress import Progress, finish
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
-from ..core.results.placement_record import Record, relevant_warnings, save_placement_record
+from ..core.results.placement_record import PlacementRecord, relevant_warnings, save_placement_record
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from .blend_file import save_blend
@@ -69,7 +69,7 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     geometry: SceneGeometry,
     site: Site,
     plan: Solution,
-    record: Record,
+    record: PlacementRecord,
     *,
     visible: Boolean,
     models: Mapping[str, LidarModel],
@@ -83,7 +83,7 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
         Receives the sensors and the coverage.
     geometry : SceneGeometry
         What was read from the scene.
-    record : dict
+    record : PlacementRecord
         What ``placement.json`` will hold.
     visible : (c, t) bool
         The visibility grid.
@@ -104,7 +104,7 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     geometry: SceneGeometry,
     site: Site,
     plan: Solution,
-    record: Record,
+    record: PlacementRecord,
     visible: Boolean,
     models: Mapping[str, LidarModel],
 ) -> Generator[Progress, None, None]:
@@ -116,5 +116,5 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     yield Progress(1, 3, "writing tables")
     save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
     yield Progress(2, 3, "drawing the plan")
-    warnings = relevant_warnings(record["warnings"], models, (sensor.model.key for sensor in deployment.sensors))
+    warnings = relevant_warnings(record.warnings, models, (sensor.model.key for sensor in deployment.sensors))
     save_plan_view(part["plan.png"], geometry, site, deployment, [plan.certificate, *warnings])

@@ -12,7 +12,7 @@ import pytest
 from seip_addon import live_coverage, selection
 from seip_addon.core.placement.objective import MOVED, MOVED_MESSAGE
 from seip_addon.core.results.comparison import unpacked_counts
-from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.scene import result_folder
 from seip_addon.scene.result_folder import FILES
 from seip_addon.sensor_edits import sensor_edits
@@ -107,7 +107,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert {name: thing.matrix_world for name, thing in selection.sensor_empties(placed).items()} == there
     out = tmp_path / "out"
     written = load_placement_record(out / "placement.json")
-    assert comparable(written) == comparable(record(placed))
+    assert comparable(written) == comparable(parsed_record(placed.seip.result.record))
     rows = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     chosen = {row["chosen"]: row for row in rows if row["chosen"]}
     assert chosen.keys() == {"S1", "S2"}
@@ -189,4 +189,4 @@ def test_the_view_is_rendered_elsewhere_and_ends_with_who_asked(placed, tmp_path
     assert rendering == sorted(rendering)
     assert rendering[-1] > rendering[0] == 0
     assert (tmp_path / "out" / "view.png").stat().st_size > 50_000
-    assert load_placement_record(tmp_path / "out" / "placement.json")["settings"]["render"] is True
+    assert load_placement_record(tmp_path / "out" / "placement.json").settings["render"] is True

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Generator
+from dataclasses import replace
 from types import SimpleNamespace
 
 from headless import place, robust
@@ -14,7 +15,7 @@ import pytest
 from seip_addon import scene_status, selection
 from seip_addon import session as session_data
 from seip_addon.core.progress import Progress, finish
-from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
 from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.ray_casting import BvhRayCaster, EmbreeRayCaster
 from seip_addon.scene.write import MARK
@@ -43,8 +44,8 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
 def test_pose_errors_are_tried_where_that_is_asked_for(junction, tmp_path, small_scene):
     junction.seip.goal.pose_errors = True
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    panel = json.loads(junction.seip.result.record)
-    assert any("in one of twenty cases" in note for note in panel["notes"])
+    panel = parsed_record(junction.seip.result.record)
+    assert any("in one of twenty cases" in note for note in panel.notes)
     place.main([str(small_scene), *OPTIONS, "--pose-errors", "-o", str(tmp_path)])
     assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
 
@@ -83,7 +84,7 @@ def test_a_stopped_placement_does_not_reach_the_export(junction, tmp_path):
     bpy.ops.seip.export_result()
     record = load_placement_record(tmp_path / "placement.json")
     rows = list(csv.DictReader((tmp_path / "candidates.csv").read_text(encoding="utf-8").splitlines()))
-    assert {int(row["pose"]) for row in rows if row["chosen"]} == {sensor["pose"] for sensor in record["sensors"]}
+    assert {int(row["pose"]) for row in rows if row["chosen"]} == {sensor.pose for sensor in record.sensors}
     assert len(json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))) == 2
 
 
@@ -95,13 +96,13 @@ def test_a_mistake_is_one_sentence(junction):
 
 def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeypatch):
     bpy.ops.seip.solve_placement()
-    before = json.loads(junction.seip.result.record)
+    before = junction.seip.result.record
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
     assert session.survey_of(scene) is None
-    assert json.loads(scene.seip.result.record) == before
+    assert scene.seip.result.record == before
     for forbidden in ("compute_visibility", "optimise"):
         monkeypatch.setattr(f"seip_addon.core.visibility.store.{forbidden}", None, raising=False)
         monkeypatch.setattr(f"seip_addon.core.workflows.survey.{forbidden}", None, raising=False)
@@ -109,7 +110,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     assert len(scene.seip.result.ranking) > 0
     scene.seip.result.folder = "//out/"
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    assert comparable(load_placement_record(tmp_path / "out" / "placement.json")) == comparable(before)
+    assert comparable(load_placement_record(tmp_path / "out" / "placement.json")) == comparable(parsed_record(before))
 
 
 def test_an_emptied_cache_is_said(junction, tmp_path):
@@ -242,15 +243,13 @@ def test_panel_and_batch_place_alike_for_what_may_go_wrong(junction, tmp_path, o
     for one in types.types:
         one.use = one.name == "type1"
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    panel = json.loads(junction.seip.result.record)
+    panel = parsed_record(junction.seip.result.record)
     options = ["--heights", "8", "--grid", "8", "--spacing", "25", "--count", "2", "--no-render", "--sensor", "type1"]
     wrong = ["--position-error", "0.5", "--tilt-error", "3", "--failure", "mean", "--objective", objective.lower()]
     robust.main([str(small_scene), *options, *wrong, "-o", str(tmp_path)])
     batch = load_placement_record(tmp_path / "placement.json")
-    for one in (panel, batch):
-        one["settings"].pop("render")
-    assert comparable(panel) == comparable(batch)
-    assert any("in nineteen of twenty" in note for note in panel["notes"])
+    assert comparable(panel) == comparable(replace(batch, settings={**batch.settings, "render": False}))
+    assert any("in nineteen of twenty" in note for note in panel.notes)
 
 
 def test_a_coverage_to_reach_allows_no_precaution(junction):

@@ -88,7 +88,7 @@ def test_kept_placements_have_names_and_can_be_forgotten(placed):
 
 def test_moved_sensors_are_followed(placed):
     before = shown(placed)
-    coverage = parsed_record(placed.seip.result.record)["coverage"]["whole"]
+    coverage = parsed_record(placed.seip.result.record).coverage.whole
     assert bpy.ops.seip.follow_sensors() == {"FINISHED"}
     assert session.following.coverage == pytest.approx(coverage, abs=1e-9)
     assert (shown(placed) == before).all()

@@ -57,7 +57,7 @@ def test_what_traffic_leaves_of_a_placement_stands_with_it(placed, tmp_path):
     assert notes[-1].endswith(f"{coverage:.2%} when it is empty")
     placed.seip.result.folder = str(tmp_path)
     bpy.ops.seip.export_result()
-    assert load_placement_record(tmp_path / "placement.json")["notes"] == notes
+    assert list(load_placement_record(tmp_path / "placement.json").notes) == notes
 
 
 def test_a_dataset_is_that_of_the_batch_command(placed, tmp_path, small_scene):

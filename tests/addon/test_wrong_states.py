@@ -2,6 +2,9 @@
 
 import builtins
 import json
+import re
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -9,8 +12,11 @@ import pytest
 from seip_addon import live_coverage, preferences, registration, scene_status, scene_survey
 from seip_addon.background import Background
 from seip_addon.core.progress import Progress, finish
+from seip_addon.core.results.placement_record import parsed_record
 from seip_addon.operators import results, work
 from seip_addon.panels import missing_package
+from seip_addon.panels import placement as placement_panel
+from seip_addon.panels import results as results_panel
 from seip_addon.scene import contract
 from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import RunningWork, session
@@ -47,9 +53,70 @@ def test_an_object_in_edit_mode_counts_as_it_is_shown_there(junction):
     assert session.survey_of(junction).grid.key == key
 
 
-def test_a_record_of_a_newer_version_is_not_shown(placed):
-    placed.seip.result.record = json.dumps({"what": "nobody knows"})
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda record: record.clear(), "has the schema None, not 'seip-placement/2'; place the sensors again"),
+        (
+            lambda record: record["sensors"][0].pop("pose"),
+            r"damaged .*: sensors\[0\]\.pose is missing; place",
+        ),
+        (
+            lambda record: record["settings"]["goal"].update(budget=-1.0),
+            "the budget must be .*; place the sensors",
+        ),
+    ],
+)
+def test_a_damaged_record_is_not_shown_and_has_its_sentence(placed, change, words):
+    record = json.loads(placed.seip.result.record)
+    change(record)
+    placed.seip.result.record = json.dumps(record)
+    assert re.search(words, results.no_placement(placed))
+    for button in (bpy.ops.seip.rank_candidates, bpy.ops.seip.judge_sensors, bpy.ops.seip.keep_placement):
+        assert not button.poll()
+    assert not bpy.ops.seip.try_in_traffic.poll()
+    bpy.ops.seip.solve_placement()
     assert not results.no_placement(placed)
+
+
+def test_a_damaged_kept_record_has_its_sentence_in_place_of_the_comparison(placed, monkeypatch):
+    bpy.ops.seip.keep_placement(name="kept")
+    said = drawn_by(results_panel, results_panel.SEIP_PT_results_comparison, monkeypatch)
+    assert said == []
+    placed.seip.kept[0].record = "{"
+    (sentence,) = drawn_by(results_panel, results_panel.SEIP_PT_results_comparison, monkeypatch)
+    assert "damaged" in sentence
+
+
+def drawn_by(module, panel, monkeypatch):
+    """Return the sentences that a panel draws."""
+    said = []
+    monkeypatch.setattr(module, "draw_sentence", lambda _, text, **__: said.append(text))
+    panel.draw(SimpleNamespace(layout=MagicMock()), bpy.context)
+    return said
+
+
+def test_the_panel_says_what_the_record_holds(placed, monkeypatch):
+    record = json.loads(placed.seip.result.record)
+    said = drawn_by(placement_panel, placement_panel.SEIP_PT_placement, monkeypatch)
+    assert set(record["notes"]) < set(said)
+    assert "Proven: the best placement that there is among these candidates." in said
+    figures = dict(placement_panel.figures(parsed_record(placed.seip.result.record)))
+    assert figures["Coverage"] == f"{record['coverage']['whole']:.2%}"
+    assert figures["Price"] == f"${record['price_usd']:,.0f}"
+    assert figures["Gap"] == "0.00%"
+
+
+@pytest.mark.parametrize("pose", [None, -1, 10**6])
+def test_a_record_of_a_pose_that_is_not_there_has_its_sentence(placed, pose):
+    record = json.loads(placed.seip.result.record)
+    record["sensors"][0]["pose"] = pose
+    placed.seip.result.record = json.dumps(record)
+    with pytest.raises(RuntimeError, match="another state of the scene or its settings: place again"):
+        bpy.ops.seip.rank_candidates()
+
+
+def test_a_record_of_a_newer_version_is_not_shown(placed):
     placed.seip.version = scene_status.FILE_VERSION + 1
     assert "newer version" in results.no_placement(placed)
 

@@ -45,13 +45,15 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
     run(tmp_path, "--count", "2", *options)
     names = {path.name for path in tmp_path.iterdir()}
     assert {*FILES, *in_traffic.CHARTS, "visibility.npz"} - {"view.png"} <= names
-    notes = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))["notes"]
+    record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
+    asked, notes = record["settings"]["traffic"], record["notes"]
+    assert (asked["layer"], asked["instants"], asked["evaluation_instants"]) == ("height" if options else "road", 4, 24)
     assert "in traffic, on average over 4 instants" in notes[0]
     assert ("targets weigh as many seconds as road users are there" in notes) == bool(options)
     said = capsys.readouterr().out
     assert "chosen for the empty road: " in said
     assert "vehicles of one run within 1 m of one of another at the same instant: " in said
-    assert "placing on traffic sees" in said
+    assert any(note.startswith("placing on traffic sees") and note in said for note in notes)
 
 
 def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):

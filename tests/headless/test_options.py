@@ -3,7 +3,7 @@
 import argparse
 import math
 
-from headless.options import add_objective, add_settings, read_objective, read_settings
+from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 from headless.survey import add_options
 
 import pytest
@@ -53,6 +53,19 @@ def test_what_is_typed_reaches_its_setting_or_is_refused(typed, kind, changed):
             surveyed(*typed)
     else:
         assert read_settings(kind, surveyed(*typed)) == kind(**changed)
+
+
+def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    parser = new_parser("place", "Place sensors.")
+    add_options(parser)
+    lines = parser.format_help().splitlines()
+    assert lines[0] == "usage: place [scene] -o OUTPUT [options]"
+    assert "  -o, --output OUTPUT         folder for the results" in lines
+    assert "  --sensor KEY ...            types to choose from (default: type1 type2 type3)" in lines
+    (assumed,) = (line for line in lines if "--assumed-poles" in line)
+    assert "default" not in assumed
+    assert len(lines) <= 40
 
 
 def test_weights_are_the_scene_s_or_one_for_all():

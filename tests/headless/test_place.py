@@ -53,26 +53,26 @@ def test_the_folder_holds_every_result(folder):
 
 def test_the_record_says_how_far_it_can_be_trusted(folder):
     record = load_placement_record(folder / "placement.json")
-    assert any("within 1% of the best" in note for note in record["notes"])
-    assert record["settings"]["pose_errors"] is False
-    assert not any("in one of twenty cases" in note for note in record["notes"])
-    assert any("neighbouring rings" in warning for warning in record["warnings"])
+    assert any("within 1% of the best" in note for note in record.notes)
+    assert record.settings["pose_errors"] is False
+    assert not any("in one of twenty cases" in note for note in record.notes)
+    assert any("neighbouring rings" in warning for warning in record.warnings)
 
 
 def test_tables_agree_with_the_record(folder):
     record = load_placement_record(folder / "placement.json")
     rows = list(csv.DictReader((folder / "candidates.csv").read_text(encoding="utf-8").splitlines()))
-    assert len(rows) == record["counts"]["poses"]
+    assert len(rows) == record.counts.poses
     chosen = {int(row["pose"]) for row in rows if row["chosen"]}
-    assert chosen == {sensor["pose"] for sensor in record["sensors"]}
-    assert len(json.loads((folder / "carla_spawn.json").read_text(encoding="utf-8"))) == len(record["sensors"])
+    assert chosen == {sensor.pose for sensor in record.sensors}
+    assert len(json.loads((folder / "carla_spawn.json").read_text(encoding="utf-8"))) == len(record.sensors)
 
 
 def test_the_saved_scene_holds_the_sensors(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
     record = load_placement_record(folder / "placement.json")
     empties = [item for item in bpy.data.collections["SEIP Sensors"].objects if item.type == "EMPTY"]
-    assert len(empties) == len(record["sensors"])
+    assert len(empties) == len(record.sensors)
     assert {item["seip_sensor"] for item in empties} == {"type1"}
 
 
@@ -86,11 +86,11 @@ def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
 @pytest.mark.slow
 def test_a_tolerance_picks_the_spacings_and_the_record_says_why(tmp_path, run):
     record = run(tmp_path, "--count", "2", "--tolerance", "0.05")
-    settings = record["settings"]
+    settings = record.settings
     assert "picked for a tolerance of 0.05" in settings["spacings_because"]
     assert f"targets {settings['grid_spacing_m']:g} m apart" in settings["spacings_because"]
     assert f"posts {settings['candidates']['spacing']:g} m apart" in settings["spacings_because"]
-    assert "spacings" in record["times"]["durations_s"]
+    assert "spacings" in record.times.durations_s
 
 
 def test_another_goal_uses_the_stored_grid(folder, tmp_path, run):
@@ -98,7 +98,7 @@ def test_another_goal_uses_the_stored_grid(folder, tmp_path, run):
     stored.write_bytes((folder / "visibility.npz").read_bytes())
     before = stored.stat().st_mtime_ns
     record = run(tmp_path, "--budget", "20000")
-    assert record["price_usd"] <= 20_000
+    assert record.price_usd <= 20_000
     assert stored.stat().st_mtime_ns == before
     run(tmp_path, "--count", "2", "--delta", "0.7")
     assert stored.stat().st_mtime_ns != before
@@ -128,32 +128,32 @@ def test_another_goal_casts_no_ray_again(folder, tmp_path, rays, run):
     assert sum(rays) == 0
     record = run(tmp_path, "--count", "3", "--pose-errors")
     assert sum(rays) > 0
-    assert record["settings"]["pose_errors"] is True
-    assert any("in one of twenty cases" in note for note in record["notes"])
+    assert record.settings["pose_errors"] is True
+    assert any("in one of twenty cases" in note for note in record.notes)
 
 
 def test_heights_come_as_a_list_or_a_range(tmp_path, run):
     record = run(tmp_path, "--count", "1", "--heights", "4:5:0.5", "8")
-    assert record["settings"]["candidates"]["heights"] == [4.0, 4.5, 5.0, 8.0]
+    assert record.settings["candidates"]["heights"] == [4.0, 4.5, 5.0, 8.0]
 
 
 def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(tmp_path, run):
     record = run(tmp_path, "--count", "2", "--tilts", "0", "5:15:5")
-    assert record["settings"]["candidates"]["tilts_deg"] == [0.0, 5.0, 10.0, 15.0]
-    assert {sensor["tilt_deg"] for sensor in record["sensors"]} <= {0.0, 5.0, 10.0, 15.0}
-    assert max(sensor["tilt_deg"] for sensor in record["sensors"]) > 0
+    assert record.settings["candidates"]["tilts_deg"] == [0.0, 5.0, 10.0, 15.0]
+    assert {sensor.tilt_deg for sensor in record.sensors} <= {0.0, 5.0, 10.0, 15.0}
+    assert max(sensor.tilt_deg for sensor in record.sensors) > 0
     upright = run(tmp_path / "upright", "--count", "2")
-    assert record["counts"]["poses"] == 4 * upright["counts"]["poses"]
-    assert record["coverage"]["whole"] > upright["coverage"]["whole"]
+    assert record.counts.poses == 4 * upright.counts.poses
+    assert record.coverage.whole > upright.coverage.whole
     spawned = json.loads((tmp_path / "carla_spawn.json").read_text(encoding="utf-8"))
     pitches = [entry["transform"]["rotation"]["pitch"] for entry in spawned]
-    assert pitches == [-sensor["tilt_deg"] + 0.0 for sensor in record["sensors"]]
+    assert pitches == [-sensor.tilt_deg + 0.0 for sensor in record.sensors]
 
 
 def test_the_reverse_problem_by_command(tmp_path, run):
     record = run(tmp_path, "--coverage", "0.2")
-    assert record["coverage"]["whole"] >= 0.2
-    assert record["greedy"] is None
+    assert record.coverage.whole >= 0.2
+    assert record.greedy is None
 
 
 @pytest.mark.parametrize(

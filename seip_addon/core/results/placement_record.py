@@ -9,25 +9,27 @@ import os
 import platform
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from datetime import datetime
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..geometry.orientation import orientation
 from ..placement import Placement
 from ..placement.deployment import Sensor
-from ..placement.objective import Solution
+from ..placement.objective import Objective, Solution, certificate
 from ..site.site import Site
 from ..storage.files import save_json
+from ..storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
 
-Record = dict[str, Any]
+Point = tuple[float, float, float]
 
 SCHEMA = "seip-placement/2"
 LIBRARIES = ("numpy", "shapely", "pulp", "highspy")
@@ -79,15 +81,180 @@ def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen
     return [warning for warning in warnings if warning.partition(":")[0] not in others]
 
 
-@lru_cache(maxsize=8)
-def parsed_record(text: str) -> Record:
-    """Return the record of a JSON text; panels ask for it at every redraw."""
-    record: Record = json.loads(text)
-    return record
+@dataclass(frozen=True)
+class RecordedSite:
+    """A scene, and the map coordinates of its local origin."""
+
+    name: str
+    origin_m: Point
 
 
-def placement_record(site: Site, plan: Solution, run: Run) -> Record:
-    """Return a placement as the value that ``placement.json`` holds.
+@dataclass(frozen=True)
+class RecordedSensor:
+    """One chosen sensor, by its label: see `placement.deployment.Sensor`.
+
+    Parameters
+    ----------
+    pose : int or None
+        Row of the visibility grid; None where a hand has put the sensor elsewhere.
+    sensor : str
+        Its type's key in the catalogue.
+    roll_deg : float, optional
+        Of a sensor that a hand has put elsewhere, and of no other.
+    """
+
+    id: str
+    pose: int | None
+    sensor: str
+    sensor_name: str
+    position: str
+    on_pole: bool
+    local_m: Point
+    map_m: Point
+    height_m: float
+    yaw_deg: float
+    tilt_deg: float
+    price_usd: float
+    coverage_alone: float
+    coverage_added: float
+    coverage_marginal: float
+    roll_deg: float | None = None
+
+    @property
+    def orientation(self) -> Float:
+        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
+        yaw, tilt, roll = map(math.radians, (self.yaw_deg, self.tilt_deg, self.roll_deg or 0.0))
+        return orientation(yaw, tilt, roll)
+
+
+@dataclass(frozen=True)
+class RecordedCoverage:
+    """Shares of the targets, or of their weight, that are seen; ``central`` is None without weighted regions."""
+
+    whole: float
+    central: float | None
+    weighted: float
+    seen_twice: float
+
+
+@dataclass(frozen=True)
+class RecordedObjective:
+    """What was optimised, in covered weight or dollars, and what is proven of it; None where nothing bounds it."""
+
+    kind: Literal["vanilla", "weighted"]
+    sought: Literal["most coverage", "least price"]
+    value: float
+    bound: float | None
+    gap: float | None
+    status: str
+    solver: str
+
+    @property
+    def cheapest(self) -> bool:
+        """Whether the least price was sought."""
+        return self.sought == "least price"
+
+    @property
+    def certificate(self) -> str:
+        """How good the placement provably is, as a sentence."""
+        return certificate(self.status, self.gap, cheapest=self.cheapest)
+
+
+@dataclass(frozen=True)
+class RecordedGreedy:
+    """The greedy answer to the same question, and the share of the objective that it loses."""
+
+    value: float
+    bound: float | None
+    gap_to_placement: float
+    poses: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RecordedCounts:
+    """How many targets, positions and poses there were, and how many candidates were dropped, by reason."""
+
+    targets: int
+    targets_central: int
+    positions: int
+    positions_on_poles: int
+    poses: int
+    dropped: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class RecordedTimes:
+    """When a placement was made (ISO 8601), and how many seconds each step took."""
+
+    created: str
+    durations_s: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class RecordedCandidates:
+    """The sensor types that there were to choose from, by catalogue key."""
+
+    sensors: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The settings of a record that are read again: what was asked for, and of which sensor types."""
+
+    goal: Objective
+    candidates: RecordedCandidates
+
+
+@dataclass(frozen=True)
+class PlacementRecord:
+    """What ``placement.json`` holds but for its schema, key by key: see docs/formats.md.
+
+    Parameters
+    ----------
+    sensors : tuple of RecordedSensor
+        In the order of their labels.
+    price_usd : float, dollars
+        Of all sensors together.
+    greedy : RecordedGreedy or None
+        None where there is no greedy answer.
+    settings : mapping
+        All that could have been set, by name; `asked` is the part that this program reads again.
+    inputs : mapping of str to str
+        Digests of what went in.
+    """
+
+    site: RecordedSite
+    sensors: tuple[RecordedSensor, ...]
+    price_usd: float
+    coverage: RecordedCoverage
+    objective: RecordedObjective
+    greedy: RecordedGreedy | None
+    counts: RecordedCounts
+    settings: Mapping[str, object]
+    seeds: Mapping[str, int]
+    inputs: Mapping[str, str]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    versions: Mapping[str, str]
+    times: RecordedTimes
+
+    @cached_property
+    def asked(self) -> Asked:
+        """What was asked for."""
+        return from_json(Asked, self.settings, "settings")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the value of ``placement.json``, its keys in order."""
+        return {"schema": SCHEMA, **asdict(self, dict_factory=_without_absent_roll)}
+
+    def text(self) -> str:
+        """Return the record in one line of JSON, for `parsed_record`."""
+        return json.dumps(self.as_json(), ensure_ascii=False, allow_nan=False)
+
+
+def placement_record(site: Site, plan: Solution, run: Run) -> PlacementRecord:
+    """Return the record of a placement.
 
     Parameters
     ----------
@@ -95,59 +262,68 @@ def placement_record(site: Site, plan: Solution, run: Run) -> Record:
         Of that site.
     run : Run
         What it was made with.
-
-    Returns
-    -------
-    dict
-        Its layout is described in docs/formats.md and docs/placement.schema.json.
     """
     deployment, placement, greedy = plan.deployment, plan.placement, plan.greedy
-    return {
-        "schema": SCHEMA,
-        "site": {"name": site.name, "origin_m": _metres(site.origin)},
-        "sensors": [_sensor(sensor, site.origin) for sensor in deployment.sensors],
-        "price_usd": _rounded(deployment.price, 2),
-        "coverage": {
-            "whole": _share(deployment.coverage),
-            "central": None if deployment.central is None else _share(deployment.central),
-            "weighted": _share(deployment.weighted),
-            "seen_twice": _share(deployment.seen_twice),
-        },
-        "objective": {
-            "kind": "weighted" if plan.objective.weighted else "vanilla",
-            "sought": "least price" if plan.objective.cheapest else "most coverage",
-            "value": _significant(placement.objective),
-            "bound": _significant(placement.bound),
-            "gap": _significant(placement.gap),
-            "status": placement.status,
-            "solver": placement.solver,
-        },
-        "greedy": None if greedy is None else _greedy(greedy, placement),
-        "counts": _counts(site),
-        "settings": dict(run.settings),
-        "seeds": {},  # visibility and placement draw no random numbers
-        "inputs": dict(run.inputs),
-        "notes": list(placement.notes),
-        "warnings": list(run.warnings),
-        "versions": dict(run.versions),
-        "times": {
-            "created": run.created.isoformat(timespec="seconds"),
-            "durations_s": {step: _rounded(seconds, 3) for step, seconds in run.durations.items()},
-        },
-    }
+    return PlacementRecord(
+        site=RecordedSite(site.name, _metres(site.origin)),
+        sensors=tuple(_sensor(sensor, site.origin) for sensor in deployment.sensors),
+        price_usd=_rounded(deployment.price, 2),
+        coverage=RecordedCoverage(
+            whole=_share(deployment.coverage),
+            central=None if deployment.central is None else _share(deployment.central),
+            weighted=_share(deployment.weighted),
+            seen_twice=_share(deployment.seen_twice),
+        ),
+        objective=RecordedObjective(
+            kind="weighted" if plan.objective.weighted else "vanilla",
+            sought="least price" if plan.objective.cheapest else "most coverage",
+            value=_significant(placement.objective),
+            bound=_found(placement.bound),
+            gap=_found(placement.gap),
+            status=placement.status,
+            solver=placement.solver,
+        ),
+        greedy=None if greedy is None else _greedy(greedy, placement),
+        counts=_counts(site),
+        settings=dict(run.settings),
+        seeds={},  # visibility and placement draw no random numbers
+        inputs=dict(run.inputs),
+        notes=placement.notes,
+        warnings=run.warnings,
+        versions=dict(run.versions),
+        times=RecordedTimes(
+            run.created.isoformat(timespec="seconds"),
+            {step: _rounded(seconds, 3) for step, seconds in run.durations.items()},
+        ),
+    )
 
 
-def comparable(record: Record) -> Record:
-    """Return the record without what differs from one machine and run to the next: times and versions."""
-    return {key: value for key, value in record.items() if key not in ("times", "versions")}
+@lru_cache(maxsize=8)
+def parsed_record(text: str) -> PlacementRecord:
+    """Return the record that a scene keeps as a text; panels ask for it at every redraw.
+
+    Raises
+    ------
+    SeipError
+        It is no placement of a version that this program knows.
+    """
+    return _read(text.encode(), "the placement that this scene keeps")
 
 
-def save_placement_record(path: str | os.PathLike[str], record: Record) -> None:
+def comparable(record: PlacementRecord) -> dict[str, Any]:
+    """Return what `PlacementRecord.as_json` does, but for what differs from one machine and run to the next.
+
+    That are times and versions.
+    """
+    return {key: value for key, value in record.as_json().items() if key not in {"times", "versions"}}
+
+
+def save_placement_record(path: str | os.PathLike[str], record: PlacementRecord) -> None:
     """Write ``placement.json``."""
-    save_json(path, record)
+    save_json(path, record.as_json())
 
 
-def load_placement_record(path: str | os.PathLike[str]) -> Record:
+def load_placement_record(path: str | os.PathLike[str]) -> PlacementRecord:
     """Read ``placement.json``.
 
     Raises
@@ -156,65 +332,85 @@ def load_placement_record(path: str | os.PathLike[str]) -> Record:
         There is no such file, or it is no placement of a version that this program knows.
     """
     try:
-        record: Record = json.loads(Path(path).read_text(encoding="utf-8"))
+        content = Path(path).read_bytes()
     except OSError as error:
         raise SeipError(f"cannot read {path}: {error.strerror}; name the placement.json of a finished run") from error
-    except (ValueError, RecursionError) as error:
-        raise SeipError(f"{path} is damaged or no JSON: {error}; place the sensors again") from error
-    schema = record.get("schema") if isinstance(record, dict) else None
-    if schema != SCHEMA:
-        raise SeipError(f"{path} has the schema {schema!r}, not {SCHEMA!r}; place the sensors again with this version")
-    return record
+    return _read(content, str(path))
 
 
-def _sensor(sensor: Sensor, origin: Float) -> Record:
-    return {
-        "id": sensor.label,
-        "pose": sensor.pose,
-        "sensor": sensor.model.key,
-        "sensor_name": sensor.model.name,
-        "position": sensor.position_name,
-        "on_pole": sensor.on_pole,
-        "local_m": _metres(sensor.xyz),
-        "map_m": _metres(sensor.xyz + origin),
-        "height_m": _rounded(sensor.height, 6),
-        "yaw_deg": degrees(sensor.yaw),
-        "tilt_deg": tilt_degrees(sensor.tilt),
-        "price_usd": _rounded(sensor.model.price, 2),
-        "coverage_alone": _share(sensor.alone),
-        "coverage_added": _share(sensor.added),
-        "coverage_marginal": _share(sensor.marginal),
-        **({"roll_deg": tilt_degrees(sensor.roll)} if sensor.pose is None else {}),
-    }
+def _read(text: bytes, where: str) -> PlacementRecord:
+    try:
+        content = json.loads(text.decode(), parse_float=_finite, parse_constant=_finite)
+        schema = content.get("schema") if isinstance(content, dict) else None
+        if schema == SCHEMA:
+            record = from_json(PlacementRecord, content)
+            _ = record.asked, record.text().encode()  # refused if these cannot be read or written again
+            return record
+    except (SeipError, ValueError, RecursionError) as error:
+        raise SeipError(f"{where} is damaged or no placement: {error}; place the sensors again") from error
+    raise SeipError(f"{where} has the schema {schema!r}, not {SCHEMA!r}; place the sensors again with this version")
 
 
-def _greedy(greedy: Placement, placement: Placement) -> Record:
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no finite number")
+    return value
+
+
+def _without_absent_roll(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: value for name, value in items if name != "roll_deg" or value is not None}
+
+
+def _sensor(sensor: Sensor, origin: Float) -> RecordedSensor:
+    return RecordedSensor(
+        id=sensor.label,
+        pose=sensor.pose,
+        sensor=sensor.model.key,
+        sensor_name=sensor.model.name,
+        position=sensor.position_name,
+        on_pole=sensor.on_pole,
+        local_m=_metres(sensor.xyz),
+        map_m=_metres(sensor.xyz + origin),
+        height_m=_rounded(sensor.height, 6),
+        yaw_deg=degrees(sensor.yaw),
+        tilt_deg=tilt_degrees(sensor.tilt),
+        price_usd=_rounded(sensor.model.price, 2),
+        coverage_alone=_share(sensor.alone),
+        coverage_added=_share(sensor.added),
+        coverage_marginal=_share(sensor.marginal),
+        roll_deg=tilt_degrees(sensor.roll) if sensor.pose is None else None,
+    )
+
+
+def _greedy(greedy: Placement, placement: Placement) -> RecordedGreedy:
     lost = placement.objective - greedy.objective
-    return {
-        "value": _significant(greedy.objective),
+    return RecordedGreedy(
+        value=_significant(greedy.objective),
         # The better of the two bounds: once the optimum is proven, it no longer hangs on a platform's rounding.
-        "bound": _significant(min(greedy.bound, placement.bound)),
-        "gap_to_placement": _share(lost / placement.objective) if placement.objective > 0.0 else 0.0,
-        "poses": [int(pose) for pose in greedy.chosen],
-        "notes": list(greedy.notes),
-    }
+        bound=_found(min(greedy.bound, placement.bound)),
+        gap_to_placement=_share(lost / placement.objective) if placement.objective > 0.0 else 0.0,
+        poses=tuple(int(pose) for pose in greedy.chosen),
+        notes=greedy.notes,
+    )
 
 
-def _counts(site: Site) -> Record:
+def _counts(site: Site) -> RecordedCounts:
     candidates = site.candidates
-    return {
-        "targets": len(site.targets),
-        "targets_central": int(np.count_nonzero(site.targets.central)),
-        "positions": len(candidates.position),
-        "positions_on_poles": int(np.count_nonzero(candidates.on_pole)),
-        "poses": len(candidates),
-        "dropped": {reason: int(count) for reason, count in sorted(candidates.dropped.items())},
-    }
+    return RecordedCounts(
+        targets=len(site.targets),
+        targets_central=int(np.count_nonzero(site.targets.central)),
+        positions=len(candidates.position),
+        positions_on_poles=int(np.count_nonzero(candidates.on_pole)),
+        poses=len(candidates),
+        dropped={reason: int(count) for reason, count in sorted(candidates.dropped.items())},
+    )
 
 
-def _metres(point: Float) -> list[float]:
+def _metres(point: Float) -> Point:
     """Round to the micrometre, which hides the last bits in which platforms differ."""
-    return [_rounded(value, 6) for value in point]
+    x, y, z = (_rounded(value, 6) for value in point)
+    return x, y, z
 
 
 def _share(value: float) -> float:
@@ -225,6 +421,10 @@ def _rounded(value: float, digits: int) -> float:
     return round(float(value), digits) + 0.0  # no negative zero
 
 
-def _significant(value: float) -> float | None:
-    """Return twelve significant digits; None for a bound that the solver has not found."""
-    return float(f"{value:.12g}") if math.isfinite(value) else None
+def _significant(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def _found(value: float) -> float | None:
+    """Return None for a bound, or a gap, that the solver has not found."""
+    return _significant(value) if math.isfinite(value) else None

@@ -27,7 +27,7 @@ from .visibility_under_errors import Surroundings
 NOTABLE_LOSS = 0.01
 """Share of the targets' weight whose loss in traffic is worth a warning."""
 
-IN_TRAFFIC = "in traffic"  # first words of messages about traffic
+IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
 
 MOSTLY_SEEN_SHARE = 0.9
 """Share of time from which on a target counts as mostly seen."""
@@ -249,8 +249,8 @@ def _users(obstacles: Sequence[TrafficObstacles]) -> float:
 def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     """Return warnings where traffic costs much coverage, and where optimising for it is not known to gain any."""
     losses = tuple(
-        f"{IN_TRAFFIC} ({study.road_users:.0f} road users at a time) the best placement for the empty road sees "
-        f"{seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average over time, not {seen.empty:.1%}: "
+        f"the best placement for the empty road sees {seen.mean.value:.1%} of the {LAYER_NAMES[layer]} on average over "
+        f"time in traffic ({study.road_users:.0f} road users at a time), not {seen.empty:.1%}: "
         f"{seen.loss.value:.1%} less"
         for layer, seen in study.empty.seen.items()
         if seen.loss.value >= NOTABLE_LOSS
@@ -259,7 +259,7 @@ def traffic_warnings(study: TrafficStudy) -> tuple[str, ...]:
     if gain.low > 0 or np.array_equal(study.empty.placement.chosen, study.traffic.placement.chosen):
         return losses
     doubt = (
-        "in traffic that it was not chosen on this placement is not known to see more than the best one for the empty "
-        f"road: {gain.describe()} more; choose on more --instants, or keep that one"
+        "this placement is not known to see more in traffic that it was not chosen on than the best one for the empty "
+        "road: choose on more instants, or keep that one"
     )
     return (*losses, doubt)

@@ -25,7 +25,7 @@ class VisibilitySettings:
 
     delta: float = setting(1.0, "distance from a target within which a return sees it", unit="m", maximum=MAX_DELTA)
     min_intensity: float = setting(
-        0.0, "least intensity of a return that sees; at 0 every return counts", minimum=0.0, maximum=1.0
+        0.0, "least intensity of a return that sees; at 0 every return counts", minimum=0.0, maximum=1.0, metavar="I"
     )
 
     def __post_init__(self) -> None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ..arrays import Boolean, Float
 from ..errors import SeipError
-from ..geometry.orientation import angles_of, orientation
+from ..geometry.orientation import angles_of
 from ..geometry.plan import surface_height
 from ..lidar import find_models, load_catalogue
 from ..placement import Placement
@@ -18,13 +17,13 @@ from ..placement.deployment import Sensor, deployment_of, sensor_at
 from ..placement.objective import MOVED, Objective, Solution, target_weights
 from ..progress import Progress
 from ..results.headings import degrees, tilt_degrees
-from ..results.placement_record import Record
+from ..results.placement_record import PlacementRecord
 from ..scans.sensor import MountedSensor
 from ..site.scene_geometry import joined
 from ..visibility.grid import VisibilityGrid
 from ..visibility.sight_lines import pose_at
 from ..visibility.visibility_model import VisibilityModel, visibility_model
-from .survey import Layout, recorded_goal
+from .survey import Layout
 
 BY_HAND = "by hand"
 """Name of a place that is no position of the site."""
@@ -93,7 +92,9 @@ def judge(
     return Solution(goal, placement, None, deployment)
 
 
-def restored_by_hand(layout: Layout, grid: VisibilityGrid, record: Record) -> Generator[Progress, None, Solution]:
+def restored_by_hand(
+    layout: Layout, grid: VisibilityGrid, record: PlacementRecord
+) -> Generator[Progress, None, Solution]:
     """Return the plan that the record of a `judge` tells of.
 
     Parameters
@@ -103,20 +104,10 @@ def restored_by_hand(layout: Layout, grid: VisibilityGrid, record: Record) -> Ge
     grid : VisibilityGrid
         That it was judged with.
     """
-    lines = record["sensors"]
-    models = find_models(load_catalogue(layout.settings.catalogue), sorted({line["sensor"] for line in lines}))
-    hung = [
-        MountedSensor(line["id"], models[line["sensor"]], np.array(line["local_m"]), recorded_orientation(line))
-        for line in lines
-    ]
-    goal = recorded_goal(record)
-    return (yield from judge(layout, grid, goal, hung, {line["id"]: line["position"] for line in lines}))
-
-
-def recorded_orientation(line: Mapping[str, Any]) -> Float:
-    """Return how a sensor is turned, (3, 3), by its line in a record."""
-    yaw, tilt, roll = (math.radians(line.get(name, 0.0)) for name in ("yaw_deg", "tilt_deg", "roll_deg"))
-    return orientation(yaw, tilt, roll)
+    sensors = record.sensors
+    models = find_models(load_catalogue(layout.settings.catalogue), sorted({one.sensor for one in sensors}))
+    hung = [MountedSensor(one.id, models[one.sensor], np.array(one.local_m), one.orientation) for one in sensors]
+    return (yield from judge(layout, grid, record.asked.goal, hung, {one.id: one.position for one in sensors}))
 
 
 def _elsewhere(layout: Layout, one: MountedSensor, place: str) -> Sensor:

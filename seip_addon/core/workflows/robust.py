@@ -42,7 +42,7 @@ def check_robust_objective(objective: Objective) -> None:
     if objective.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
-            "is of poses as planned"
+            "is of poses as planned and the empty road"
         )
 
 

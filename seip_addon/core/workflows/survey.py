@@ -21,7 +21,7 @@ from ..placement.objective import Objective, Solution, optimise, placement_probl
 from ..placement.search_limits import SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
-from ..results.placement_record import Record, Run, placement_record
+from ..results.placement_record import PlacementRecord, Run, placement_record
 from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
@@ -264,7 +264,7 @@ class Provenance:
     versions: Mapping[str, str]
 
 
-def record_of(  # what was asked for stands in the record
+def record_of(  # noqa: PLR0913  # what was asked for stands in the record
     layout: Layout,
     grid: VisibilityGrid,
     plan: Solution,
@@ -272,7 +272,8 @@ def record_of(  # what was asked for stands in the record
     *,
     render: bool,
     pose_errors: bool = False,
-) -> Record:
+    traffic: Mapping[str, object] | None = None,
+) -> PlacementRecord:
     """Return what ``placement.json`` holds of a plan.
 
     Parameters
@@ -281,8 +282,12 @@ def record_of(  # what was asked for stands in the record
         Whether a rendered view goes with it.
     pose_errors : bool
         Whether the plan was tried with pose errors; see `place`.
+    traffic : mapping of str to value, optional
+        The `TrafficSettings` that the plan was chosen with, by name; None for a plan that was not chosen on traffic.
     """
     asked = {"goal": asdict(plan.objective), "pose_errors": pose_errors, "render": render}
+    if traffic is not None:
+        asked["traffic"] = dict(traffic)
     run = Run(
         settings=layout.settings.as_record() | asked,
         created=circumstances.created,
@@ -294,14 +299,7 @@ def record_of(  # what was asked for stands in the record
     return placement_record(layout.site, plan, run)
 
 
-def recorded_goal(record: Record) -> Objective:
-    """Return the goal that a record's placement answers."""
-    asked = record["settings"]["goal"]
-    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
-    return Objective(**named)
-
-
-def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Solution:
+def restored_plan(layout: Layout, grid: VisibilityGrid, record: PlacementRecord) -> Solution:
     """Return the plan that a record of `record_of` tells of, without asking a solver again.
 
     Parameters
@@ -310,29 +308,29 @@ def restored_plan(layout: Layout, grid: VisibilityGrid, record: Record) -> Solut
         That it was made on.
     grid : VisibilityGrid
         That it was made from.
-    record : dict
+    record : PlacementRecord
         The greedy answer that it may hold is left out.
 
     Raises
     ------
     SeipError
-        The record is of another grid, or lacks something.
+        The record is of another grid, or names a pose that is none of its candidates.
     """
-    if record.get("inputs", {}).get("visibility") != grid.key:
+    poses = range(len(layout.site.candidates))
+    if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
-    goal, objective = recorded_goal(record), record["objective"]
-    chosen = np.array([sensor["pose"] for sensor in record["sensors"]], dtype=np.int64)
-    value = objective["value"]
+    goal, objective = record.asked.goal, record.objective
+    chosen = np.array([sensor.pose for sensor in record.sensors], dtype=np.int64)
     placement = Placement(
         chosen=chosen,
-        objective=value,
-        bound=math.nan if objective["bound"] is None else objective["bound"],
-        gap=math.inf if objective["gap"] is None else objective["gap"],
-        status=objective["status"],
-        solver=objective["solver"],
-        seconds=record["times"]["durations_s"].get("placement", 0.0),
+        objective=objective.value,
+        bound=math.nan if objective.bound is None else objective.bound,
+        gap=math.inf if objective.gap is None else objective.gap,
+        status=objective.status,
+        solver=objective.solver,
+        seconds=record.times.durations_s.get("placement", 0.0),
         covered=float(target_weights(layout.site, goal)[grid.times_seen(chosen) > 0].sum()),
-        price=record["price_usd"],
-        notes=tuple(record["notes"]),
+        price=record.price_usd,
+        notes=record.notes,
     )
     return Solution(goal, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))

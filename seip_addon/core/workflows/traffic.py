@@ -22,6 +22,7 @@ from ..site.site import Site
 from ..traffic import Trajectories
 from ..traffic.run_overlap import require_independent, vehicle_positions
 from ..visibility.grid import VisibilityGrid
+from .robust import check_robust_objective
 from .survey import Layout, surroundings
 
 _Run = TypeVar("_Run")
@@ -49,9 +50,11 @@ class TrafficSettings:
 
     layer: TrafficLayer = setting("road", "what is to be seen: the road, or points at vehicles' height", option="see")
     weights_from_traffic: bool = setting(default=False, help="weigh targets by the time that road users are there")
-    instants: int = setting(24, "of traffic to choose on", minimum=1)
-    evaluation_instants: int = setting(120, "of traffic to judge by", minimum=1, option="judged-at", metavar="INSTANTS")
-    seed: int = setting(0, "of the instants; those to judge by have the next")
+    instants: int = setting(24, "instants of traffic to choose on", minimum=1, metavar="N")
+    evaluation_instants: int = setting(
+        120, "instants of other runs to evaluate on", minimum=1, option="judged-at", metavar="N"
+    )
+    seed: int = setting(0, "of the instants; those to evaluate on have the next")
 
     def __post_init__(self) -> None:
         for number in (self.instants, self.evaluation_instants):
@@ -90,9 +93,40 @@ def split_runs(runs: Sequence[_Run]) -> tuple[list[_Run], list[_Run]]:
     return list(runs[:-last]), list(runs[-last:])
 
 
+def traffic_folder(scene: Path, kind: str = "") -> Path:
+    """Return the folder for runs beside the file of a scene: ``junction_traffic`` beside ``junction.blend``.
+
+    Parameters
+    ----------
+    kind : str
+        What else the folder's name ends with: ``_dense`` for ``junction_traffic_dense``.
+    """
+    return scene.parent / f"{scene.stem}_traffic{kind}"
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """Return the files of runs in a folder by their names, none where there is no such folder."""
+    return sorted(folder.glob("*.npz"))
+
+
 def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:
     """Read runs, in the local axes of an origin."""
     return [Trajectories.load(path).moved_to(origin) for path in paths]
+
+
+def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None, TrafficRuns]:
+    """Read the runs that a survey's sensors are to be placed on.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, or as for `independent_runs`.
+    """
+    runs: dict[str, Trajectories] = {}
+    for number, path in enumerate(paths):
+        yield Progress(number, len(paths), "reading runs of traffic")
+        (runs[str(path)],) = load_runs([path], layout.geometry.origin)
+    return independent_runs(runs, layout.site)
 
 
 def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRuns:
@@ -105,8 +139,8 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
     """
     if len(runs) < 2:
         raise SeipError(
-            f"{len(runs)} runs of traffic are too few: name two or more with --traffic, made by headless/traffic.py "
-            "with a seed each; the last third of them judges what is chosen on the others"
+            f"{len(runs)} runs of traffic are too few: give two or more, made by headless/traffic.py with a seed each; "
+            "the last third of them judges what is chosen on the others"
         )
     check_runs(list(runs.values()), site.region)
     positions = [vehicle_positions(name, run) for name, run in runs.items()]
@@ -123,7 +157,15 @@ def place_in_traffic(
     ----------
     grid : VisibilityGrid
         Of the empty road.
+    objective : Objective
+        Of most coverage.
+
+    Raises
+    ------
+    SeipError
+        As for `check_robust_objective`, `placement_problem` and `spread_instants`.
     """
+    check_robust_objective(objective)
     problem = placement_problem(layout.site, grid.visible, layout.models, objective)
     if settings.weights_from_traffic:
         seconds = yield from road_user_seconds(layout.site.targets, runs.optimisation)
@@ -139,6 +181,13 @@ def place_in_traffic(
         "objective, bound and gap are of that"
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
-    noted = replace(placement, notes=(note, *weighed, *placement.notes, *traffic_warnings(study)))
+    notes = (note, *weighed, *placement.notes, *traffic_sentences(study), *traffic_warnings(study))
     deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
-    return TrafficSolution(Solution(with_count(objective, layout.site), noted, None, deployment), study)
+    solution = Solution(with_count(objective, layout.site), replace(placement, notes=notes), None, deployment)
+    return TrafficSolution(solution, study)
+
+
+def traffic_sentences(study: TrafficStudy) -> tuple[str, ...]:
+    """Say what placing on traffic gains, and whether the instants that this is evaluated on were too few."""
+    gain = f"placing on traffic sees {study.gain(study.layer).describe()} more of the {LAYER_NAMES[study.layer]}"
+    return (gain,) if study.is_converged() else (gain, "every other instant says something else: evaluate on more")

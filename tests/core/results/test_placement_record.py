@@ -1,6 +1,9 @@
+import copy
 import json
 import math
-from dataclasses import replace
+import re
+from collections.abc import Iterator
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,11 +12,13 @@ import pytest
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement import Placement
-from seip_addon.core.placement.objective import Objective, Solution
+from seip_addon.core.placement.objective import MOVED, Objective, Solution
 from seip_addon.core.results.placement_record import (
+    PlacementRecord,
     Run,
     comparable,
     load_placement_record,
+    parsed_record,
     placement_record,
     save_placement_record,
     versions,
@@ -21,6 +26,7 @@ from seip_addon.core.results.placement_record import (
 from tests.json_schema import violations
 from tests.small_junction import Example, make_example
 
+GOAL = Objective(count=3, central_weight=2.5, forbidden=("pole 1",))
 SCHEMA = json.loads((Path(__file__).parents[3] / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
 
 
@@ -37,7 +43,11 @@ def example() -> Example:
 @pytest.fixture
 def run() -> Run:
     return Run(
-        settings={"delta_m": 1.0, "heights_m": (3.5, 5.4), "budget_usd": None},
+        settings={
+            "grid_spacing_m": 1.0,
+            "candidates": {"sensors": ("type1", "vlp32c"), "heights": (3.5, 5.4)},
+            "goal": asdict(GOAL),
+        },
         created=datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
         durations={"visibility": 12.3456789},
         versions=versions(blender="4.5.15"),
@@ -46,35 +56,157 @@ def run() -> Run:
     )
 
 
-def make_record(example, run, **changes):
+def make_record(example, run, **changes) -> PlacementRecord:
     values = {"objective": 512.0, "bound": 530.5, "gap": 18.5 / 512.0, **changes}
     best = solution([sensor.pose for sensor in example.deployment.sensors], **values)
     greedy = solution([1, 2, 3], objective=500.0, bound=531.0, gap=0.05)
-    return placement_record(example.site, Solution(Objective(count=3), best, greedy, example.deployment), run)
+    return placement_record(example.site, Solution(GOAL, best, greedy, example.deployment), run)
+
+
+def made_by_hand(example, run) -> PlacementRecord:
+    """Return the record of sensors of which a hand has turned the first."""
+    first, *others = example.deployment.sensors
+    turned = replace(first, pose=None, tilt=math.radians(-12.5), roll=math.radians(3.0))
+    deployment = replace(example.deployment, sensors=(turned, *others))
+    moved = solution([sensor.pose for sensor in others], objective=512.0, bound=math.nan, gap=math.inf, status=MOVED)
+    return placement_record(example.site, Solution(GOAL, moved, None, deployment), run)
+
+
+@pytest.fixture(params=["placed", "without bound", "by hand"])
+def record(example, run, request) -> PlacementRecord:
+    if request.param == "by hand":
+        return made_by_hand(example, run)
+    return make_record(example, run, **({} if request.param == "placed" else {"bound": math.inf, "gap": math.inf}))
+
+
+@pytest.fixture
+def whole(example, run) -> dict:
+    """Return a record with all that one can hold, as JSON."""
+    by_hand = made_by_hand(example, run)
+    return content_of(replace(by_hand, sensors=by_hand.sensors[:1], greedy=make_record(example, run).greedy))
+
+
+def content_of(record: PlacementRecord) -> dict:
+    return json.loads(record.text())
+
+
+def every_place(value: object, place: tuple = ()) -> Iterator[tuple]:
+    """Yield the keys that lead to each value within a value of JSON."""
+    for key, part in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
+        yield (*place, key)
+        yield from every_place(part, (*place, key))
+
+
+def parent(content: dict, place: tuple) -> dict | list:
+    for key in place[:-1]:
+        content = content[key]
+    return content
+
+
+def refusal(content: dict) -> str:
+    """Return the sentence with which a record is refused; nothing for one that is read, and can be written again."""
+    try:
+        record = parsed_record(json.dumps(content))
+    except SeipError as error:
+        return str(error)
+    assert content_of(record)["schema"] == content["schema"]
+    return ""
+
+
+def is_open(place: tuple) -> bool:
+    """Return whether a value is none that this program reads again, so that it may be anything."""
+    return place[0] == "settings" and place[1:2] not in {(), ("goal",), ("candidates",)}
 
 
 def test_the_record_is_what_the_schema_says_and_json_can_hold_it(example, run, tmp_path):
     record = make_record(example, run)
     save_placement_record(tmp_path / "placement.json", record)
+    assert violations(json.loads((tmp_path / "placement.json").read_text(encoding="utf-8")), SCHEMA) == []
     loaded = load_placement_record(tmp_path / "placement.json")
-    assert violations(loaded, SCHEMA) == []
-    assert loaded["objective"]["value"] == 512.0
-    assert loaded["greedy"]["gap_to_placement"] == pytest.approx(12 / 512)
-    assert loaded["settings"]["heights_m"] == [3.5, 5.4]
+    assert loaded.objective.value == 512.0
+    assert loaded.greedy.gap_to_placement == pytest.approx(12 / 512)
+    assert loaded.settings["candidates"]["heights"] == [3.5, 5.4]
+
+
+def test_a_record_is_written_as_it_was_read(record, tmp_path):
+    save_placement_record(tmp_path / "one.json", record)
+    read = load_placement_record(tmp_path / "one.json")
+    save_placement_record(tmp_path / "other.json", read)
+    assert (tmp_path / "other.json").read_bytes() == (tmp_path / "one.json").read_bytes()
+    assert parsed_record(record.text()) == read
+    assert read.text() == record.text()
+    assert read.sensors == record.sensors
+    assert read.asked == record.asked
+    assert read.asked.goal == GOAL
+    assert violations(content_of(read), SCHEMA) == []
+
+
+def test_the_keys_are_in_the_order_of_the_schema(record):
+    content = content_of(record)
+    assert list(content) == list(SCHEMA["properties"])
+    for sensor in content["sensors"]:
+        named = SCHEMA["properties"]["sensors"]["items"]["required"]
+        assert list(sensor) == [*named, *(["roll_deg"] if sensor["pose"] is None else [])]
+
+
+def test_a_sensor_is_turned_as_it_hangs(example, run):
+    for recorded, sensor in zip(make_record(example, run).sensors, example.deployment.sensors, strict=True):
+        assert np.allclose(recorded.orientation, sensor.orientation, rtol=0, atol=1e-7)
+    turned = made_by_hand(example, run).sensors[0]
+    assert turned.roll_deg == 3.0
+    assert not np.allclose(turned.orientation, replace(turned, roll_deg=None).orientation, rtol=0, atol=1e-3)
+
+
+def test_keys_of_which_this_version_knows_nothing_are_passed_over(whole):
+    content = copy.deepcopy(whole)
+    for place in [(), *every_place(whole)]:
+        value = parent(content, (*place, ""))
+        if isinstance(value, dict) and not set(place) & {"settings", "dropped", "inputs", "versions", "durations_s"}:
+            value["more"] = 1.0
+    assert content["sensors"][0]["more"]
+    content["seeds"].pop("more")
+    assert content_of(parsed_record(json.dumps(content))) == whole
+
+
+def test_a_part_that_is_missing_is_missed(whole):
+    for place in every_place(whole):
+        changed = copy.deepcopy(whole)
+        del parent(changed, place)[place[-1]]
+        assert bool(refusal(changed)) == bool(violations(changed, SCHEMA)), place
+
+
+@pytest.mark.parametrize(
+    "value", [None, True, "text", 0.5, math.nan, math.inf, pytest.param(10**400, id="vast"), [], [0.5], {}, {"a": []}]
+)
+def test_a_part_of_another_type_is_refused(whole, value):
+    for place in every_place(whole):
+        changed = copy.deepcopy(whole)
+        parent(changed, place)[place[-1]] = value
+        sentence = refusal(changed)
+        if sentence:
+            assert re.fullmatch(r"the placement that this scene keeps .*; place the sensors again.*", sentence)
+        elif violations(changed, SCHEMA):
+            assert is_open(place) or (place[-1], value) in {("status", "text"), ("roll_deg", None)}, place
+
+
+def test_a_text_that_no_file_can_hold_is_refused(record):
+    with pytest.raises(SeipError, match="damaged"):
+        parsed_record(record.text().replace("rings", "\\ud800"))
 
 
 def test_a_tilt_is_in_degrees_and_upright_is_zero(example, run):
     first, *others = example.deployment.sensors
     deployment = replace(example.deployment, sensors=(replace(first, tilt=math.radians(-12.5)), *others))
     record = make_record(replace(example, deployment=deployment), run)
-    assert [sensor["tilt_deg"] for sensor in record["sensors"]] == [-12.5, *(0.0 for _ in others)]
-    assert violations(json.loads(json.dumps(record)), SCHEMA) == []
-    record["sensors"][0]["tilt_deg"] = 91.0
-    assert violations(json.loads(json.dumps(record)), SCHEMA)
+    assert [sensor.tilt_deg for sensor in record.sensors] == [-12.5, *(0.0 for _ in others)]
+    content = content_of(record)
+    assert violations(content, SCHEMA) == []
+    content["sensors"][0]["tilt_deg"] = 91.0
+    assert violations(content, SCHEMA)
 
 
 def test_every_required_part_is_missed_when_it_is_absent(example, run):
-    record = json.loads(json.dumps(make_record(example, run)))
+    record = content_of(make_record(example, run))
     for part in SCHEMA["required"]:
         assert violations({key: value for key, value in record.items() if key != part}, SCHEMA)
     assert violations({**record, "more": 1}, SCHEMA)
@@ -82,24 +214,22 @@ def test_every_required_part_is_missed_when_it_is_absent(example, run):
 
 def test_settings_of_the_work_are_accepted_and_held_to_their_types(example, run):
     work = {"engine": "auto", "solver": "highs", "catalogue": ["mine.toml"], "render": True, "time_limit_s": 60.0}
-    record = make_record(example, replace(run, settings=work))
+    record = content_of(make_record(example, replace(run, settings={**run.settings, **work})))
     assert violations(record, SCHEMA) == []
     for name in work:
-        assert violations({**record, "settings": {**work, name: None}}, SCHEMA)
+        assert violations({**record, "settings": {**record["settings"], name: None}}, SCHEMA)
 
 
 def test_nothing_random_is_claimed(example, run):
-    assert make_record(example, run)["seeds"] == {}
+    assert make_record(example, run).seeds == {}
 
 
 def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(example, run):
     record = make_record(example, run)
-    for entry, sensor in zip(record["sensors"], example.deployment.sensors, strict=True):
-        assert np.allclose(np.subtract(entry["map_m"], entry["local_m"]), example.site.origin, atol=2e-6, rtol=0)
-        assert entry["local_m"] == pytest.approx(sensor.xyz.tolist(), abs=1e-6)
-        assert (
-            entry["position"] == example.site.candidates.position_name[example.site.candidates.position_of[sensor.pose]]
-        )
+    for entry, sensor in zip(record.sensors, example.deployment.sensors, strict=True):
+        assert np.allclose(np.subtract(entry.map_m, entry.local_m), example.site.origin, atol=2e-6, rtol=0)
+        assert entry.local_m == pytest.approx(sensor.xyz.tolist(), abs=1e-6)
+        assert entry.position == example.site.candidates.position_name[example.site.candidates.position_of[sensor.pose]]
 
 
 def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):
@@ -115,8 +245,8 @@ def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, r
 def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
     record = make_record(example, run, bound=math.inf, gap=math.inf)
     save_placement_record(tmp_path / "placement.json", record)
-    assert record["objective"]["bound"] is None
-    assert violations(record, SCHEMA) == []
+    assert record.objective.bound is None
+    assert violations(content_of(record), SCHEMA) == []
 
 
 @pytest.mark.parametrize(
@@ -125,11 +255,17 @@ def test_a_bound_that_was_not_found_is_null(example, run, tmp_path):
         ("{", "damaged"),
         ('{"schema": "seip-placement/0"}', "seip-placement/0"),
         ("[1]", "None"),
+        (
+            '{"schema": "seip-placement/2", "site": 3}',
+            "json is damaged .*: site must be an object, not 3; place",
+        ),
+        ("[" * 100_000, "damaged"),
+        ("\xff", "damaged"),
     ],
 )
 def test_a_foreign_file_is_refused_in_one_sentence(tmp_path, content, says):
     path = tmp_path / "placement.json"
-    path.write_text(content)
+    path.write_bytes(content.encode("latin-1"))
     with pytest.raises(SeipError, match=says):
         load_placement_record(path)
 

@@ -1,0 +1,112 @@
+"""Dataclasses from JSON, each value held to the type of its field."""
+
+from __future__ import annotations
+
+import reprlib
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+Value = TypeVar("Value")
+
+_PLAIN: dict[type, tuple[str, tuple[type, ...]]] = {
+    str: ("a text", (str,)),
+    bool: ("true or false", (bool,)),
+    int: ("a whole number", (int,)),
+    float: ("a number", (int, float)),
+    NoneType: ("null", (NoneType,)),
+    tuple: ("a list", (list, tuple)),
+    dict: ("an object", (dict,)),
+}
+"""What each type is called in messages, and the types of values that stand for it."""
+
+
+def from_json(kind: type[Value], content: object, where: str = "") -> Value:
+    """Return the dataclass that a JSON value holds: its keys are the names of the fields.
+
+    Fields are ``str``, ``bool``, ``int``, ``float`` (whole numbers stay as they are), ``object`` (anything), literals,
+    dataclasses, and tuples, mappings by name and unions of these. Keys without a field are passed over.
+
+    Parameters
+    ----------
+    kind : type
+        The dataclass.
+    where : str
+        What stands before the names of fields in messages.
+
+    Raises
+    ------
+    ValueError
+        A field without a default is missing, or a value is not of its field's type or no finite number.
+    """
+    read: Value = _read(kind, content, where)
+    return read
+
+
+def _read(kind: Any, value: Any, where: str) -> Any:  # noqa: ANN401 -- types and values of any kind
+    parts = get_args(kind)
+    if kind is object:
+        read = value
+    elif is_dataclass(kind):
+        read = _object(kind, _plain(dict, value, where), where)
+    elif get_origin(kind) in {Union, UnionType}:
+        read = _first_of(parts, value, where)
+    elif get_origin(kind) is tuple:
+        read = _items(parts, _plain(tuple, value, where), where)
+    elif get_origin(kind) is Mapping:
+        read = {name: _read(parts[1], part, _at(where, name)) for name, part in _plain(dict, value, where).items()}
+    elif get_origin(kind) is Literal:
+        if value not in parts:
+            raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, not {reprlib.repr(value)}")
+        read = value
+    else:
+        read = _plain(kind, value, where)
+    return read
+
+
+def _object(kind: Any, content: dict[str, Any], where: str) -> Any:  # noqa: ANN401 -- as above
+    hints, values = _hints(kind), {}
+    for each in fields(kind):
+        if each.name in content:
+            values[each.name] = _read(hints[each.name], content[each.name], _at(where, each.name))
+        elif each.default is MISSING:
+            raise ValueError(f"{_at(where, each.name)} is missing")
+    return kind(**values)
+
+
+def _first_of(kinds: tuple[Any, ...], value: object, where: str) -> Any:  # noqa: ANN401 -- as above
+    problems = []
+    for kind in kinds:
+        try:
+            return _read(kind, value, where)
+        except ValueError as error:
+            problems.append(error)
+    raise problems[0]
+
+
+def _items(kinds: tuple[Any, ...], values: Sequence[object], where: str) -> tuple[Any, ...]:
+    if kinds[1:] == (Ellipsis,):
+        kinds = kinds[:1] * len(values)
+    if len(kinds) != len(values):
+        raise ValueError(f"{where} must be a list of {len(kinds)} values, not of {len(values)}")
+    return tuple(_read(kinds[at], value, f"{where}[{at}]") for at, value in enumerate(values))
+
+
+def _plain(kind: type, value: Any, where: str) -> Any:  # noqa: ANN401 -- as above
+    name, types = _PLAIN[kind]
+    fits = isinstance(value, types) and (kind is bool or not isinstance(value, bool))
+    if not fits or (isinstance(value, (int, float)) and not abs(value) <= sys.float_info.max):
+        raise ValueError(f"{where or 'all'} must be {name}, not {reprlib.repr(value)}")
+    return value
+
+
+def _at(where: str, name: str) -> str:
+    return f"{where}.{name}" if where else name
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)

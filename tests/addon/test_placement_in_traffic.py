@@ -1,0 +1,128 @@
+"""Placement for the road in traffic from the panel: the command's answer, and a sentence for what cannot be used."""
+
+import shutil
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+from headless import in_traffic
+
+import bpy
+import pytest
+
+from seip_addon.core.results.placement_record import comparable, load_placement_record, parsed_record
+from seip_addon.operators.placement import SEIP_OT_solve_placement
+from seip_addon.panels.placement import SEIP_PT_placement_precaution
+from seip_addon.session import session
+from tests.scene_by_hand import make_scene
+from tests.small_junction import make_example
+from tests.small_scene import make_run
+
+OPTIONS = [
+    *("--sensor", "vlp16", "--heights", "5.4", "--grid", "8", "--spacing", "25", "--delta", "6", "--count", "2"),
+    *("--see", "height", "--weights-from-traffic", "--instants", "2", "--judged-at", "8", "--no-render"),
+]
+
+
+@pytest.fixture
+def coarse(junction):
+    """The small junction with coarser settings, to place on its traffic."""
+    survey, goal = junction.seip.survey, junction.seip.goal
+    survey.heights, survey.grid, survey.spacing, survey.delta = "5.4", 8.0, 25.0, 6.0
+    for one in survey.types:
+        one.use = one.name == "vlp16"
+    goal.objective, goal.instants, goal.evaluation_instants = "TRAFFIC", 2, 8
+    return junction
+
+
+def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coarse, tmp_path, small_scene):
+    goal = coarse.seip.goal
+    goal.layer, goal.weights_from_traffic = "height", True
+    goal.pose_errors = True  # left from another objective, and not shown for this one
+    assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    path = tmp_path / "placed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    seip = bpy.context.scene.seip
+    panel = parsed_record(seip.result.record)
+    assert any(note.startswith("placing on traffic sees") for note in panel.notes)
+    seip.traffic.file = str(small_scene.parent / "small_traffic" / "run-1.npz")
+    bpy.ops.seip.load_traffic()
+    bpy.ops.seip.try_in_traffic()
+    assert parsed_record(seip.result.record).notes[:-1] == panel.notes
+    in_traffic.main([str(small_scene), *OPTIONS, "-o", str(tmp_path)])
+    assert comparable(panel) == comparable(load_placement_record(tmp_path / "placement.json"))
+
+
+def test_the_panel_shows_what_the_objective_asks_for(coarse):
+    layout = MagicMock()
+    SEIP_PT_placement_precaution.draw(SimpleNamespace(layout=layout), bpy.context)
+    column = layout.column.return_value
+    names = [call.args[1] for call in column.prop.call_args_list]
+    assert names == ["objective", "runs", "layer", "weights_from_traffic", "instants", "evaluation_instants"]
+    assert all(hasattr(coarse.seip.goal, name) for name in names)
+    assert column.prop.call_args_list[1].kwargs == {"placeholder": "small_traffic"}
+    said = " ".join(call.kwargs["text"] for call in column.column.return_value.label.call_args_list)
+    assert said == "This looks from every candidate at 2 instants and takes minutes."
+
+
+def test_runs_are_read_in_work_that_can_be_stopped(coarse):
+    work = SEIP_OT_solve_placement.prepare(SimpleNamespace(), coarse)
+    assert any(progress.what == "reading runs of traffic" for progress in work)
+    work.close()
+    assert session.survey_of(coarse) is None
+    assert not coarse.seip.result.record
+
+
+def other_place(folder):
+    far = make_run(1, 30.0)
+    far.position[:] += 9000.0
+    far.save(folder / "run-1.npz")
+    make_run(2, 30.0).save(folder / "run-2.npz")
+
+
+def copies(folder):
+    for number in (1, 2):
+        make_run(1, 30.0).save(folder / f"run-{number}.npz")
+
+
+def damaged(folder):
+    copies(folder)
+    (folder / "run-2.npz").write_bytes(b"PK")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (shutil.rmtree, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder, or make two or more"),
+        (lambda folder: None, "there is no run of traffic"),
+        (lambda folder: make_run(1, 30.0).save(folder / "run.npz"), "1 runs of traffic are too few: give two or more"),
+        (other_place, "traffic of another place"),
+        (copies, r"run-1\.npz and .*run-2\.npz are nearly the same traffic"),
+        (damaged, r"run-2\.npz is no file of trajectories, or is damaged.*import or simulate them again"),
+    ],
+)
+def test_runs_that_are_of_no_use_are_refused_before_any_ray_is_cast(coarse, tmp_path, wrong, words):
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    wrong(folder)
+    coarse.seip.goal.runs = str(folder)
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.seip.solve_placement()
+    assert not coarse.seip.result.record
+    assert not (tmp_path / "cache").exists()
+
+
+def test_runs_beside_a_file_that_was_never_saved_have_their_sentence(add_on):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = make_scene(make_example().geometry)
+    scene.seip.goal.objective = "TRAFFIC"
+    for folder in ("", "//runs"):
+        scene.seip.goal.runs = folder
+        with pytest.raises(RuntimeError, match="the file has not been saved: save it first, or choose another folder"):
+            bpy.ops.seip.solve_placement()
+
+
+def test_a_coverage_to_reach_is_of_the_empty_road(coarse):
+    coarse.seip.goal.limit = "COVERAGE"
+    with pytest.raises(RuntimeError, match="needs a number of sensors or a budget"):
+        bpy.ops.seip.solve_placement()
