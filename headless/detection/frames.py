@@ -196,7 +196,7 @@ def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
 
 
 def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str:
-    """See that no two splits show nearly the same traffic; return a sentence on how much their runs overlap.
+    """Raise SeipError where two splits show nearly the same traffic; return a message on the overlap of their runs.
 
     Where vehicles are is read from the labels of all frames.
 

@@ -68,7 +68,7 @@ class SensorConfiguration:
 
     @property
     def places(self) -> Float:
-        """Where the sensors are, (s, 3) in metres."""
+        """Positions of the sensors, (s, 3) in metres."""
         return np.array([sensor.xyz for sensor in self.sensors])
 
 

@@ -48,7 +48,7 @@ _CLOSED_LANES = ("shoulder", "restricted", "median", "stop", "none", "border")
 
 @dataclass(frozen=True)
 class Sumo:
-    """Where SUMO's programs are: of the installation in ``home``."""
+    """SUMO's programs, of the installation in ``home``."""
 
     sumo: Path
     netconvert: Path

@@ -118,7 +118,7 @@ def measure(
 def placements(
     site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
 ) -> tuple[list[SolverRun], tuple[str, str, str]]:
-    """Compare ways to place sensors at the scene's site and in synthetic streets."""
+    """Compare placement methods on the scene's site and in synthetic streets."""
     own = site.candidates.sensor == site.candidates.sensor[0]
     visible = finish(compute_visibility(site, models, settings)).visible
     problem = placement_problem(site, visible, models, Objective(count=SENSOR_COUNT))

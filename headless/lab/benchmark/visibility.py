@@ -120,7 +120,7 @@ def visibility_costs(
     samples: int,
     simpler: Sequence[Approximation] = (),
 ) -> dict[str, Cost]:
-    """Compute the same poses in all ways in turn: full scan and lazily, with each engine and each simplification.
+    """Compute the same poses by all methods in turn: full scan and lazily, with each engine and each simplification.
 
     Parameters
     ----------

@@ -162,7 +162,7 @@ def _of_borders(borders: BorderResults) -> Iterator[Row]:
 
 
 def _below_half(bins: Sequence[Bin], what: str) -> str:
-    """Say where fewer than half are found."""
+    """Return the bins in which fewer than half are found, as a message."""
     known = [one for one in bins if one.wanted]
     fails = [one for one in known if one.value < 0.5]
     words = _bins(known, lambda value: f"{value:.0%}")

@@ -305,7 +305,7 @@ def training_plan(
 
 @dataclass(frozen=True, eq=False)
 class LimitsStudy:
-    """Where the detector begins to fail on one site.
+    """Limits of the detector on one site.
 
     Parameters
     ----------

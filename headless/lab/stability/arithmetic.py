@@ -253,7 +253,7 @@ def _seen_in_float64(scene: HardScene, targets: Float, delta: float) -> tuple[Bo
 
 
 def _within(distance: Float, near: Boolean) -> bool:
-    """Tell whether some ray that is near ends within the sensor's range."""
+    """Return whether some near ray ends within the sensor's range."""
     return bool((near & (distance >= SENSOR.min_range) & (distance <= SENSOR.max_range)).any())
 
 

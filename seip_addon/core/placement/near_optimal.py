@@ -56,7 +56,7 @@ class NearOptimalSet:
 
     @property
     def message(self) -> str:
-        """How many there are, and how different."""
+        """Number and variety of the placements, as a message."""
         near = f"within {self.share:.0%} of the best"
         if self.complete and len(self) == 1:
             return f"no other placement covers {near}"

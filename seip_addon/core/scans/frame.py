@@ -86,7 +86,7 @@ class Labels:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What all sensors measure in one revolution, sensor after sensor; n points.
+    """Point cloud of all sensors in one revolution, sensor after sensor; n points.
 
     Parameters
     ----------

@@ -398,7 +398,7 @@ def _duplicates(contents: SceneContents) -> Iterator[Problem]:
 
 
 def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
-    """Look at the road within the region: holes, steps, and one road closely above another."""
+    """Find problems of the road within the region: holes, steps, and one road closely above another."""
     region, road = plans["region"], plans["roads"]
     within = region.intersection(road)
     if within.area == 0:

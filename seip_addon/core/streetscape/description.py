@@ -148,7 +148,7 @@ class SiteDescription:
 
     @property
     def along(self) -> float | None:
-        """How far the region follows the approaches of the junction, metres; None where it is a circle or an area."""
+        """Length of the approaches in the region, metres; None where the region is a circle or an area."""
         if self.junction is None or self.region is not None or self.radius is not None:
             return None
         return DEFAULT_RADIUS if self.approaches is None else self.approaches

@@ -138,7 +138,7 @@ class _Sample:
 def _compute_from(
     drawn: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]
 ) -> Generator[Progress, None, _Sample]:
-    """Look from the first of some places, then from as many more as there is time for.
+    """Compute visibility from the first of some positions, then from as many more as there is time for.
 
     The second batch alone counts where it is the larger one: the first pays for what later places find ready.
     """

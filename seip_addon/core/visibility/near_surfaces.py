@@ -26,7 +26,7 @@ _FLOAT32_ROUNDINGS = 64
 
 @dataclass(frozen=True, eq=False)
 class Cuts:
-    """What balls of radius δ about targets cut out of the planes of the triangles that they meet: discs.
+    """Discs: intersections of balls of radius δ about targets with the planes of triangles.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Cuts:
 
 @dataclass(frozen=True, eq=False)
 class Discs:
-    """Circles about what balls of radius δ about targets cut out of the triangles that they meet.
+    """Circles about the intersections of balls of radius δ about targets with triangles.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Discs:
 
 @dataclass(frozen=True, eq=False)
 class NearSurfaces:
-    """Where returns within δ of targets can lie.
+    """Surfaces on which returns within δ of targets can lie.
 
     Parameters
     ----------
