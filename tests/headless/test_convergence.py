@@ -73,7 +73,7 @@ def test_the_coarsest_is_taken_where_nothing_is_gained_and_the_finest_where_all_
 def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
     goal, tolerance = Objective(count=2), 0.02
     found = finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
-    assert found.settings.spacings_because == found.sentence
+    assert found.settings.spacings_because == found.message
     evaluator = Evaluator(GEOMETRY, SETTINGS, goal)
     taken = finish(evaluator.answer(found.settings))
     finest = finish(
