@@ -33,13 +33,13 @@ def main(argv: list[str], scope: BenchmarkScope | None = None) -> None:
     findings, names = measure(
         read_scene(bpy.context.scene).geometry, options.places, options.time_limit, scope or BenchmarkScope()
     )
-    requirements = bars(findings.costs, findings.runs, names, findings.scans)
-    for bar in requirements:
+    checks = bars(findings.costs, findings.runs, names, findings.scans)
+    for bar in checks:
         runtime.print_line(f"{bar.what}: asked {bar.asked}, measured {bar.measured}{'' if bar.met else ' – NOT MET'}")
     with runtime.incomplete_if_interrupted(options.output):
         save_charts(options.output / "benchmark", findings)
-        save_json(options.output / "benchmark" / "benchmark.json", findings, requirements)
-        save_page(options.output / "benchmark.md", findings, requirements, "benchmark")
+        save_json(options.output / "benchmark" / "benchmark.json", findings, checks)
+        save_page(options.output / "benchmark.md", findings, checks, "benchmark")
     runtime.print_line(f"results: {options.output / 'benchmark.md'}")
 
 

@@ -41,10 +41,10 @@ NETWORKS = {
     ("width", "64"): replace(DEFAULT_NETWORK, width=64),
     ("head", "anchors"): replace(DEFAULT_NETWORK, head="anchor"),
 }
-"""What is compared: family and name, and the network."""
+"""Networks compared, by family and name."""
 
 TIMED_RUNS = 5
-"""Times that a frame is looked at, of which the median counts."""
+"""Runs of the detector on each frame; the median time counts."""
 
 
 def main(argv: list[str]) -> None:

@@ -15,7 +15,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime, survey
-from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
+from headless.charts.robust import save_frontier_chart, save_loss_chart, save_spread_chart
 from headless.options import add_objective, add_settings, new_parser, read_objective, read_settings
 
 from seip_addon.core.placement.objective import check_objective
@@ -39,7 +39,7 @@ def main(argv: list[str]) -> None:
     with runtime.incomplete_if_interrupted(options.output):
         layout = surveyed.layout
         save_spread_chart(options.output / CHARTS[0], study, f"{layout.site.name}: coverage under pose errors")
-        save_blame_chart(options.output / CHARTS[1], robust.pose_study, f"{layout.site.name}: what costs coverage")
+        save_loss_chart(options.output / CHARTS[1], robust.pose_study, f"{layout.site.name}: what costs coverage")
         save_frontier_chart(options.output / CHARTS[2], study, f"{layout.site.name}: what robustness costs and saves")
         asked = {"render": not options.no_render, "robustness": robustness.as_record()}
         survey.save_solution(surveyed, solution, options.output, asked)

@@ -52,8 +52,7 @@ except ImportError:
 
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
-ELAPSED_FORMAT = "{desc} [{elapsed}]"
-"""How progress of unknown length is shown."""
+ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
 
 LOG = logging.getLogger("headless")
 """Progress and warnings of commands and their modules; results go through `print_line`."""

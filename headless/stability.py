@@ -31,7 +31,7 @@ PAGE, CHARTS = "stability.md", "stability"
 
 
 def main(argv: list[str], scope: StabilityScope | None = None) -> None:
-    """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
+    """Study what has not been scene yet, and write the page; tests give a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
     for other in options.other:
@@ -42,27 +42,25 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
         lambda site, models: check_objective(site, models, Objective(count=DEFAULT_COUNT)),
     )
     runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
-    studied = StudiedScene(
-        surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope()
-    )
+    scene = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
     made_from = digest(
         grid_key(surveyed.layout),
         repr(surveyed.layout.settings),
-        repr(studied.scope),
+        repr(scene.scope),
         *(run.key for run in runs),
         *(other.name for other in options.other),
         source_digest("headless.stability"),
     )
     done = []
-    for name, work in chapters(studied):
+    for name, work in chapters(scene):
         kept = load_chapter(options.work / f"{name}.json", made_from)
         if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
-            kept = surveyed.stopwatch.run(name, work(studied))
+            kept = surveyed.stopwatch.run(name, work(scene))
             save_chapter(options.work / f"{name}.json", kept, made_from)
             runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
         done.append(kept)
     with runtime.incomplete_if_interrupted(options.output):
-        save_page(options.output / PAGE, introduction(studied), done, CHARTS)
+        save_page(options.output / PAGE, introduction(scene), done, CHARTS)
     runtime.print_line(f"written to {options.output / PAGE}")
 
 

@@ -43,7 +43,7 @@ LOG = logging.getLogger(__name__)
 
 @dataclass
 class Stopwatch:
-    """How long each step took, in seconds; kept apart from results."""
+    """Seconds of each step; kept apart from results."""
 
     seconds: dict[str, float] = field(default_factory=dict)
 

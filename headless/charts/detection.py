@@ -370,7 +370,7 @@ def _mark(row: int) -> dict[str, Any]:
 
 
 def _front(cells: Sequence[PrecisionCell]) -> list[PrecisionCell]:
-    """Return the cells than which none costs no more and detects better (Pareto front), the cheapest first."""
+    """Return the Pareto front of cells by price and average precision, the cheapest first."""
     best: list[PrecisionCell] = []
     for cell in sorted(cells, key=lambda cell: (cell.price, -cell.mean)):
         if not best or cell.mean > best[-1].mean:

@@ -56,7 +56,7 @@ def save_spread_chart(path: str | os.PathLike[str], study: RobustStudy, title: s
     save_chart(path, figure, title)
 
 
-def save_blame_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) -> None:
+def save_loss_chart(path: str | os.PathLike[str], study: PoseStudy, title: str) -> None:
     """Draw the mean loss of coverage by each sensor's own error, and by each kind of error, as PNG."""
     figure, (axes,) = new_figure(*FIGURE_SIZE)
     sensors = list(zip(study.labels, study.loss_by_sensor(), strict=True))

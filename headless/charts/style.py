@@ -1,4 +1,4 @@
-"""Style that all charts share: colours, marks, axes, legends and titles."""
+"""Style of all charts: colours, marks, axes, legends and titles."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def _draw_shares(panel: Axes, site: Site, time: Float) -> None:
 
 
 def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:
-    """Draw what stands in the way and the region's border."""
+    """Draw obstacles and the region's border."""
     shown = shapely.box(*panel.get_xlim()[:1], *panel.get_ylim()[:1], *panel.get_xlim()[1:], *panel.get_ylim()[1:])
     standing = shapely.intersection(outline(joined(geometry.occluders)), shown)
     draw_area(panel, standing, facecolor=OBSTACLE_COLOUR, edgecolor="#3d4542", linewidth=0.4, alpha=0.75, zorder=2)

@@ -28,11 +28,10 @@ DIRECTION_FROM = math.pi / 4
 SMOOTH_L1_BETA = 1 / 9
 """Where the smooth L1 loss turns from a square into a line."""
 
-INITIAL_SCORE = 0.01
-"""Score that every anchor begins with."""
+INITIAL_SCORE = 0.01  # score that every anchor begins with
 
 MAX_BOXES = 500
-"""Boxes of a cloud that are looked at, the best first."""
+"""Boxes of a cloud before suppression, the best first."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,7 @@ class AnchorHead(nn.Module):
 
 
 BACKGROUND, IGNORED = -1, -2
-"""What an anchor is assigned to that must find no road user, and one that may do as it likes."""
+"""Assignment of an anchor that must find no road user, and of one that is left out of the loss."""
 
 
 def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:

@@ -40,11 +40,10 @@ HEAT_STD = 0.18
 MIN_HEAT = 0.2
 """Cells with less heat of a road user do not learn its box."""
 
-INITIAL_HEAT = 0.01
-"""Heat that every cell begins with."""
+INITIAL_HEAT = 0.01  # heat that every cell begins with
 
 MAX_PEAKS = 500
-"""Peaks of a cloud that are looked at, the highest first."""
+"""Peaks of a cloud before suppression, the highest first."""
 
 OVERLAP_POWER = 0.5
 """Part of the predicted overlap in a score: heat^(1 − part) · overlap^part."""

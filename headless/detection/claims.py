@@ -22,8 +22,7 @@ from seip_addon.core.estimates import Interval, mean_interval
 FACTOR = 2.0
 """Factor up to which a figure is about another."""
 
-MIN_SEEDS = 3
-"""Seeds below which nothing is decided."""
+MIN_SEEDS = 3  # seeds below which nothing is decided
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
 """What the study gained from one to two and from two to four sensors, of the simplest type and the next."""

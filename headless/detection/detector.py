@@ -82,7 +82,7 @@ class Detector(nn.Module):
 
     @property
     def device(self) -> torch.device:
-        """Where the weights are."""
+        """Device of the weights."""
         return next(self.parameters()).device
 
     @property
@@ -244,7 +244,7 @@ _READ_ERRORS = (
 
 
 def _check_archive(content: bytes) -> None:
-    """See that a file is what `torch.save` writes, to the last of its bits: torch itself compares no checksums."""
+    """Check the archive of `torch.save` against its checksums, which torch itself does not compare."""
     if len(content) > _MAX_BYTES:
         raise _ContentError(f"it is larger than {_MAX_BYTES >> 30} GiB")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -256,7 +256,7 @@ def _check_archive(content: bytes) -> None:
 
 
 def _check_sizes(state: object, most: int) -> None:
-    """See that tensors are not larger than the file that they are from."""
+    """Raise `_ContentError` where tensors are larger than their file."""
     if sum(tensor.numel() * tensor.element_size() for tensor in _tensors(state)) > most:
         raise _ContentError("it has tensors larger than itself")
 

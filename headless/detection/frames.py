@@ -32,7 +32,7 @@ class Recording:
     name : str
         For messages.
     traffic : str
-        What tells the run of traffic from all others: the source of its trajectories, with its seed.
+        Identifier of the run of traffic: the source of its trajectories, with its seed.
     frames : sequence of Frame
         In memory, or read when they are asked for.
     sensors : tuple of str
@@ -196,7 +196,7 @@ def require_separate(splits: Mapping[str, Sequence[Recording]]) -> None:
 
 
 def require_independent_splits(splits: Mapping[str, Sequence[Recording]]) -> str:
-    """See that no two splits show nearly the same traffic; return a sentence on how much their runs overlap.
+    """Raise SeipError where two splits show nearly the same traffic; return a message on the overlap of their runs.
 
     Where vehicles are is read from the labels of all frames.
 

@@ -15,7 +15,7 @@ MIN_SCORE = 0.05
 """Boxes below it are not kept: average precision hardly sees them, and time is spent on each."""
 
 MAX_OVERLAP = 0.1
-"""Two boxes that overlap more, as intersection over union in plan, are one road user: none stands in another."""
+"""Intersection over union in plan beyond which two boxes are one road user."""
 
 
 @torch.inference_mode()

@@ -28,7 +28,7 @@ from .frames import LazyFrames, Recording
 
 @dataclass(frozen=True, eq=False)
 class SampledRun:
-    """One run of traffic and the instants at which it is looked at.
+    """A run of traffic with the instants of its frames.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class SampledRun:
 
     @property
     def key(self) -> str:
-        """What tells this run of traffic from all others, whatever its file is called."""
+        """Identifier of the run of traffic, whatever its file is called."""
         return digest(self.trajectories.first, self.trajectories.time, self.trajectories.position)
 
 
@@ -68,7 +68,7 @@ class SensorConfiguration:
 
     @property
     def places(self) -> Float:
-        """Where the sensors are, (s, 3) in metres."""
+        """Positions of the sensors, (s, 3) in metres."""
         return np.array([sensor.xyz for sensor in self.sensors])
 
 

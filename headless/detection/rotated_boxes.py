@@ -131,13 +131,13 @@ def _cuts(start: Tensor, step: Tensor, half: Tensor) -> tuple[Tensor, Tensor]:
 
 def _corners_seen_from(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
     """Return x and y (4, n) of the corners of `a` in the frames of `b`."""
-    east, north = _turned(a[:, 0] - b[:, 0], a[:, 1] - b[:, 1], -b[:, 4])
+    east, north = _rotated(a[:, 0] - b[:, 0], a[:, 1] - b[:, 1], -b[:, 4])
     unit = torch.tensor(CORNERS, dtype=a.dtype, device=a.device)
-    x, y = _turned(unit[:, :1] * a[:, 2], unit[:, 1:] * a[:, 3], a[:, 4] - b[:, 4])
+    x, y = _rotated(unit[:, :1] * a[:, 2], unit[:, 1:] * a[:, 3], a[:, 4] - b[:, 4])
     return x + east, y + north
 
 
-def _turned(x: Tensor, y: Tensor, angle: Tensor) -> tuple[Tensor, Tensor]:
+def _rotated(x: Tensor, y: Tensor, angle: Tensor) -> tuple[Tensor, Tensor]:
     """Turn points counter-clockwise about the origin."""
     cosine, sine = torch.cos(angle), torch.sin(angle)
     return cosine * x - sine * y, sine * x + cosine * y

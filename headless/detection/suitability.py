@@ -26,11 +26,11 @@ def suitability_warnings(
     Parameters
     ----------
     sensors : sequence of str
-        Catalogue keys of the types whose clouds it is to look at.
+        Catalogue keys of the types whose clouds it is used on.
     site : str
         The scene's name; empty where it is not known.
     points : (n, 3 or more) float32, metres
-        A cloud as it is to look at.
+        A cloud as it is used on.
     """
     found = (_of_types(detector, sensors), _of_site(detector, site), _of_pillars(detector, points))
     return tuple(sentence for sentence in found if sentence)

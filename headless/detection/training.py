@@ -33,7 +33,7 @@ from .pillars import PillarGrid, Pillars, fill_pillars, stacked
 from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18
-"""Frames, spread over the recordings set aside, that each validation looks at."""
+"""Frames of each validation, spread over the recordings set aside."""
 
 LOSS_MARGIN = 1.6
 """Metres at the border of a window for which no loss is computed: much of what is there lies outside."""

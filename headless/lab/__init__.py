@@ -1,1 +1,1 @@
-"""Studies of the methods themselves: where they fail, and what they cost. Imported by no command but theirs."""
+"""Studies of the methods' limits and costs. Imported by no command but theirs."""

@@ -41,14 +41,14 @@ _PERMISSIONS = {
     "biking": 'allow="bicycle"',
     "parking": f'allow="{PARKED_CLASS}"',
 }
-"""Who may use which type of lane; nobody the others."""
+"""Permissions of lane types; all others are closed."""
 
 _CLOSED_LANES = ("shoulder", "restricted", "median", "stop", "none", "border")
 
 
 @dataclass(frozen=True)
 class Sumo:
-    """Where SUMO's programs are: of the installation in ``home``."""
+    """SUMO's programs, of the installation in ``home``."""
 
     sumo: Path
     netconvert: Path

@@ -11,8 +11,7 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
 from seip_addon.core.traffic.sumo_files import Attributes, read_tags
 
-WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"
-"""Uses of lanes."""
+WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes
 
 PARKED_CLASS = "custom1"
 """The vClass that alone may stand in a parking lane."""

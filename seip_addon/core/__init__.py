@@ -1,1 +1,1 @@
-"""The core: NumPy in, NumPy out, no Blender."""
+"""The core: NumPy arrays in and out, no Blender."""

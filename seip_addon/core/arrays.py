@@ -1,4 +1,4 @@
-"""Names for arrays by what they hold; docstrings give shapes and units."""
+"""Type aliases of NumPy arrays by element type; docstrings give shapes and units."""
 
 from __future__ import annotations
 

@@ -15,16 +15,15 @@ Interval = tuple[float, float]
 """Least and largest value that a 95 % interval holds."""
 
 TAIL_PROBABILITY = 0.025
-"""Share of probability on either side of an interval."""
+"""Probability on either side of an interval."""
 
 NORMAL_QUANTILE = 1.959963984540054
 """Value that a standard normal variable exceeds with a probability of 2.5 %."""
 
-RESAMPLES = 2000
-"""Of a bootstrap."""
+RESAMPLES = 2000  # of a bootstrap
 
 MIN_BATCHES = 4
-"""Of fewer the spread of a mean is not known well enough for an interval."""
+"""With fewer, no interval is given for a mean."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
     ----------
     values : (n,) float64
     batch : (n,) int64
-        In which batch of time each was taken.
+        Batch of time of each value.
     """
     _, which = np.unique(batch, return_inverse=True)
     many = np.bincount(which)

@@ -22,7 +22,7 @@ REPORT_INTERVAL = 0.1
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a piece of work has come.
+    """Progress of a piece of work.
 
     Parameters
     ----------

@@ -30,4 +30,4 @@ def test_each_setting_gets_its_price_and_its_precision(small_scene, tmp_path, mo
 
 def test_the_settings_hold_the_default_and_the_published():
     assert list(compare_detectors.NETWORKS.values()).count(compare_detectors.DEFAULT_NETWORK) == 1
-    assert compare_detectors.PUBLISHED in compare_detectors.NETWORKS.values()
+    assert compare_detectors.PUBLISHED_NETWORK in compare_detectors.NETWORKS.values()

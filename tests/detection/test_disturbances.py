@@ -123,7 +123,7 @@ def test_points_of_a_misplaced_sensor_are_moved_and_no_others(plain):
     assert np.abs(by).max() < 3e-5
 
 
-def test_points_of_a_misturned_sensor_are_turned_about_its_own_place(plain):
+def test_points_of_a_sensor_with_a_yaw_error_are_rotated_about_its_own_place(plain):
     place, angle = sensors()[1].xyz, math.radians(2.0)
     turned, own = frame_under(YawError(2.0, sensor=1)), plain.sensor == 1
     way, other = plain.points[own] - place, turned.points[own] - place

@@ -9,7 +9,7 @@ from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.lab.detector import study as study_module
 from headless.lab.detector import trials as trials_module
-from headless.lab.detector.charts import save_foreign_chart, save_limits_chart
+from headless.lab.detector.charts import save_limits_chart, save_transfer_chart
 from headless.lab.detector.disturbances import Disturbance, DropOff, SensorFailure, YawError
 from headless.lab.detector.rows import limit_rows, points_in_words
 from headless.lab.detector.study import (
@@ -146,7 +146,7 @@ def test_there_is_a_row_for_each_question(study):
 
 def test_charts_are_drawn(study, tmp_path):
     save_limits_chart(tmp_path / "limits.png", study)
-    save_foreign_chart(tmp_path / "foreign.png", study)
+    save_transfer_chart(tmp_path / "foreign.png", study)
     assert imread(tmp_path / "limits.png").shape[1] > 1500
     assert imread(tmp_path / "foreign.png").shape[1] > 1000
 

@@ -15,7 +15,7 @@ from headless.lab.stability.criterion import (
     criterion_study,
     in_view,
     ring_borders,
-    turned_targets,
+    rotated_targets,
 )
 
 import numpy as np
@@ -73,7 +73,7 @@ def test_the_coarsest_is_taken_where_nothing_is_gained_and_the_finest_where_all_
 def test_on_a_junction_the_pick_is_within_the_tolerance_of_the_finest() -> None:
     goal, tolerance = Objective(count=2), 0.02
     found = finish(coarsest_settings(GEOMETRY, SETTINGS, goal, tolerance))
-    assert found.settings.spacings_because == found.sentence
+    assert found.settings.spacings_because == found.message
     evaluator = Evaluator(GEOMETRY, SETTINGS, goal)
     taken = finish(evaluator.answer(found.settings))
     finest = finish(
@@ -124,8 +124,8 @@ def test_borders_are_those_of_the_warning() -> None:
 
 
 def test_turned_grids_cover_the_same_road() -> None:
-    plain = turned_targets(GEOMETRY, 1.0, np.zeros(2), 0.0)
-    turned = turned_targets(GEOMETRY, 1.0, np.array([0.3, 0.8]), 0.6)
+    plain = rotated_targets(GEOMETRY, 1.0, np.zeros(2), 0.0)
+    turned = rotated_targets(GEOMETRY, 1.0, np.array([0.3, 0.8]), 0.6)
     assert len(turned) == pytest.approx(GEOMETRY.region.area, rel=0.02)
     assert len(plain) == pytest.approx(GEOMETRY.region.area, rel=0.1)
     gaps = np.linalg.norm(turned.xyz[:, None, :2] - turned.xyz[None, :50, :2], axis=2)

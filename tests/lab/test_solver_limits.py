@@ -187,5 +187,5 @@ def test_rows_and_charts_of_a_study(tmp_path: Path) -> None:
     problem, _ = random_problem(1)
     top = finish(near_optimal_set(problem, finish(solve(problem)).chosen, 0.1))
     charts.save_solver_chart(tmp_path / "solvers.png", study, "solvers")
-    charts.save_flat_top_chart(tmp_path / "flat.png", [("small", top)], "flat")
+    charts.save_near_optimal_chart(tmp_path / "flat.png", [("small", top)], "flat")
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in tmp_path.iterdir())

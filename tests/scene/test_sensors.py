@@ -15,7 +15,7 @@ from scene_by_hand import make_scene
 from small_junction import make_example
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import orientation, turned
+from seip_addon.core.geometry.orientation import orientation, rotated
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.scene import contract
@@ -74,7 +74,7 @@ def test_tilted_sensors_are_read_as_they_were_written_and_their_rays_go_where_th
         assert thing.name.startswith(f"{written.model.key} @ {written.height:.3g} m, tilted ")
         rays = beam_directions(written.model).reshape(-1, 3)[::997]
         pointed = np.array([thing.matrix_world.to_3x3() @ Vector(ray) for ray in rays])
-        np.testing.assert_allclose(turned(rays, written.orientation), pointed, atol=1e-6)
+        np.testing.assert_allclose(rotated(rays, written.orientation), pointed, atol=1e-6)
         ahead = read.orientation[:, 0]
         assert -math.degrees(math.asin(ahead[2])) == pytest.approx(math.degrees(written.tilt), abs=1e-4)
 

@@ -1,1 +1,1 @@
-"""What the benchmark measures: visibility, placement, and how both grow."""
+"""Benchmark of visibility and placement, and of their growth."""

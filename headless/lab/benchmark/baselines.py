@@ -23,7 +23,7 @@ from seip_addon.core.progress import finish
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a method found within its time limit.
+    """Result of a method within its time limit.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Found:
 
 
 def ours(problem: PlacementProblem, seconds: float) -> Found:
-    """Solve as the project does."""
+    """Solve by the project's own method."""
     placement = finish(solve(problem, SolverLimits(time_limit=seconds)))
     return Found(placement.chosen, placement.bound)
 
@@ -154,7 +154,7 @@ BASELINES: dict[str, Callable[[PlacementProblem, float], Found]] = {
 
 
 def can_run(rival: str) -> bool:
-    """Return whether what a way needs is installed, and load it, so that loading is not measured."""
+    """Return whether the packages of a method are installed, and load them, so that loading is not measured."""
     if rival != "spopt MCLP":
         return True
     try:

@@ -18,15 +18,15 @@ ENGINE_NAMES = {"bvh": "BVHTree", "embree": "Embree"}
 
 def save_charts(pictures: Path, findings: Findings) -> None:
     """Draw visibility, placement and growth into a folder, as PNG."""
-    harm, setting = findings.harms, findings.setting
+    degradation, setting = findings.degradations, findings.setting
     save_trade_off_chart(
         pictures / "visibility.png",
         {
             "wrong pairs of pose and target, per seen pair": [
-                _way(n, c, _harm(harm, n).wrong) for n, c in findings.costs.items()
+                _way(n, c, _degradation(degradation, n).wrong) for n, c in findings.costs.items()
             ],
             "coverage lost by the placement (share of targets)": [
-                _way(n, c, max(0.0, harm["exact"].coverage - _harm(harm, n).coverage))
+                _way(n, c, max(0.0, degradation["exact"].coverage - _degradation(degradation, n).coverage))
                 for n, c in findings.costs.items()
             ],
         },
@@ -61,9 +61,9 @@ def _way(name: str, cost: Cost, error: float) -> Method:
     return Method(ENGINE_NAMES.get(what, what), family, cost.seconds, error, default=name == DEFAULT_ENGINE)
 
 
-def _harm(harm: Mapping[str, Degradation], way: str) -> Degradation:
+def _degradation(degradation: Mapping[str, Degradation], way: str) -> Degradation:
     what = way.partition(" ")[2]
-    return harm["exact"] if what in ENGINES else harm[what]
+    return degradation["exact"] if what in ENGINES else degradation[what]
 
 
 def _proof(run: SolverRun) -> str:

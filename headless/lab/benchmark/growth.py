@@ -64,12 +64,12 @@ class Growth:
 
 @dataclass(frozen=True, eq=False)
 class Scaled:
-    """A site with the sizes to be looked at.
+    """A site with the sizes to be measured.
 
     Parameters
     ----------
     looked_from : int
-        From how many places, evenly spread, targets are looked at.
+        Number of positions, evenly spread, that visibility is computed from.
     stand_for : float
         How many places each of them stands for.
     """

@@ -1,4 +1,4 @@
-"""The sequence of measurements of the benchmark."""
+"""The measurements of the benchmark, in sequence."""
 
 from __future__ import annotations
 
@@ -16,7 +16,14 @@ from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.scans import scan_costs
 from headless.lab.benchmark.street_visibility import street_problem
-from headless.lab.benchmark.visibility import ENGINES, SENSOR_COUNT, cast_rate, harms, sampled_places, visibility_costs
+from headless.lab.benchmark.visibility import (
+    ENGINES,
+    SENSOR_COUNT,
+    cast_rate,
+    degradations,
+    sampled_places,
+    visibility_costs,
+)
 
 import numpy as np
 
@@ -47,7 +54,7 @@ class BenchmarkScope:
     largest : tuple of int
         As ``street``, with many sensors.
     places : int
-        From so many places growth is looked at.
+        Number of positions in the measurements of growth.
     multiples : tuple of int
         Of the places, and of what grows in the streets.
     copies : tuple of int
@@ -85,7 +92,7 @@ def measure(
     for way, cost in costs.items():
         LOG.info(f"{way:<24}{cost.seconds:>9.3f} s of CPU{cost.rays:>12,} rays")
     LOG.info("whole grids, exact and simplified, and a placement by each")
-    harm = harms(site, models, settings, simpler, time_limit)
+    degradation = degradations(site, models, settings, simpler, time_limit)
     rates = {engine: cast_rate(make_ray_caster(site.triangles, engine), site.candidates.xyz[0]) for engine in ENGINES}
     limits = {str(engine): c.seconds * rates[engine] / c.seen for engine in ENGINES for c in [costs[f"lazy {engine}"]]}
     runs, names = placements(site, models, settings, time_limit, scope)
@@ -105,13 +112,13 @@ def measure(
         "cores": os.cpu_count(),
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
-    return Findings(setting, costs, harm, limits, runs, growths, scans), names
+    return Findings(setting, costs, degradation, limits, runs, growths, scans), names
 
 
 def placements(
     site: Site, models: dict[str, LidarModel], settings: VisibilitySettings, time_limit: float, scope: BenchmarkScope
 ) -> tuple[list[SolverRun], tuple[str, str, str]]:
-    """Compare ways to place sensors at the scene's site and in synthetic streets."""
+    """Compare placement methods on the scene's site and in synthetic streets."""
     own = site.candidates.sensor == site.candidates.sensor[0]
     visible = finish(compute_visibility(site, models, settings)).visible
     problem = placement_problem(site, visible, models, Objective(count=SENSOR_COUNT))

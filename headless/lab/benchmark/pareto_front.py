@@ -32,7 +32,7 @@ class Method:
 
 
 def front(ways: Sequence[Method]) -> list[Method]:
-    """Return the ways than which none is both as quick and as exact (Pareto front), the quickest first."""
+    """Return the Pareto front of methods by run time and error, the quickest first."""
     best: list[Method] = []
     for way in sorted(ways, key=lambda w: (w.seconds, w.error)):
         if not best or way.error < best[-1].error:

@@ -130,7 +130,7 @@ def _mark_default(panel: Axes, ways: Sequence[Method]) -> None:
 
 
 def _name(panel: Axes, ways: Sequence[Method]) -> None:
-    """Write each way's name beside it, no name on another or on a mark, and off the front where there is room."""
+    """Write each method's name beside its mark, without overlaps, and off the front where there is room."""
     style: dict[str, Any] = {"size": 7.5, "color": INK, "ha": "center", "va": "center", "zorder": 3}
     box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
     texts = [panel.text(0, 0, way.name, bbox=box, **style) for way in ways]

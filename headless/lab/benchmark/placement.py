@@ -39,7 +39,7 @@ class SolverRun:
 
     @property
     def gap(self) -> float:
-        """How far below the best bound it is, as a share of it."""
+        """Gap to the best bound, as a share of the bound."""
         return max(0.0, 1 - self.objective / self.best_bound)
 
     @property
@@ -54,7 +54,7 @@ class SolverRun:
 
 
 def compare(name: str, problem: PlacementProblem, ways: Sequence[str], seconds: float) -> list[SolverRun]:
-    """Solve an instance in several ways in turn, each with the same time limit.
+    """Solve an instance by several methods in turn, each with the same time limit.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Findings:
 
     setting: dict[str, Any]
     costs: Mapping[str, Cost]
-    harms: Mapping[str, Degradation]
+    degradations: Mapping[str, Degradation]
     limits: Mapping[str, float]
     runs: Sequence[SolverRun]
     growths: Sequence[Growth]
@@ -59,33 +59,25 @@ def bars(
         Instances: the one with few sensors, the one with many, the largest.
     """
     pairs = (("lazy bvh", "full bvh", 20), ("lazy embree", "full bvh", 100), ("lazy embree", "full embree", 10))
-    requirements = [
-        _ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs
-    ]
+    checks = [_ratio(f"{a} against {b}, same V", costs[b].seconds / costs[a].seconds, asked) for a, b, asked in pairs]
     by_name = {(run.instance, run.way): run for run in runs}
     few, many, largest = names
     us, cbc = by_name[few, "ours"], by_name[few, "PuLP + CBC"]
     same = us.proven and us.objective >= cbc.objective
     ratio = cbc.expense.cpu / us.expense.cpu
     stopped = "" if cbc.proven else ", CBC stopped at the time limit"
-    requirements.append(_ratio(f"ours against plain PuLP + CBC, {few}", ratio, 20, holds=same, note=stopped))
-    requirements += [
-        _small_gap(by_name[many, "ours"], 0.01, 60, None),
-        _small_gap(by_name[largest, "ours"], 0.015, 120, 4096),
-    ]
+    checks.append(_ratio(f"ours against plain PuLP + CBC, {few}", ratio, 20, holds=same, note=stopped))
+    checks += _small_gap(by_name[many, "ours"], 0.01, 60, None), _small_gap(by_name[largest, "ours"], 0.015, 120, 4096)
     plain = scans["anew bvh"]
     for engine in ENGINES:
         times = scans[f"kept {engine}"].rate / plain.rate
-        requirements.append(_ratio(f"frames of scans, {engine} against the whole scene anew with bvh", times, 15))
+        checks.append(_ratio(f"frames of scans, {engine} against the whole scene anew with bvh", times, 15))
     most = max(cost.differing / cost.rays for cost in scans.values())
     few_differ = f"{most * 1e6:.2g} in a million, each grazes something"
-    return [
-        *requirements,
-        Bar("returns of scans elsewhere than the full scan's", "1 in a million", few_differ, most <= 1e-6),
-    ]
+    return [*checks, Bar("returns of scans elsewhere than the full scan's", "1 in a million", few_differ, most <= 1e-6)]
 
 
-def save_json(path: str | os.PathLike[str], findings: Findings, requirements: Sequence[Bar]) -> None:
+def save_json(path: str | os.PathLike[str], findings: Findings, checks: Sequence[Bar]) -> None:
     """Write all figures; what is not finite is null."""
     runs = [asdict(run) | {"gap": run.gap, "own_gap": run.own_gap, "proven": run.proven} for run in findings.runs]
     growths = [
@@ -93,9 +85,9 @@ def save_json(path: str | os.PathLike[str], findings: Findings, requirements: Se
     ]
     record = {
         "setting": findings.setting,
-        "bars": [asdict(bar) for bar in requirements],
+        "bars": [asdict(bar) for bar in checks],
         "visibility": {way: asdict(cost) for way, cost in findings.costs.items()},
-        "harm": {name: asdict(harm) for name, harm in findings.harms.items()},
+        "harm": {name: asdict(degradation) for name, degradation in findings.degradations.items()},
         "times_the_limit": dict(findings.limits),
         "placement": runs,
         "growth": growths,
@@ -105,10 +97,10 @@ def save_json(path: str | os.PathLike[str], findings: Findings, requirements: Se
         temporary.write_text(json.dumps(_finite(record), indent=1) + "\n", encoding="utf-8")
 
 
-def save_page(path: str | os.PathLike[str], findings: Findings, requirements: Sequence[Bar], pictures: str) -> None:
+def save_page(path: str | os.PathLike[str], findings: Findings, checks: Sequence[Bar], pictures: str) -> None:
     """Write the page; ``pictures`` is the folder of the charts, as seen from the page."""
     parts = [
-        *_summary(findings.setting, requirements),
+        *_summary(findings.setting, checks),
         *_about_visibility(findings, pictures),
         *_about_placement(findings, pictures),
         *_about_growth(findings, pictures),
@@ -118,19 +110,19 @@ def save_page(path: str | os.PathLike[str], findings: Findings, requirements: Se
         temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
-def _summary(setting: Mapping[str, Any], requirements: Sequence[Bar]) -> list[str]:
+def _summary(setting: Mapping[str, Any], checks: Sequence[Bar]) -> list[str]:
     versions = ", ".join(f"{name} {version}" for name, version in setting["versions"].items())
     text = (
         "Written by `make benchmark`. Seconds are of processor time and differ from machine to machine; ratios hardly "
         "do: what is compared ran in turn in one process. "
         f"Here: {setting['cores']} cores, {versions}."
     )
-    rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in requirements]
+    rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in checks]
     return ["# Benchmark", text, _table(("", "asked", "measured", ""), rows)]
 
 
 def _about_visibility(findings: Findings, pictures: str) -> list[str]:
-    setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.harms["exact"]
+    setting, plain, exact = findings.setting, findings.costs["full bvh"], findings.degradations["exact"]
     text = (
         f"{setting['scene']}: {setting['targets']:,} targets, {setting['poses']:,} poses, {setting['triangles']:,} "
         f"triangles. Times are of {setting['places']} places spread evenly over the site, every type at each: the "
@@ -143,14 +135,14 @@ def _about_visibility(findings: Findings, pictures: str) -> list[str]:
         ("way", "times as quick as the plain loop", "s", "s on the clock", "rays", "rays per seen target"),
         [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
     )
-    harm = _table(
+    degradation = _table(
         ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept", ""),
-        [_harm_row(name, harm, exact) for name, harm in findings.harms.items()],
+        [_degradation_row(name, degradation, exact) for name, degradation in findings.degradations.items()],
     )
     times = "; ".join(f"with {engine} it takes {n:.1f} times that" for engine, n in findings.limits.items())
     limit = f"The least that any method can do is to cast one ray for each seen target. Of the lazy engine: {times}."
     picture = f"![processor time against error of visibility]({pictures}/visibility.png)"
-    return ["## Visibility", text, picture, costs, harm, limit]
+    return ["## Visibility", text, picture, costs, degradation, limit]
 
 
 def _about_placement(findings: Findings, pictures: str) -> list[str]:
@@ -228,15 +220,15 @@ def _cost_row(way: str, cost: Cost, plain: Cost) -> tuple[str, ...]:
     )
 
 
-def _harm_row(name: str, harm: Degradation, exact: Degradation) -> tuple[str, ...]:
+def _degradation_row(name: str, degradation: Degradation, exact: Degradation) -> tuple[str, ...]:
     return (
         name,
-        f"{harm.wrong:.2%}",
-        f"{harm.claimed:.2%}",
-        f"{harm.coverage:.2%}",
-        f"{exact.coverage - harm.coverage:.2%}",
-        f"{harm.kept} of {exact.kept}",
-        "" if harm.proven else "placement not proven the best",
+        f"{degradation.wrong:.2%}",
+        f"{degradation.claimed:.2%}",
+        f"{degradation.coverage:.2%}",
+        f"{exact.coverage - degradation.coverage:.2%}",
+        f"{degradation.kept} of {exact.kept}",
+        "" if degradation.proven else "placement not proven the best",
     )
 
 

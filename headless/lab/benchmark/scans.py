@@ -211,7 +211,7 @@ def differing(one: Scan, other: Scan) -> Integer:
 
 
 def grazes(origin: Float, direction: Float, triangles: Float, distance: float) -> bool:
-    """Tell whether two engines may disagree on a ray, of which one says how far it goes.
+    """Return whether a ray grazes an edge or a surface, so that two engines may disagree on it.
 
     It passes an edge, or it meets a surface so edge-on that single precision of the
     corners moves the full scan's return, while double precision agrees with this one.
@@ -235,7 +235,7 @@ def exact_hit(origin: Float, direction: Float, triangles: Float) -> float:
 
 
 def passes_an_edge(origin: Float, direction: Float, triangles: Float) -> bool:
-    """Tell whether a ray passes within a tenth of a millimetre of some triangle's edge."""
+    """Return whether a ray passes within a tenth of a millimetre of a triangle's edge."""
     start = np.concatenate([triangles[:, corner] for corner in range(3)]) - origin
     edge = np.concatenate([triangles[:, (corner + 1) % 3] - triangles[:, corner] for corner in range(3)])
     aside, across = (part - np.outer(part @ direction, direction) for part in (start, edge))

@@ -27,11 +27,10 @@ from seip_addon.core.visibility.visibility_model import VisibilityModel, seen_by
 
 ENGINES: tuple[Engine, ...] = ("bvh", "embree")
 
-PROVEN_GAP = 1e-6
-"""Gap below which nothing is better."""
+PROVEN_GAP = 1e-6  # gap below which nothing is better
 
 SENSOR_COUNT = 4
-"""Sensors of the placement by which the harm of an error is evaluated."""
+"""Sensors of the placement in which the degradation is measured."""
 
 
 @dataclass
@@ -121,7 +120,7 @@ def visibility_costs(
     samples: int,
     simpler: Sequence[Approximation] = (),
 ) -> dict[str, Cost]:
-    """Compute the same poses in all ways in turn: full scan and lazily, with each engine and each simplification.
+    """Compute the same poses by all methods in turn: full scan and lazily, with each engine and each simplification.
 
     Parameters
     ----------
@@ -152,7 +151,7 @@ def visibility_costs(
     return costs
 
 
-def harms(
+def degradations(
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,

@@ -1,1 +1,1 @@
-"""Where the detector fails: disturbances, trials, charts."""
+"""Limits of the detector: disturbances, trials, charts."""

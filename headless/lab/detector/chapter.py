@@ -25,11 +25,10 @@ from seip_addon.core.scans import ScanSettings, static_scene
 from seip_addon.core.workflows.survey import Layout, lay_out, see
 from seip_addon.scene.read import read_scene
 
-TRAINING_INTERVAL = 2.5
-"""Seconds between frames to learn from."""
+TRAINING_INTERVAL = 2.5  # seconds between frames to learn from
 
 TEST_STRIDE = 2
-"""Of the test frames every so many-th is tried: neighbouring ones show nearly the same."""
+"""Every second test frame is used: neighbouring ones show nearly the same."""
 
 
 def detector_limits(

@@ -1,4 +1,4 @@
-"""Charts of where the detector begins to fail."""
+"""Charts of the limits of the detector."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from seip_addon.core.pictures.palette import INK, PAPER, SOFT_INK
 from .disturbances import CappedPillars, SensorFailure
 from .study import DisturbanceCurve, LimitsStudy, TransferResult
 
-COLUMNS = 4
-"""Panels in a row."""
+COLUMNS = 4  # panels in a row
 
 PANEL_SIZE = (3.6, 3.0)  # inches
 
@@ -42,9 +41,9 @@ def save_limits_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
     save_chart(path, figure, title, panels[:1])
 
 
-def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
+def save_transfer_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None:
     """Draw by how much average precision differs where detectors are used beyond what they have learnt."""
-    changes = (*study.foreign, *study.padding)
+    changes = (*study.transfers, *study.padding)
     if not changes:
         raise SeipError("there is nothing foreign to draw: try detectors elsewhere first")
     figure, (panel,) = new_figure(9.0, 1.2 + 0.42 * len(changes), dpi=150)
@@ -60,7 +59,7 @@ def save_foreign_chart(path: str | os.PathLike[str], study: LimitsStudy) -> None
 
 
 def _in_words(one: TransferResult) -> str:
-    return f"{one.learnt}, on {one.tried}, against {one.against}"
+    return f"{one.trained_on}, on {one.tested_on}, against {one.against}"
 
 
 def _draw(panel: Axes, curves: Sequence[DisturbanceCurve], rows: Sequence[int]) -> None:

@@ -25,10 +25,10 @@ from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.traffic import Trajectories
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
-"""Unit vector along which a sensor is misplaced and about which it is tilted: no street's own direction."""
+"""Unit vector of position and tilt errors, along no street."""
 
 DROP_RANGE = 10.0
-"""Metres from a sensor within which a drop may return enough to be taken for something."""
+"""Metres from a sensor within which a raindrop may cause a return."""
 
 DROP_INTENSITY = 0.05
 """Intensity of a drop's return: at the dark end of what surfaces return."""
@@ -202,7 +202,7 @@ class YawError(OfOneSensor):
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
-        return _turned(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
+        return _rotated(frame, self, sensors, np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class TiltError(OfOneSensor):
 
     def disturbed_frame(self, frame: Frame, sensors: Sequence[MountedSensor], random: np.random.Generator) -> Frame:  # noqa: ARG002  # nothing random
         """Return the frame with this sensor's points turned about its own place."""
-        return _turned(frame, self, sensors, ERROR_AXIS)
+        return _rotated(frame, self, sensors, ERROR_AXIS)
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def _with_models(
     return tuple(replace(sensor, model=change(sensor.model)) for sensor in sensors)
 
 
-def _turned(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor], axis: Float) -> Frame:
+def _rotated(frame: Frame, wrong: OfOneSensor, sensors: Sequence[MountedSensor], axis: Float) -> Frame:
     return _moved(
         frame, wrong.sensor, sensors[wrong.sensor].xyz, _rotation(axis, math.radians(wrong.size)), np.zeros(3)
     )
@@ -301,7 +301,7 @@ def _rotation(axis: Float, angle: float) -> Float:
 
 
 def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> Frame:
-    """Return the frame with one sensor's points turned about a place and moved."""
+    """Return the frame with one sensor's points rotated about a position and moved."""
     own = frame.sensor == sensor
     points = frame.points.copy()
     points[own] = ((points[own] - about) @ turn.T + about + by).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Where the detector begins to fail, as rows of the page of stability."""
+"""Limits of the detector, as rows of the stability page."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def limit_rows(study: LimitsStudy) -> tuple[Row, ...]:
     return (
         _of_spreads(study.spreads),
         *(_of_curve(curve, study) for curve in study.curves),
-        *(_of_foreign(one) for one in study.foreign),
+        *(_transfer_row(one) for one in study.transfers),
         *(row for borders in study.borders[:1] for row in _of_borders(borders)),
         _of_pillars(study.pillars),
         *(_of_padding(one) for one in study.padding),
@@ -130,10 +130,10 @@ def _each_loss(curve: DisturbanceCurve) -> str:
     return f"lost: {', '.join(each)} on {curve.undisturbed.value:.1%}"
 
 
-def _of_foreign(one: TransferResult) -> Row:
+def _transfer_row(one: TransferResult) -> Row:
     return Row(
         METHOD,
-        f"learnt from {one.learnt}, used on {one.tried}",
+        f"learnt from {one.trained_on}, used on {one.tested_on}",
         f"{points_in_words(one.change)} against {one.against}: {one.precision.describe(1)}",
         "the same frames, paired" if one.against != "at home" else "other frames: compared as a whole",
         "a detector's file says of which sensor types and sites it has learnt; used beyond, a warning names them",
@@ -162,7 +162,7 @@ def _of_borders(borders: BorderResults) -> Iterator[Row]:
 
 
 def _below_half(bins: Sequence[Bin], what: str) -> str:
-    """Say where fewer than half are found."""
+    """Return the bins in which fewer than half are found, as a message."""
     known = [one for one in bins if one.wanted]
     fails = [one for one in known if one.value < 0.5]
     words = _bins(known, lambda value: f"{value:.0%}")
@@ -197,7 +197,7 @@ def _of_pillars(pillars: Sequence[PillarFilling]) -> Row:
 def _of_padding(one: TransferResult) -> Row:
     return Row(
         METHOD,
-        f"pillars padded with zeros, {one.tried}",
+        f"pillars padded with zeros, {one.tested_on}",
         f"{points_in_words(one.change)}: {one.precision.describe(1)}",
         "trained as long with the same seeds, the same frames, paired",
         "pillars are not padded: no point appears that was not measured",

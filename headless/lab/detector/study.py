@@ -1,7 +1,7 @@
 """Average precision against the size of each disturbance, and on other types, traffic and sites.
 
-Trained detectors, alike but for their seeds, are tried on the same test frames
-again and again, each time with one thing wrong. A disturbance begins to harm
+Trained detectors, alike but for their seeds, are evaluated on the same test
+frames under one disturbance at a time. A disturbance begins to harm
 at the smallest size whose average precision is lower than without it by more
 than the interval of the difference, pair by pair, over traffic and trainings.
 """
@@ -47,8 +47,7 @@ Series = tuple[Disturbance, ...]
 BORDER_EDGES = (0.0, 2.0, 5.0, 10.0, 20.0, 40.0, np.inf)
 """Metres from the border of the region of interest, between which road users are counted."""
 
-COUNTED_FRAMES = 8
-"""Frames in which pillars are counted."""
+COUNTED_FRAMES = 8  # frames in which pillars are counted
 
 
 def full_series(sensor: int) -> tuple[Series, ...]:
@@ -67,7 +66,7 @@ def full_series(sensor: int) -> tuple[Series, ...]:
 
 
 def brief_series(sensor: int) -> tuple[Series, ...]:
-    """Return the disturbances that say whether another sensor type bears as much."""
+    """Return a shorter series of disturbances, for further sensor types."""
     return (
         tuple(RangeNoise(size) for size in (0.05, 0.1, 0.2)),
         tuple(DropOff(size) for size in (0.25, 0.5, 0.75)),
@@ -151,18 +150,18 @@ class TransferResult:
 
     Parameters
     ----------
-    learnt, tried : str
-        On what they have learnt, and on what they are tried.
+    trained_on, tested_on : str
+        Sensor type or site of the training, and of the test.
     precision : IntervalEstimate
-        There.
+        On the test.
     change : IntervalEstimate
         Against ``against``.
     against : str
         Whose average precision is subtracted.
     """
 
-    learnt: str
-    tried: str
+    trained_on: str
+    tested_on: str
     precision: IntervalEstimate
     change: IntervalEstimate
     against: str
@@ -208,12 +207,12 @@ class OtherSite:
     Parameters
     ----------
     tested : tuple of EvaluatedDetector
-        The detectors from home, on this ground's grid.
+        The detectors from home, on this site's grid.
     trained_there : tuple of EvaluatedDetector
         Detectors that have learnt there, as many or none.
     """
 
-    ground: TrialSite
+    site: TrialSite
     configurations: tuple[SensorConfiguration, ...]
     tested: tuple[EvaluatedDetector, ...]
     trained_there: tuple[EvaluatedDetector, ...] = ()
@@ -289,7 +288,7 @@ def training_plan(
     Parameters
     ----------
     configurations : sequence of SensorConfiguration
-        All that an evaluation looks at.
+        All of an evaluation.
     training : TrainingSettings
         Of those who learn from all types.
     padding : bool
@@ -306,7 +305,7 @@ def training_plan(
 
 @dataclass(frozen=True, eq=False)
 class LimitsStudy:
-    """Where the detector begins to fail on one site.
+    """Limits of the detector on one site.
 
     Parameters
     ----------
@@ -316,9 +315,9 @@ class LimitsStudy:
         Test frames of each trial at home.
     worst : mapping of str to int
         For each configuration the sensor, by its number from 0, whose loss costs most: it is the one to be
-        misplaced, misturned and late.
-    foreign : tuple of TransferResult
-        Other types, other traffic, other sites.
+        displaced, rotated and late.
+    transfers : tuple of TransferResult
+        Detectors on other types, traffic and sites.
     padding : tuple of TransferResult
         What padding with zeros does to each configuration; none where it was not trained.
     """
@@ -328,7 +327,7 @@ class LimitsStudy:
     spreads: tuple[SeedSpread, ...]
     curves: tuple[DisturbanceCurve, ...]
     worst: Mapping[str, int]
-    foreign: tuple[TransferResult, ...]
+    transfers: tuple[TransferResult, ...]
     borders: tuple[BorderResults, ...]
     pillars: tuple[PillarFilling, ...]
     padding: tuple[TransferResult, ...]
@@ -347,7 +346,7 @@ def limits_study(
     Parameters
     ----------
     home : TrialSite
-        Where they have learnt, with traffic that they have not seen.
+        The site of their training, with unseen traffic.
     configurations : sequence of SensorConfiguration
         The first is driven through everything, the others through the brief series.
     store : path
@@ -360,39 +359,39 @@ def limits_study(
     Progress
         Trials done, of all.
     """
-    desk = _Desk(home, store, _length(configurations, candidates, elsewhere))
+    runner = _TrialRunner(home, store, _length(configurations, candidates, elsewhere))
     spreads, curves, borders, pillars, worst = [], [], [], [], {}
     for number, configuration in enumerate(configurations):
-        tried = yield from desk.tried(configuration, Disturbance(), candidates.tested)
+        tried = yield from runner.run(configuration, Disturbance(), candidates.tested)
         own = [ResampledPrecision(trial.evaluation) for trial in tried]
         spreads.append(SeedSpread(configuration.name, tuple(one.value for one in own), level(own)))
         borders.append(_borders(configuration.name, tried[0], score))
         pillars.append(_pillars(home, configuration, candidates.tested[0].detector))
         loss = tuple(SensorFailure.each(sensor) for sensor in range(len(configuration.sensors)))
-        lost = yield from desk.curve(configuration, loss, candidates.tested, own)
+        lost = yield from runner.curve(configuration, loss, candidates.tested, own)
         worst[configuration.name] = int(np.argmin([point.change.value for point in lost.points]))
         curves.append(lost)
         series = full_series if number == 0 else brief_series
         for one in series(worst[configuration.name]):
-            curve = yield from desk.curve(configuration, one, candidates.tested, own)
+            curve = yield from runner.curve(configuration, one, candidates.tested, own)
             curves.append(curve)
-    foreign = yield from desk.foreign(configurations, candidates, elsewhere)
-    padding = yield from desk.padding(configurations, candidates)
-    yield desk.progress("tried")
+    transfers = yield from runner.transfers(configurations, candidates, elsewhere)
+    padding = yield from runner.padding(configurations, candidates)
+    yield runner.progress("tried")
     return LimitsStudy(
         home.simulator.site,
         sum(len(run.times) for run in home.runs),
         tuple(spreads),
         tuple(curves),
         worst,
-        tuple(foreign),
+        tuple(transfers),
         tuple(borders),
         tuple(pillars),
         tuple(padding),
     )
 
 
-class _Desk:
+class _TrialRunner:
     """Runs trials, and counts them for progress."""
 
     def __init__(self, home: TrialSite, store: Path, total: int) -> None:
@@ -401,14 +400,14 @@ class _Desk:
     def progress(self, what: str) -> Progress:
         return Progress(min(self._done, self._total), self._total, what)
 
-    def tried(
+    def run(
         self,
         configuration: SensorConfiguration,
         disturbance: Disturbance,
         tested: Sequence[EvaluatedDetector],
-        ground: TrialSite | None = None,
+        site: TrialSite | None = None,
     ) -> Generator[Progress, None, list[DisturbedTrial]]:
-        there = self._home if ground is None else ground
+        there = self._home if site is None else site
         steps = trials(there, configuration, disturbance, tested, self._store)
         made = yield from within(self.progress(f"{configuration.name}, {disturbance.name} {disturbance.size:g}"), steps)
         self._done += 1
@@ -423,13 +422,13 @@ class _Desk:
     ) -> Generator[Progress, None, DisturbanceCurve]:
         points = []
         for disturbance in series:
-            tried = yield from self.tried(configuration, disturbance, tested)
+            tried = yield from self.run(configuration, disturbance, tested)
             own = [ResampledPrecision(trial.evaluation) for trial in tried]
             by_all, by_half = (change(own, undisturbed, draws) for draws in (DRAWS, DRAWS // 2))
             points.append(DisturbanceEffect(disturbance, level(own), by_all, by_half))
         return DisturbanceCurve(configuration.name, level(undisturbed), tuple(points))
 
-    def foreign(
+    def transfers(
         self,
         configurations: Sequence[SensorConfiguration],
         candidates: EvaluatedDetectors,
@@ -440,7 +439,7 @@ class _Desk:
         for configuration in configurations:
             tried = {}
             for sensor, one_tested in candidates.by_type.items():
-                made = yield from self.tried(configuration, Disturbance(), [one_tested])
+                made = yield from self.run(configuration, Disturbance(), [one_tested])
                 tried[sensor] = [ResampledPrecision(made[0].evaluation)]
             native = tried.pop(configuration.case.sensor, None)
             for sensor, those in tried.items() if native else ():
@@ -462,18 +461,18 @@ class _Desk:
         configurations: Sequence[SensorConfiguration],
     ) -> Generator[Progress, None, TransferResult]:
         """Compare with detectors trained there on the same frames, or else with these at home, on other frames."""
-        made = yield from self.tried(configuration, Disturbance(), other.tested, other.ground)
+        made = yield from self.run(configuration, Disturbance(), other.tested, other.site)
         there = [ResampledPrecision(trial.evaluation) for trial in made]
         if other.trained_there:
-            own = yield from self.tried(configuration, Disturbance(), other.trained_there, other.ground)
+            own = yield from self.run(configuration, Disturbance(), other.trained_there, other.site)
             against = "learnt there"
         else:
             twin = next(one for one in configurations if one.name == configuration.name)
-            own = yield from self.tried(twin, Disturbance(), candidates.tested)
+            own = yield from self.run(twin, Disturbance(), candidates.tested)
             against = "at home"
         seed = 0 if other.trained_there else 1  # other frames: nothing is paired but the detectors
         before = [ResampledPrecision(trial.evaluation, seed) for trial in own]
-        tried = f"{configuration.name}, {other.ground.name}"
+        tried = f"{configuration.name}, {other.site.name}"
         return TransferResult(self._home.simulator.site, tried, level(there), change(there, before), against)
 
     def padding(
@@ -481,7 +480,7 @@ class _Desk:
     ) -> Generator[Progress, None, list[TransferResult]]:
         found = []
         for configuration in configurations if candidates.padded else ():
-            made = yield from self.tried(configuration, Disturbance(), (*candidates.padded, *candidates.unpadded))
+            made = yield from self.run(configuration, Disturbance(), (*candidates.padded, *candidates.unpadded))
             own = [ResampledPrecision(trial.evaluation) for trial in made]
             with_zeros, without = own[: len(candidates.padded)], own[len(candidates.padded) :]
             found.append(
@@ -527,12 +526,12 @@ def _borders(name: str, trial: DisturbedTrial, score: float) -> BorderResults:
     )
 
 
-def _pillars(ground: TrialSite, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
+def _pillars(site: TrialSite, configuration: SensorConfiguration, detector: Detector) -> PillarFilling:
     """Count how full pillars are in some frames, with the detector's own cap and smaller ones."""
     caps = (detector.settings.most_points, 8, 4, 2, 1)
     frames = [
-        ground.simulator.frame(configuration, ground.runs[0], number)
-        for number in range(min(COUNTED_FRAMES, len(ground.runs[0].times)))
+        site.simulator.frame(configuration, site.runs[0], number)
+        for number in range(min(COUNTED_FRAMES, len(site.runs[0].times)))
     ]
     counted = {}
     for cap in dict.fromkeys(caps):

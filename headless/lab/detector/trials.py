@@ -127,7 +127,7 @@ class DisturbedTrial:
 
 
 def trials(
-    ground: TrialSite,
+    site: TrialSite,
     configuration: SensorConfiguration,
     disturbance: Disturbance,
     tested: Sequence[EvaluatedDetector],
@@ -138,7 +138,7 @@ def trials(
     Parameters
     ----------
     tested : sequence of EvaluatedDetector
-        With pillars on the ground's own grid.
+        With pillars on the site's own grid.
     store : path
         Folder of what was tried before.
 
@@ -147,15 +147,15 @@ def trials(
     list of DisturbedTrial
         One for each detector.
     """
-    setting = digest(source_digest(__name__), ground.key(configuration), repr(RULE), repr(disturbance))
+    setting = digest(source_digest(__name__), site.key(configuration), repr(RULE), repr(disturbance))
     paths = [store / f"{digest(setting, one_tested.key)[:32]}.npz" for one_tested in tested]
     missing = [(one_tested, path) for one_tested, path in zip(tested, paths, strict=True) if not path.exists()]
     if missing:
         detectors = [disturbance.disturbed_detector(one_tested.detector) for one_tested, _ in missing]
-        results = yield from _results(ground, configuration, disturbance, detectors)
+        results = yield from _results(site, configuration, disturbance, detectors)
         for (one_tested, path), frames in zip(missing, results, strict=True):
-            header = {"ground": ground.name, "configuration": configuration.name, "detector": one_tested.name}
-            _save(path, header | {"disturbance": repr(disturbance)}, trial_of(frames, ground.simulator.static.region))
+            header = {"ground": site.name, "configuration": configuration.name, "detector": one_tested.name}
+            _save(path, header | {"disturbance": repr(disturbance)}, trial_of(frames, site.simulator.static.region))
     return [_load(path) for path in paths]
 
 
@@ -178,29 +178,27 @@ def trial_of(frames: Sequence[FrameResult], region: BaseGeometry) -> DisturbedTr
 
 
 def disturbed_frames(
-    ground: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance
+    site: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance
 ) -> Generator[tuple[SampledRun, Frame], None, None]:
     """Simulate the test frames as they are under a disturbance."""
-    simulator = ground.simulator
+    simulator = site.simulator
     sensors = disturbance.disturbed_sensors(configuration.sensors)
-    for run in ground.runs:
+    for run in site.runs:
         trajectories = disturbance.disturbed_traffic(run.trajectories)
         bodies = [fitted_body(user) for user in trajectories.users]
         simulation = finish(prepare(simulator.static, sensors, trajectories, bodies, simulator.settings))
         for number, time in enumerate(run.times.tolist()):
             random = np.random.default_rng([simulator.settings.seed, int(run.key, 16), number])
-            yield (
-                run,
-                disturbance.disturbed_frame(disturbance.disturbed_scan(simulation, number, time), sensors, random),
-            )
+            scan = disturbance.disturbed_scan(simulation, number, time)
+            yield run, disturbance.disturbed_frame(scan, sensors, random)
 
 
 def _results(
-    ground: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance, detectors: Sequence[Detector]
+    site: TrialSite, configuration: SensorConfiguration, disturbance: Disturbance, detectors: Sequence[Detector]
 ) -> Generator[Progress, None, list[list[FrameResult]]]:
     results: list[list[FrameResult]] = [[] for _ in detectors]
-    total = sum(len(run.times) for run in ground.runs)
-    for done, (run, frame) in enumerate(disturbed_frames(ground, configuration, disturbance)):
+    total = sum(len(run.times) for run in site.runs)
+    for done, (run, frame) in enumerate(disturbed_frames(site, configuration, disturbance)):
         yield Progress(done, total, f"{configuration.name}, {disturbance.name} {disturbance.size:g}")
         cloud = CloudInPlan(frame.points)
         for detector, own in zip(detectors, results, strict=True):
@@ -212,7 +210,7 @@ def _results(
                     cloud,
                     found,
                     classes=tuple(CLASS_CATEGORIES.values()),
-                    region=ground.simulator.static.region,
+                    region=site.simulator.static.region,
                     sensors=configuration.places,
                     run=run.name,
                 )

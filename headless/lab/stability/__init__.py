@@ -1,1 +1,1 @@
-"""Where visibility, placement and arithmetic fail, chapter by chapter."""
+"""Limits of visibility, placement and arithmetic, chapter by chapter."""

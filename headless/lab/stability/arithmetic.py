@@ -35,8 +35,7 @@ MAX_ROUNDINGS = 64
 DISTANCES = tuple(10.0 ** (half / 2) for half in range(4, 15))
 """Metres to which an ordinary street is moved, or at which a stray mesh is left."""
 
-RAY_LENGTH = 1e9
-"""Metres that rays go."""
+RAY_LENGTH = 1e9  # metres that rays go
 
 DELTA = 0.5
 TARGETS = 300
@@ -52,7 +51,7 @@ SENSOR = LidarModel(
     rotation_rate=10.0,
     price_range=(1.0, 1.0),
 )
-"""What looks at the scenes: few rays, so that float64 can follow all of them."""
+"""Sensor of the test scenes: few rays, so that float64 can follow all of them."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +253,7 @@ def _seen_in_float64(scene: HardScene, targets: Float, delta: float) -> tuple[Bo
 
 
 def _within(distance: Float, near: Boolean) -> bool:
-    """Tell whether some ray that is near ends within the sensor's range."""
+    """Return whether some near ray ends within the sensor's range."""
     return bool((near & (distance >= SENSOR.min_range) & (distance <= SENSOR.max_range)).any())
 
 

@@ -1,4 +1,4 @@
-"""Chapters of the stability page: each drives one method to where it begins to fail."""
+"""Chapters of the stability page: each finds the limits of one method."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .robustness_rows import pose_rows, robust_rows, traffic_rows
 from .solver_limits import solver_rows, solver_study
 
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
-"""What else a placement may be asked to stand: the loss of a sensor, and targets that one look is not enough for."""
+"""Risks studied: the loss of a sensor, and targets that two sensors must see."""
 
 DETECTOR_RUNS = 3
 """With more runs of traffic than these a detector can learn and be tried."""
@@ -74,7 +74,7 @@ class StudiedScene:
     ----------
     runs : list of Trajectories
         Traffic; none where there is none beside the scene.
-    scene : path or None
+    path : path or None
         Its file; None for the one that is open.
     others : sequence of path
         Other scenes, to try on what was learnt on this one.
@@ -84,7 +84,7 @@ class StudiedScene:
 
     surveyed: survey.Survey
     runs: list[Trajectories]
-    scene: Path | None
+    path: Path | None
     others: Sequence[Path]
     work: Path
     charts: Path
@@ -118,32 +118,28 @@ class StudiedScene:
 Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
 
 
-def chapters(studied: StudiedScene) -> Iterator[tuple[str, Work]]:
+def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
     """Yield the chapters that a scene allows, by the names that they are kept under."""
     yield "criterion", criterion
     yield "arithmetic", arithmetic
     yield "solvers", solvers
     yield "poses", poses
     yield "failures", failures
-    if len(studied.runs) > 1:
+    if len(scene.runs) > 1:
         yield "traffic", traffic
-    if importlib.util.find_spec("torch") and len(studied.runs) > DETECTOR_RUNS:
+    if importlib.util.find_spec("torch") and len(scene.runs) > DETECTOR_RUNS:
         yield "detector", detector
 
 
-def criterion(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def criterion(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Vary δ, grid spacings and beam azimuth."""
-    layout = studied.surveyed.layout
+    layout = scene.surveyed.layout
     delta = layout.settings.visibility.delta
-    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=studied.scope.grids)
-    limits_charts.save_ring_border_chart(
-        studied.charts / "ring_borders.png", study, delta, f"{studied.name}: rings and δ"
-    )
-    limits_charts.save_border_check_chart(
-        studied.charts / "beyond_border.png", study, f"{studied.name}: beyond the border"
-    )
-    limits_charts.save_delta_chart(studied.charts / "delta.png", study, delta, f"{studied.name}: coverage against δ")
-    limits_charts.save_convergence_chart(studied.charts / "convergence.png", study, f"{studied.name}: spacings")
+    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=scene.scope.grids)
+    limits_charts.save_ring_border_chart(scene.charts / "ring_borders.png", study, delta, f"{scene.name}: rings and δ")
+    limits_charts.save_border_check_chart(scene.charts / "beyond_border.png", study, f"{scene.name}: beyond the border")
+    limits_charts.save_delta_chart(scene.charts / "delta.png", study, delta, f"{scene.name}: coverage against δ")
+    limits_charts.save_convergence_chart(scene.charts / "convergence.png", study, f"{scene.name}: spacings")
     return Chapter(
         "The criterion of visibility",
         tuple(criterion_rows(study, delta)),
@@ -156,10 +152,10 @@ def criterion(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def arithmetic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def arithmetic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Compare the ray casters with float64."""
-    study = yield from arithmetic_study(studied.scope.rays)
-    limits_charts.save_rounding_chart(studied.charts / "rounding.png", study, "Hits against float64")
+    study = yield from arithmetic_study(scene.scope.rays)
+    limits_charts.save_rounding_chart(scene.charts / "rounding.png", study, "Hits against float64")
     return Chapter(
         "Arithmetic",
         tuple(arithmetic_rows(study)),
@@ -167,18 +163,18 @@ def arithmetic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def solvers(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Find the limits of the solvers, and the size of the near-optimal set."""
-    study = yield from solver_study(studied.scope.instances)
+    study = yield from solver_study(scene.scope.instances)
     tops: list[tuple[str, NearOptimalSet]] = []
-    for sensor in studied.surveyed.layout.models:
-        problem = studied.problem(sensor)
-        best = yield from solve(problem, SolverLimits(studied.surveyed.layout.settings.solver))
+    for sensor in scene.surveyed.layout.models:
+        problem = scene.problem(sensor)
+        best = yield from solve(problem, SolverLimits(scene.surveyed.layout.settings.solver))
         top = yield from near_optimal_set(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
-    limits_charts.save_solver_chart(studied.charts / "solvers.png", study, "Solvers at their limits")
-    limits_charts.save_flat_top_chart(studied.charts / "flat_top.png", tops, f"{studied.name}: how flat the top is")
+    limits_charts.save_solver_chart(scene.charts / "solvers.png", study, "Solvers at their limits")
+    limits_charts.save_near_optimal_chart(scene.charts / "flat_top.png", tops, f"{scene.name}: how flat the top is")
     return Chapter(
         "Solvers",
         tuple(solver_rows(study, tops)),
@@ -189,22 +185,22 @@ def solvers(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def poses(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a placement under pose errors."""
-    layout, around = studied.surveyed.layout, surroundings(studied.surveyed.layout)
+    layout, around = scene.surveyed.layout, surroundings(scene.surveyed.layout)
     study = yield from robust_study(
-        around, studied.problem(studied.sensor), studied.scope.robust, limits=layout.settings.limits
+        around, scene.problem(scene.sensor), scene.scope.robust, limits=layout.settings.limits
     )
     chosen = study.nominal[0].placement.chosen
-    deployment = deploy(layout.site, layout.models, studied.surveyed.grid.visible, chosen)
-    under_errors = yield from pose_study(around, deployment, studied.scope.poses)
-    robust_charts.save_spread_chart(studied.charts / "spread.png", study, f"{studied.placed} under pose errors")
-    robust_charts.save_blame_chart(studied.charts / "blame.png", under_errors, f"{studied.placed}: what costs coverage")
+    deployment = deploy(layout.site, layout.models, scene.surveyed.grid.visible, chosen)
+    under_errors = yield from pose_study(around, deployment, scene.scope.poses)
+    robust_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
+    robust_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
     robust_charts.save_frontier_chart(
-        studied.charts / "frontier.png", study, f"{studied.placed}: what robustness costs and saves"
+        scene.charts / "frontier.png", study, f"{scene.placed}: what robustness costs and saves"
     )
     return Chapter(
-        f"Poses that err: {studied.placed}",
+        f"Poses that err: {scene.placed}",
         (*pose_rows(under_errors), *robust_rows(study)),
         (
             Chart(
@@ -216,23 +212,21 @@ def poses(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def failures(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements under sensor failures and multi-cover."""
-    around, problem = surroundings(studied.surveyed.layout), studied.problem(studied.sensor)
-    study = yield from robust_study(
-        around, problem, studied.scope.robust, RISKS, studied.surveyed.layout.settings.limits
-    )
-    robust_charts.save_spread_chart(studied.charts / "failures.png", study, f"{studied.placed}: failures")
+    around, problem = surroundings(scene.surveyed.layout), scene.problem(scene.sensor)
+    study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.surveyed.layout.settings.limits)
+    robust_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
-    return Chapter(f"Failures: {studied.placed}", robust_rows(study), (Chart("failures.png", caption),))
+    return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
 
 
-def traffic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements in traffic."""
-    layout = studied.surveyed.layout
-    around, problem, settings = surroundings(layout), studied.problem(studied.sensor), layout.settings
-    runs_to_choose, runs_to_evaluate = split_runs(studied.runs)
-    to_choose, to_evaluate = studied.scope.instants
+    layout = scene.surveyed.layout
+    around, problem, settings = surroundings(layout), scene.problem(scene.sensor), layout.settings
+    runs_to_choose, runs_to_evaluate = split_runs(scene.runs)
+    to_choose, to_evaluate = scene.scope.instants
     scenarios = yield from traffic_scenarios(around, problem, spread_instants(runs_to_choose, to_choose, seed=0))
     evaluation = spread_instants(runs_to_evaluate, to_evaluate, seed=1)
     steps = traffic_study(
@@ -244,14 +238,14 @@ def traffic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
-    deployment = deploy(layout.site, layout.models, studied.surveyed.grid.visible, chosen)
-    title = f"{studied.placed} in traffic"
+    deployment = deploy(layout.site, layout.models, scene.surveyed.grid.visible, chosen)
+    title = f"{scene.placed} in traffic"
     traffic_charts.save_time_map(
-        studied.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
+        scene.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
     )
-    traffic_charts.save_traffic_chart(studied.charts / "promise.png", [(studied.placed, study)], title)
+    traffic_charts.save_traffic_chart(scene.charts / "promise.png", [(scene.placed, study)], title)
     return Chapter(
-        f"Traffic that hides things: {studied.placed}",
+        f"Traffic that hides things: {scene.placed}",
         traffic_rows(study),
         (
             Chart("time_seen.png", "Share of time for which each target, and the point above it, is seen in traffic"),
@@ -260,26 +254,24 @@ def traffic(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
 
 
-def detector(studied: StudiedScene) -> Generator[Progress, None, Chapter]:
+def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Train detectors, and evaluate them under growing disturbances."""
     from headless.lab.detector import charts as limit_charts  # noqa: PLC0415 -- torch need not be installed
     from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
     from headless.lab.detector.chapter import detector_limits  # noqa: PLC0415 -- as above
 
-    study = yield from detector_limits(
-        studied.surveyed, studied.scene, studied.others, studied.work, **studied.scope.detector
-    )
-    limit_charts.save_limits_chart(studied.charts / "detector.png", study)
+    study = yield from detector_limits(scene.surveyed, scene.path, scene.others, scene.work, **scene.scope.detector)
+    limit_charts.save_limits_chart(scene.charts / "detector.png", study)
     charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
-    if study.foreign:
-        limit_charts.save_foreign_chart(studied.charts / "detector_away.png", study)
+    if study.transfers:
+        limit_charts.save_transfer_chart(scene.charts / "detector_away.png", study)
         charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
 
 
-def introduction(studied: StudiedScene) -> str:
+def introduction(scene: StudiedScene) -> str:
     """Return the introduction of the page."""
-    site = studied.surveyed.layout.site
+    site = scene.surveyed.layout.site
     return (
         "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
         f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "

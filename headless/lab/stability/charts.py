@@ -1,4 +1,4 @@
-"""Charts of where the criterion, arithmetic and the solvers begin to fail."""
+"""Charts of the limits of criterion, arithmetic and solvers."""
 
 from __future__ import annotations
 
@@ -187,7 +187,9 @@ def save_solver_chart(path: str | os.PathLike[str], study: SolverStudy, title: s
     save_chart(path, figure, title)
 
 
-def save_flat_top_chart(path: str | os.PathLike[str], tops: Sequence[tuple[str, NearOptimalSet]], title: str) -> None:
+def save_near_optimal_chart(
+    path: str | os.PathLike[str], tops: Sequence[tuple[str, NearOptimalSet]], title: str
+) -> None:
     """Draw how many placements near the best share how many positions with it."""
     figure, panels = _figure(len(tops))
     for panel, (name, top) in zip(panels, tops, strict=True):

@@ -42,8 +42,7 @@ from seip_addon.core.workflows.survey import SurveySettings
 from .rows import Row
 from .shares import Share
 
-DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
-"""Metres."""
+DELTAS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # metres
 
 BORDER_RATIOS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Distances in multiples of the border, between which targets are counted."""
@@ -240,7 +239,7 @@ def ring_borders(
     Parameters
     ----------
     reach : float, metres
-        Nothing farther away is looked at.
+        Targets farther away are ignored.
     """
     return tuple(
         RingBorder(key, height, delta, unresolved_from(model, height, delta, min(reach, model.max_range)))
@@ -274,8 +273,8 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float
     return free
 
 
-def turned_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle: float) -> Targets:
-    """Lay a grid of targets that is shifted and turned.
+def rotated_targets(geometry: SceneGeometry, spacing: float, shift: Float, angle: float) -> Targets:
+    """Return a grid of targets that is shifted and rotated.
 
     Parameters
     ----------
@@ -359,7 +358,7 @@ def _by_grid_laid(
     """Evaluate the best placement on shifted and rotated grids; optimise anew on a quarter of them."""
     covered, rechosen = [], []
     for draw in range(draws):
-        targets = turned_targets(
+        targets = rotated_targets(
             evaluator.geometry, settings.grid_spacing, random.random(2), random.uniform(0, math.pi / 2)
         )
         laid = replace(site, targets=targets)

@@ -17,8 +17,7 @@ GROUND = 128
 STREET_YAW = 0.37
 """Radians by which the street is turned about z."""
 
-ORIGIN = np.array([0.3, -0.2, 5.0])
-"""Where rays start in most scenes."""
+ORIGIN = np.array([0.3, -0.2, 5.0])  # where rays start in most scenes
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class HardScene:
 
 
 def hard_scenes(rays: int, random: np.random.Generator) -> list[HardScene]:
-    """Return one scene of each kind that scenes made by hand or read from a map may hold."""
+    """Return one scene of each kind of numerical difficulty."""
     street = _street()
     everywhere = _everywhere(rays, random)
     plain = HardScene("an ordinary street", street, ORIGIN, everywhere)

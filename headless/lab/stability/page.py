@@ -1,4 +1,4 @@
-"""The page of stability: where each method begins to fail, chapter by chapter, as Markdown; chapters as JSON."""
+"""The stability page: limits of each method, chapter by chapter, as Markdown; chapters as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Studies of robustness as rows of the page of stability."""
+"""Results of robustness studies, as rows of the stability page."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A row of the page of stability: one method in one regime."""
+"""A row of the stability page: one method in one regime."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ class Row:
     Parameters
     ----------
     method : str
-        What was driven to where it fails.
+        The method, and on what.
     regime : str
-        What was turned up until it failed.
+        The quantity that was increased until it failed.
     begins : str
         Where it begins to fail, with units and the interval of the estimate.
     how : str
         How that was found.
     answer : str
-        What the tool does about it.
+        What the program does about it.
     """
 
     method: str

@@ -1,4 +1,4 @@
-"""A dataset's folder: samples run by run, and ``manifest.json`` with all that it takes to trust them."""
+"""A dataset's folder: samples run by run, and ``manifest.json`` with settings, counts and digests."""
 
 from __future__ import annotations
 

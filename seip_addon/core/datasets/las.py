@@ -18,8 +18,7 @@ from ..errors import SeipError
 from .format_interface import Format
 from .sample import Sample, TrafficRun
 
-RESOLUTION = 0.001
-"""Of coordinates, metres."""
+RESOLUTION = 0.001  # of coordinates, metres
 
 CREATION_DATE_BYTES = range(90, 94)
 """The bytes of the header in which laspy puts the day of writing; zeros, for not known, keep them out of the file."""

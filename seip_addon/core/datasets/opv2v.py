@@ -1,4 +1,4 @@
-r"""The format of OPV2V, which OpenCOOD and its kin read: each sensor is an agent that tells the others what it sees.
+r"""The format of OPV2V, which OpenCOOD reads: each sensor is an agent that shares what it sees.
 
 OpenCOOD stands on CARLA's left-handed axes (x forward, y **right**, z up): with M = diag(1, −1, 1), a place p here is
 M p there and a rotation R is M R M. A pose is x, y, z in metres and roll, yaw, pitch in degrees, of which the

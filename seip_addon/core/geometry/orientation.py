@@ -1,6 +1,6 @@
 r"""Orientation of sensors: rotation from a sensor's axes (x along azimuth zero, z up) to the site's.
 
-A sensor of yaw ψ, tilt θ and roll φ is turned as
+A sensor of yaw ψ, tilt θ and roll φ is rotated as
 
 .. math::
     R = R_z(ψ)\, R_y(θ)\, R_x(φ):
@@ -66,7 +66,7 @@ def angles_of(matrix: Float) -> tuple[float, float, float]:
     return math.atan2(matrix[1, 0], matrix[0, 0]), tilt, math.atan2(matrix[2, 1], matrix[2, 2])
 
 
-def turned(vectors: Float, matrix: Float) -> Float:
+def rotated(vectors: Float, matrix: Float) -> Float:
     """Return the products of a matrix and each vector.
 
     They are the same bits in every batch, which those of a matrix product need not be.

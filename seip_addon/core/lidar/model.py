@@ -91,7 +91,7 @@ class LidarModel:
 
 
 MAX_RAYS = 50_000_000
-"""Rays of a revolution beyond which a figure must be a slip: fifty times the study's finest type."""
+"""Limit on the rays of a revolution: fifty times the finest type of the study."""
 
 
 def _require_valid(model: LidarModel) -> None:

@@ -11,7 +11,6 @@ from .beams import BeamPattern
 from .model import LidarModel
 
 RING_AZIMUTHS = 120
-"""Azimuths at which rings are drawn."""
 
 
 @dataclass(frozen=True, eq=False)

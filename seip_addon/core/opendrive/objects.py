@@ -1,4 +1,4 @@
-"""Objects of the map in map coordinates, their repetitions written out."""
+"""Objects of the map in map coordinates, with repeated ones expanded."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class PlacedObject:
-    """An object where it stands.
+    """An object in map coordinates.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Piecewise cubic profiles: how OpenDRIVE gives elevation, offsets and widths along a road."""
+"""Piecewise cubic profiles of OpenDRIVE: elevation, offsets and widths along a road."""
 
 from __future__ import annotations
 

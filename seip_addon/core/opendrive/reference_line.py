@@ -173,7 +173,7 @@ class ReferenceLine:
 
     @property
     def end(self) -> float:
-        """Where the last piece ends, metres along the road."""
+        """End of the last piece, metres along the road."""
         return float(self.s[-1] + self.length[-1])
 
     def __call__(self, s: Float) -> tuple[Float, Float, Float]:

@@ -125,7 +125,7 @@ class RoadObject:
 
 @dataclass(frozen=True)
 class MapPlace:
-    """Where a signal stands in map coordinates (metres, radians)."""
+    """Position and heading of a signal in map coordinates (metres, radians)."""
 
     x: float
     y: float

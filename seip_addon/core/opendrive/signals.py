@@ -15,7 +15,7 @@ from .road_map import Road, RoadMap, RoadSignal
 
 @dataclass(frozen=True, eq=False)
 class PlacedSignal:
-    """A signal where it stands or hangs.
+    """A signal in map coordinates.
 
     Maps disagree on what is given, the foot of the post or the lamp above the
     carriageway.

@@ -1,4 +1,4 @@
-"""Elements that pictures share: sensors with labels, title, PNG output."""
+"""Elements shared by pictures: sensors with labels, title, PNG output."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ BACKGROUND_COLOUR = "#e9edf0"
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """Where things are on a picture, in shares of its width and height from the lower left.
+    """Positions on a picture, as shares of its width and height from the lower left.
 
     Parameters
     ----------

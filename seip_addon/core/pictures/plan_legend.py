@@ -11,16 +11,7 @@ from matplotlib.patches import Rectangle
 from ..site.scene_geometry import ASSUMED, FROM_MAP
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .plan_style import (
-    ASSUMED_MARK,
-    FORBIDDEN_COLOUR,
-    HEIGHT_CMAP,
-    MANDATORY_COLOUR,
-    POLE_MARK,
-    SIDEWALK_MARK,
-    WEIGHTED_COLOUR,
-    Style,
-)
+from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -33,7 +24,7 @@ if TYPE_CHECKING:
     from ..site.site import Site
 
 LEGEND_WIDTH = 3.7  # inches
-SENSOR_ROW_HEIGHT, LINE_HEIGHT, SMALL_LINE_HEIGHT = 0.42, 0.24, 0.15  # inches
+ROW_HEIGHT, LINE_HEIGHT, SMALL_LINE_HEIGHT = 0.42, 0.24, 0.15  # inches
 LETTERS_PER_LINE = 62  # of small text that fit into a line
 
 
@@ -88,8 +79,8 @@ class PlanLegend:
 
     def _sensors(self, deployment: Deployment, room: float) -> None:
         """List the sensors, without their positions where room is short, and as many as fit."""
-        detailed = len(deployment.sensors) * SENSOR_ROW_HEIGHT <= room
-        rows = max(1, int(room / (SENSOR_ROW_HEIGHT if detailed else LINE_HEIGHT)))
+        detailed = len(deployment.sensors) * ROW_HEIGHT <= room
+        rows = max(1, int(room / (ROW_HEIGHT if detailed else LINE_HEIGHT)))
         self._heading("Sensors")
         markers = markers_of(deployment)
         for sensor in deployment.sensors[:rows]:
@@ -98,14 +89,9 @@ class PlanLegend:
             self._text(0.70, f"{_short(sensor.model.name, 28)}, {sensor.height:.3g} m")
             self._text(LEGEND_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
             if detailed:
-                self._text(
-                    0.70,
-                    _short(sensor.position_name, 40),
-                    y=self.y + SENSOR_ROW_HEIGHT - LINE_HEIGHT,
-                    color=SOFT_INK,
-                    size=8,
-                )
-            self.y += SENSOR_ROW_HEIGHT if detailed else LINE_HEIGHT
+                below = self.y + ROW_HEIGHT - LINE_HEIGHT
+                self._text(0.70, _short(sensor.position_name, 40), y=below, color=SOFT_INK, size=8)
+            self.y += ROW_HEIGHT if detailed else LINE_HEIGHT
         if len(deployment.sensors) > rows:
             self._text(0.34, f"and {len(deployment.sensors) - rows} more", color=SOFT_INK)
             self.y += LINE_HEIGHT
@@ -130,11 +116,11 @@ class PlanLegend:
         for weight in weights:
             names = [area.name for area in geometry.weighted_regions if area.weight == weight]
             words = _short(names[0], 26) if len(names) == 1 else f"{len(names)} areas"
-            self._swatch(facecolor="none", edgecolor=WEIGHTED_COLOUR, linewidth=1.4, linestyle=(0, (4, 1.5)))
+            self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
             self._line(f"{words} (weight {weight:g} where weights count)")
         for areas, colour, hatch, words in (
-            (geometry.forbidden_areas, FORBIDDEN_COLOUR, "////", "no sensor here"),
-            (geometry.mandatory_areas, MANDATORY_COLOUR, "....", "at least one sensor here"),
+            (geometry.forbidden_areas, FORBIDDEN, "////", "no sensor here"),
+            (geometry.mandatory_areas, MANDATORY, "....", "at least one sensor here"),
         ):
             if areas:
                 self._swatch(facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9)

@@ -1,4 +1,4 @@
-"""Colours and marks that a plan and its legend share."""
+"""Colours and marks shared by a plan and its legend."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .palette import INK, PAPER
 Style = dict[str, Any]
 
 HEIGHT_CMAP = LinearSegmentedColormap.from_list("heights", ("#d2d0c4", "#8b9285", "#4b5350"))
-WEIGHTED_COLOUR, FORBIDDEN_COLOUR, MANDATORY_COLOUR = "#6a3d9a", "#a3333d", "#2f6b3a"
+WEIGHTED, FORBIDDEN, MANDATORY = "#6a3d9a", "#a3333d", "#2f6b3a"
 SIDEWALK_MARK: Style = {"linestyle": "none", "marker": "o", "markersize": 2.6, "mfc": PAPER, "mec": INK, "mew": 0.5}
 ASSUMED_MARK: Style = {
     "linestyle": "none",

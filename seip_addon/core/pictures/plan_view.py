@@ -21,15 +21,7 @@ from ..site.target_squares import target_squares
 from .drawing import draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
 from .plan_legend import LEGEND_WIDTH, PlanLegend
-from .plan_style import (
-    ASSUMED_MARK,
-    FORBIDDEN_COLOUR,
-    HEIGHT_CMAP,
-    MANDATORY_COLOUR,
-    POLE_MARK,
-    SIDEWALK_MARK,
-    WEIGHTED_COLOUR,
-)
+from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED
 
 if TYPE_CHECKING:
     import os
@@ -77,7 +69,7 @@ def save_plan_view(
     deployment : Deployment
         The chosen sensors and what they see.
     notes : sequence of str
-        What a reader of the plan should know, in sentences.
+        Notes for the reader of the plan, one sentence each.
     """
     figure = draw_plan(geometry, site, deployment, notes)
     save_png(path, figure)
@@ -163,7 +155,7 @@ def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
 
 
 def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: BaseGeometry) -> Normalize:
-    """Draw what stands in the way, the higher the darker, and return the scale of heights."""
+    """Draw obstacles, darker the higher they are, and return the scale of heights."""
     triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
     flat = shapely.polygons(triangles[:, :, :2])
     drawn = (shapely.area(flat) > MIN_PLAN_AREA) & shapely.intersects(flat, shown)
@@ -193,8 +185,8 @@ def _road_level(site: Site, points: Float) -> Float:
 def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> None:
     draw_area(plan, closed(region, MAX_GAP), facecolor="none", edgecolor=INK, linewidth=1.1, zorder=BORDER)
     for areas, colour, hatch in (
-        (geometry.forbidden_areas, FORBIDDEN_COLOUR, "////"),
-        (geometry.mandatory_areas, MANDATORY_COLOUR, "...."),
+        (geometry.forbidden_areas, FORBIDDEN, "////"),
+        (geometry.mandatory_areas, MANDATORY, "...."),
     ):
         for area in areas:
             draw_area(plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER)
@@ -204,7 +196,7 @@ def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> No
             plan,
             area.polygon,
             facecolor="none",
-            edgecolor=WEIGHTED_COLOUR,
+            edgecolor=WEIGHTED,
             linewidth=1.5,
             linestyle=(0, (5, 2)),
             zorder=BORDER,

@@ -9,8 +9,7 @@ from PIL import Image
 from ..storage.files import whole_file
 from .palette import PAPER
 
-GAP = 24
-"""Pixels between the two, and around them."""
+GAP = 24  # pixels between the two, and around them
 
 
 def save_sheet(path: str | os.PathLike[str], view: Image.Image, plan: Image.Image) -> None:

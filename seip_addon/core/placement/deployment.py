@@ -23,12 +23,10 @@ class Sensor:
         ``S1``, ``S2``, … in the order in which each adds the most to those before it.
     pose : int or None
         Index among the site's candidates; None where a hand has put it elsewhere.
-    model : LidarModel
-        What hangs there.
     position_name : str
         Name of the pole, or of the sampled place on the sidewalk.
     on_pole : bool
-        Whether it hangs at an existing pole.
+        Whether it is mounted on an existing pole.
     foot : (3,) float64, metres
         Ground point of the position, local site axes.
     xyz : (3,) float64, metres
@@ -66,7 +64,7 @@ class Sensor:
 
     @property
     def orientation(self) -> Float:
-        """How it is turned: the rotation from its axes to the site's, (3, 3) float64."""
+        """Rotation from the sensor's axes to the site's, (3, 3) float64."""
         return orientation(self.yaw, self.tilt, self.roll)
 
 
@@ -126,7 +124,7 @@ def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deplo
     Parameters
     ----------
     mounted : sequence of Sensor
-        In the order in which each adds to those before it; their own shares are not looked at.
+        In the order in which each adds to those before it; their own shares are ignored.
     rows : (k, t) bool
         What each of them sees.
     """

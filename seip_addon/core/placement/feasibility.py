@@ -27,7 +27,7 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     Raises
     ------
     SeipError
-        The groups cannot all be served; the limit that stands in the way is
+        The groups cannot all be served; the limit that prevents it is
         named. Or the time was too short to tell.
     """
     if len(instance.mandatory) == 0:

@@ -21,7 +21,7 @@ TABU_STEPS_PER_CANDIDATE = 2
 """Swaps of a tabu search for each candidate."""
 
 ADDED_TENURE, DROPPED_TENURE = 4, 12
-"""Who came stays for fewer steps than the first of these, and who went stays away for once or twice the second."""
+"""A candidate added stays for fewer steps than the first; one dropped stays out for one to two times the second."""
 
 
 def greedy(instance: Instance, start: Integer, *, per_price: bool = False, enough: float = math.inf) -> Integer:

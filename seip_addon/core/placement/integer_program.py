@@ -49,7 +49,7 @@ UNLIMITED_SECONDS = 1e7
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a solver found.
+    """Outcome of a solver: choice, bound and status.
 
     Parameters
     ----------

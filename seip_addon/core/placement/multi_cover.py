@@ -87,5 +87,4 @@ def _upper_hull(values: Sequence[Fraction]) -> list[int]:
     return corners
 
 
-COVERAGE = multi_cover([Fraction(0), Fraction(1)])
-"""One sensor is enough."""
+COVERAGE = multi_cover([Fraction(0), Fraction(1)])  # one sensor is enough

@@ -16,8 +16,7 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance, make_instance
 from .search_limits import Clock
 
-MAX_LISTED = 10_000
-"""Placements that are listed at most."""
+MAX_LISTED = 10_000  # placements that are listed at most
 
 MAX_BRANCHES = 300
 """Branches that are searched at most: no clock decides what is found."""
@@ -57,7 +56,7 @@ class NearOptimalSet:
 
     @property
     def message(self) -> str:
-        """How many there are, and how different."""
+        """Number and variety of the placements, as a message."""
         near = f"within {self.share:.0%} of the best"
         if self.complete and len(self) == 1:
             return f"no other placement covers {near}"

@@ -112,12 +112,12 @@ class Solution:
 
     @property
     def certificate(self) -> str:
-        """How good the placement provably is, as a sentence."""
+        """The certificate as a message: proven optimal, or within which gap."""
         return certificate(self.placement.status, self.placement.gap, cheapest=self.objective.cheapest)
 
 
 def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
-    """Return how good a placement provably is, as a sentence.
+    """Return a placement's certificate as a message: proven optimal, or within which gap.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class PlacementProblem:
     positions : (c,) int64
         Position of each pose; at most one pose is chosen at each.
     xyz : (c, 3) float64, metres
-        Where each pose's sensor hangs.
+        Position of each pose's sensor.
     labels : (c,) str
         Sensor type of each pose. Poses are put into the order of x, y, z and
         label before anything else, so that the order in which they are given
@@ -179,7 +179,7 @@ class Placement:
     price : float
         Total price.
     notes : tuple of str
-        What a person should know about this answer, in sentences.
+        Notes on the solution, one sentence each.
     """
 
     chosen: Integer

@@ -54,7 +54,7 @@ class Instance:
     slack : float
         Covered weights that differ by no more count as equal: less than one where weights have a common unit.
     margin : float
-        What rounding may take from the bound of a relaxation.
+        Rounding error that the bound of a relaxation may have.
     price : (c,) float64
     conflict : (c, c) bool
         Pairs that exclude each other: same position, or too close. The diagonal is false.

@@ -48,7 +48,7 @@ MAX_PROGRAM_ENTRIES = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """What is proven about a placement.
+    """A placement with its bound, its ties, and whether it is optimal.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
 
 
 MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0
-"""Metres and radians: larger standard deviations are slips of the keyboard."""
+"""Metres and radians; larger standard deviations are taken for typing errors."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,6 @@ class PoseErrors:
 
 
 ERROR_KINDS = tuple(field.name for field in fields(PoseErrors))
-"""Kinds of pose errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +137,7 @@ def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseD
     Parameters
     ----------
     foot : (s, 3) float64, metres
-        Ground point of each sensor's position; equal ones err alike.
+        Ground point of each sensor's position; equal ones have equal errors.
     seed : int
         At least 0.
     """
@@ -165,7 +164,7 @@ def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tup
     Parameters
     ----------
     xyz : (s, 3) float64, metres
-        Where the sensors were planned.
+        The planned positions.
 
     Returns
     -------

@@ -25,7 +25,7 @@ from .visibility_under_errors import Surroundings, draws_for, visibility_under_e
 QUANTILES = (0.05, 0.5, 0.95)
 
 NOTABLE_LOSS = 0.01
-"""Share of the targets whose loss, in one of twenty draws, a user should know of."""
+"""Share of the targets whose loss, in one of twenty draws, is worth a warning."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,13 @@ class PoseStudy:
     planned : Coverages
         Of the poses as planned: n = 1.
     together : Coverages
-        All sensors err.
+        With errors of all sensors.
     alone : tuple of Coverages
-        For each sensor: it alone errs, in the same draws.
+        With errors of one sensor alone, for each, in the same draws.
     by_kind : dict of str to Coverages
-        For each kind of error: all sensors err in that way alone.
+        With one kind of error alone, for each kind.
     blocked : float
-        Share of the drawn poses that would have been inside an object, and were turned out of it.
+        Share of the drawn poses that would have been inside an object, and were moved out of it.
     """
 
     settings: PoseStudySettings

@@ -81,7 +81,7 @@ def solve_robust(
     scenarios : ScenarioVisibility
         Of all candidates.
     risk : Risk
-        What is to be large.
+        The risk measure to maximise.
     foreseen : sequence of Placement, optional
         See `foresee`; found within the time limit if not given, and only of use where one look is enough.
 

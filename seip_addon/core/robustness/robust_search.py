@@ -29,7 +29,7 @@ from ..placement.search_limits import Clock
 from ..progress import Progress
 
 STARTING_PAIRS, MAX_FIRST_CANDIDATES = 8, 100
-"""Pairs to begin from where one sensor is worth nothing, and candidates that may be the first of a pair."""
+"""Starting pairs where a single sensor gains nothing, and candidates that may be the first of a pair."""
 
 SWAPS_TRIED = 24
 """Swaps of a sensor for which T is computed, those with the largest F."""

@@ -23,7 +23,7 @@ LOW_QUANTILE = 0.05
 """Quantile of coverage by which placements are compared."""
 
 COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
-"""That are compared where nothing else is asked for."""
+"""Compared by default."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class RobustnessSettings:
     Parameters
     ----------
     risk : Risk
-        What is to be large.
+        The risk measure to maximise.
     errors : PoseErrors
         Of the sensors' poses.
     scenarios : int
@@ -46,7 +46,7 @@ class RobustnessSettings:
     Raises
     ------
     SeipError
-        There is nothing to choose on, or nothing to evaluate on.
+        There is no scenario to optimise on, or no draw to evaluate on.
     """
 
     risk: Risk = field(default_factory=Risk)
@@ -73,7 +73,7 @@ class Contender:
     Parameters
     ----------
     name : str
-        What it was chosen for.
+        What it was optimised for.
     planned : float
         Share of the targets' weight that it covers as planned, by one look and without any failure.
     evaluated_by : Risk
@@ -154,7 +154,7 @@ def robust_study(
     problem : PlacementProblem
         Of all candidates of the site.
     risks : sequence of Risk
-        What is to be large, for each placement that is compared.
+        A risk measure for each placement that is compared.
     limits : SolverLimits
         For each placement.
     """

@@ -16,10 +16,10 @@ from ..traffic import Snapshot, Trajectories
 from ..traffic.bodies import fitted_body
 
 WARM_UP = 2.0
-"""Seconds from the first sample of a run to the first instant that is looked at."""
+"""Seconds from the first sample of a run to the first instant that is used."""
 
 BATCH_SECONDS = 12.0
-"""Seconds of a run whose instants count as one draw: what stands in the way at one stays there for some of them."""
+"""Seconds of a run whose instants count as one draw, since the same queues block the view at them."""
 
 _MARGIN = 1e-3
 """Metres by which bounding boxes are larger than what they bound: ray casters compute in float32."""
@@ -43,8 +43,7 @@ class TrafficObstacles:
     hulls: Float
 
 
-NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty((0, 8, 3)))
-"""The empty road."""
+NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty((0, 8, 3)))  # the empty road
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ class Instants:
         Which of the runs.
     time : (n,) float64, seconds
     batch : (n,) int64
-        Which batch of a run each instant is in; instants of different ones hardly depend on each other.
+        Batch of time of each instant; instants of different batches are nearly independent.
     """
 
     runs: tuple[Trajectories, ...]

@@ -25,10 +25,9 @@ from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_tra
 from .visibility_under_errors import Surroundings
 
 NOTABLE_LOSS = 0.01
-"""Share of the targets' weight whose loss in traffic a user should know of."""
+"""Share of the targets' weight whose loss in traffic is worth a warning."""
 
-IN_TRAFFIC = "in traffic"
-"""How the sentence of `tried_in_traffic` begins, and no other."""
+IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
 
 MOSTLY_SEEN_SHARE = 0.9
 """Share of time from which on a target counts as mostly seen."""
@@ -44,7 +43,7 @@ class TrafficScenarios:
     Parameters
     ----------
     layer : {"road", "height"}
-        What is to be seen.
+        The layer to be seen.
     empty : (c, t) bool
         On the empty road.
     views : ScenarioVisibility
@@ -73,7 +72,7 @@ class TrafficCoverage:
     time : (t,) float64
         Share of the instants at which each target is seen.
     batch : (n,) int64
-        Of the instants.
+        Batch of each instant.
     """
 
     empty: float
@@ -115,7 +114,7 @@ class TrafficEvaluation:
     Parameters
     ----------
     name : str
-        What it was chosen for.
+        What it was optimised for.
     seen : mapping of {"road", "height"} to TrafficCoverage
         Of the targets, and of the points `LAYER_HEIGHT` metres above them.
     """
@@ -132,15 +131,15 @@ class TrafficStudy:
     Parameters
     ----------
     layer : {"road", "height"}
-        What both were to see.
+        The layer that both were optimised to see.
     chosen_at : int
-        Instants of traffic that one of the two was chosen on.
+        Number of instants that the traffic-aware placement was optimised on.
     road_users : float
-        On the road at an instant that is evaluated, on average.
+        Mean number of road users at the evaluated instants.
     empty : TrafficEvaluation
-        Chosen for the empty road.
+        Optimised for the empty road.
     traffic : TrafficEvaluation
-        Chosen on traffic.
+        Optimised on traffic.
     """
 
     layer: TrafficLayer

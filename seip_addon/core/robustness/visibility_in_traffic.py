@@ -55,9 +55,9 @@ def visibility_in_traffic(
     poses : (s,) int64
         Among the site's candidates.
     instants : sequence of TrafficObstacles
-        Who stands in the way at each of n instants.
+        Bodies of the vehicles present at each of n instants.
     layer : {"road", "height"}
-        What is to be seen.
+        The layer to be seen.
 
     Yields
     ------
@@ -125,7 +125,7 @@ class _BlockedRays:
 
 
 class _StaticScan:
-    """Where the rays of one pose end on the empty road, as far as they pass the box about all that is to be seen.
+    """Ends of the rays of one pose on the empty road, of those that pass the box about the targets.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ class _HeightVisibility:
             yield part[hull[passing]], ray[passing]
 
     def _pass(self, ray: Integer, point: Integer) -> Boolean:
-        """Tell which rays come nearer than δ to points within the sensor's range and before they end, (n,)."""
+        """Return which rays come nearer than δ to points within the sensor's range and before they end, (n,)."""
         static, end = self._static, self._end[ray]
         towards = self._points[point] - static.place.origin
         ahead = (towards * static.directions(ray)).sum(axis=1)

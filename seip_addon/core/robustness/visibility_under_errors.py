@@ -59,7 +59,7 @@ def visibility_under_errors(
     poses : (s,) int64
         Among the site's candidates.
     draws : PoseDraws
-        Of n draws for these poses; poses of one place must err alike.
+        Of n draws for these poses; poses of one position must have equal errors.
 
     Yields
     ------
@@ -79,8 +79,8 @@ def visibility_under_errors(
     def compute(work: tuple[int, Integer]) -> None:
         draw, members = work
         first = members[0]
-        where, turned = xyz[first] + draws.shift[draw, first], orientations[draw, first]
-        seen, _ = model.see_all([models[keys[member]] for member in members], where, turned)
+        where, rotated = xyz[first] + draws.shift[draw, first], orientations[draw, first]
+        seen, _ = model.see_all([models[keys[member]] for member in members], where, rotated)
         packed[draw, members] = np.packbits(seen, axis=1)
 
     works = [(draw, members) for draw in range(len(draws)) for members in together]

@@ -15,8 +15,7 @@ from ..traffic.trajectories import CATEGORIES
 _MAX_COORDINATE = 1e7
 """Metres from the local origin within which all points and boxes lie."""
 
-_ROUNDED_ONE = 1.0 + 1e-5
-"""1, as float32 may round it."""
+_ROUNDED_ONE = 1.0 + 1e-5  # 1, as float32 may round it
 
 _POINTS = {
     "points": ArrayRule("f4", ("n", 3), -_MAX_COORDINATE, _MAX_COORDINATE),
@@ -87,7 +86,7 @@ class Labels:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What all sensors measure in one revolution, sensor after sensor; n points.
+    """Point cloud of all sensors in one revolution, sensor after sensor; n points.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ class BodySurface(ReflectiveSurface):
         return placed.reshape(-1, 3)
 
     def may_hit(self, origin: Float, directions: Float, reach: float) -> Boolean:
-        """Tell which rays pass through the bounding box within so many metres, by its slabs (Kay and Kajiya 1986).
+        """Return which rays pass through the bounding box within so many metres, by its slabs (Kay and Kajiya 1986).
 
         Parameters
         ----------
@@ -226,7 +226,7 @@ class Scanner:
         return Scan(distance, intensity, chance, instance, unoccluded, visible)
 
     def in_range(self, distance: Float) -> Boolean:
-        """Tell which distances the sensor can measure."""
+        """Return which distances the sensor can measure."""
         return (distance >= self._model.min_range) & (distance <= self._model.max_range)
 
     def _hits(self, traffic: MovingTraffic) -> Iterator[tuple[Motion, _Hits]]:

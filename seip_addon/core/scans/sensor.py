@@ -21,7 +21,7 @@ class MountedSensor:
     Parameters
     ----------
     label : str
-        What people call it: ``S1``.
+        Label, as ``S1``.
     xyz : (3,) float64, metres
         Optical centre, local site axes.
     orientation : (3, 3) float64

@@ -36,7 +36,7 @@ class StaticScene:
     warnings: tuple[str, ...] = ()
 
     def inside(self, xyz: Float) -> Boolean:
-        """Tell which points (k, 3) are in the region of interest in plan, (k,)."""
+        """Return which points (k, 3) are in the region of interest in plan, (k,)."""
         return np.asarray(shapely.contains_xy(self.region, xyz[:, 0], xyz[:, 1]), dtype=bool)
 
 

@@ -23,7 +23,7 @@ _MAX_ABOVE_POLE = 0.5
 """Metres that a sensor may hang above the top of its pole, on a short mast."""
 
 MAX_SENSOR_HEIGHT = 100.0
-"""Metres: a sensor higher than this is taken for a typing error."""
+"""Metres above the ground; a larger height is taken for a typing error."""
 
 ASSUMED_POLES = "assumed poles"
 """Reason for which assumed poles are dropped."""
@@ -236,7 +236,7 @@ class Candidates:
         return len(self.xyz)
 
     def orientation(self, pose: int) -> Float:
-        """Return how a pose's sensor is turned, (3, 3) float64, from its axes to the site's."""
+        """Return the rotation of a pose's sensor from its axes to the site's, (3, 3) float64."""
         return orientation(float(self.yaw[pose]), float(self.tilt[pose]))
 
 
@@ -252,7 +252,7 @@ def generate_candidates(geometry: SceneGeometry, settings: CandidateSettings) ->
     Raises
     ------
     SeipError
-        A setting cannot be meant, no candidate is left (with what dropped
+        A setting is out of range, no candidate is left (with what dropped
         them), or a mandatory place holds none.
     """
     dropped: dict[str, int] = {}

@@ -25,9 +25,9 @@ MAX_ORIGIN_DISTANCE = 10_000.0
 MIN_REGION_SIZE, MAX_REGION_SIZE = 5.0, 10_000.0
 """Metres across between which a region of interest is one."""
 MIN_PLAN_SHARE = 0.5
-"""Share of a surface's area that shows in plan below which it stands more than it lies."""
+"""Share of a surface's area that shows in plan, below which it counts as upright."""
 MAX_POLE_DISTANCE = 60.0
-"""Metres from the region beyond which a pole is none of the place's."""
+"""Metres from the region beyond which a pole is taken to belong to another place."""
 MAX_FOOT_OFFSET = 0.5
 """Metres between a pole's foot and the ground beyond which sensors would hang at a wrong height."""
 MAX_HOLE_AREA = 10.0
@@ -39,12 +39,12 @@ MAX_ROAD_STEP = 0.3
 LAYER_DISTANCES = (0.05, 2.5)
 """Metres between which one road above another is no bridge, but a mistake."""
 SAMPLE_SPACING = 1.0
-"""Metres between the places at which the road is looked at."""
+"""Metres between the samples of the road."""
 MAX_SAMPLES = 250_000
 SAME_POLE_DISTANCE = 0.05
 """Metres in plan below which two poles stand at one place."""
 MAX_NAMED = 5
-"""Culprits of one kind that are named one by one."""
+"""Objects with the same problem that are named one by one."""
 
 Severity = Literal["ERROR", "WARNING"]
 
@@ -56,11 +56,11 @@ class Problem:
     Parameters
     ----------
     severity : {"ERROR", "WARNING"}
-        Whether a survey cannot go on.
+        An error stops a survey.
     text : str
-        What is wrong, and the cure.
+        The problem and its remedy.
     thing : str
-        Name of the object to look at; empty where it is the scene.
+        Name of the object concerned; empty where it is the scene.
     """
 
     severity: Severity
@@ -109,9 +109,9 @@ class SceneContents:
     surfaces : tuple of Surface
         Without faulty ones.
     geometry : SceneGeometry or None
-        Where all is there that a survey needs.
+        None where something is missing that a survey needs.
     problems : tuple of Problem
-        That showed as it was read.
+        Problems found while reading.
     complaint : str
         Why there is no geometry; empty where there is.
     """
@@ -398,7 +398,7 @@ def _duplicates(contents: SceneContents) -> Iterator[Problem]:
 
 
 def _road_problems(contents: SceneContents, plans: dict[str, BaseGeometry]) -> Iterator[Problem]:
-    """Look at the road within the region: holes, steps, and one road closely above another."""
+    """Find problems of the road within the region: holes, steps, and one road closely above another."""
     region, road = plans["region"], plans["roads"]
     within = region.intersection(road)
     if within.area == 0:

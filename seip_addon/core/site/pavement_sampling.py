@@ -13,10 +13,10 @@ _FINE_STEPS = 8
 """Fine grid steps per candidate spacing: a strip wider than an eighth of it gets candidates."""
 
 _TILE = 128
-"""Columns and rows of the fine grid that are looked at at once."""
+"""Columns and rows of a tile of the fine grid."""
 
 MAX_POSITIONS = 20_000
-"""More positions than these are a slip of the keyboard: each is cast from at every height with every type."""
+"""Limit on positions: each is cast from at every height with every type."""
 
 
 def spread(area: BaseGeometry, spacing: float) -> Float:

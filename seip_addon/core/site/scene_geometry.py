@@ -18,7 +18,7 @@ DEFAULT_REFLECTIVITY = 0.3
 """Of a surface that is not known to reflect otherwise."""
 
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
-"""Who says that a pole stands there: the map, the site description, or nobody."""
+"""Source of a pole: the map, the site description, or an assumption."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class SceneGeometry:
     ground : tuple of Mesh
         Other surfaces that rays end on (pavements, verges); no targets.
     occluders : tuple of Mesh
-        Everything else that stands in the way (buildings, trees, poles).
+        All other occluders (buildings, trees, poles).
     region : shapely geometry
         Region of interest in plan.
     weighted_regions, forbidden_areas, mandatory_areas : tuple of NamedArea

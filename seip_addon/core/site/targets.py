@@ -16,7 +16,7 @@ from ..geometry.plan import surface_height
 from .scene_geometry import NamedArea
 
 MAX_TARGETS = 2_000_000
-"""A grid beyond this is a slip of the keyboard, not a plan."""
+"""Limit on the targets of a grid."""
 
 MIN_SPACING, MAX_SPACING = 0.01, 1000.0
 """Metres between which a spacing makes sense."""

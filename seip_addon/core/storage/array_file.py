@@ -50,7 +50,7 @@ class ContentError(ValueError):
 
 @dataclass(frozen=True)
 class ArrayRule:
-    """What an array of a file must be.
+    """Rule for an array of a file: type, shape and range.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class ArrayFile:
         return arrays
 
     def _check_claims(self, claims: Mapping[str, tuple[np.dtype[Any], tuple[int, ...]]]) -> None:
-        """See that types and lengths are those of the rules, and that all arrays fit into memory."""
+        """Check types and lengths against the rules, and that all arrays fit into memory."""
         lengths: dict[str, int] = {}
         for name, rule in self.arrays.items():
             dtype, shape = claims[name]

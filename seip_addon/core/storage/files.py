@@ -155,7 +155,7 @@ _PREFIX = ".seip-"
 """How the names of unfinished files begin; the number of the process that writes them follows."""
 
 _STALE_SECONDS = 86400.0
-"""Seconds after which an unfinished file is nobody's, where processes cannot be asked for."""
+"""Seconds after which an unfinished file counts as abandoned, where processes cannot be queried."""
 
 _LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 

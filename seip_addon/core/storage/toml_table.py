@@ -14,8 +14,7 @@ from ..errors import SeipError
 Reader = Callable[[Any], Any]
 """Turns a value into what it stands for; a `ValueError` of it says what the value must be instead."""
 
-REQUIRED = object()
-"""The default of a key that must be there."""
+REQUIRED = object()  # the default of a key that must be there
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ def read_table(content: Mapping[str, Any], where: str, keys: Mapping[str, Key]) 
     Parameters
     ----------
     where : str
-        What people call the table: its file, and its number in it.
+        Name for messages: its file, and its number in it.
 
     Raises
     ------

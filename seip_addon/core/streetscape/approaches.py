@@ -28,7 +28,7 @@ Key = tuple[str, int]
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """Where the driving lanes of a road end: lines across them, their height, and the way along the road (2,)."""
+    """End of a road's driving lanes: lines across them, their height, and the direction along the road (2,)."""
 
     across: BaseGeometry
     height: float

@@ -27,14 +27,13 @@ DESCRIPTION_SUFFIX = ".toml"
 MAX_SIZE = 100_000.0
 """Metres (or degrees, or a weight) that nothing described may exceed."""
 
-MAX_HEIGHT = 1_000.0
-"""Metres that nothing described is high."""
+MAX_HEIGHT = 1_000.0  # metres that nothing described is high
 
 MAX_RADIUS = 5_000.0
 """Metres from the middle of the place to the end of its region at most."""
 
 MAX_ROW_LENGTH = 10_000
-"""Trees or lights of a row beyond which its spacing is a slip."""
+"""Limit on the trees or lights of a row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +148,7 @@ class SiteDescription:
 
     @property
     def along(self) -> float | None:
-        """How far the region follows the approaches of the junction, metres; None where it is a circle or an area."""
+        """Length of the approaches in the region, metres; None where the region is a circle or an area."""
         if self.junction is None or self.region is not None or self.radius is not None:
             return None
         return DEFAULT_RADIUS if self.approaches is None else self.approaches

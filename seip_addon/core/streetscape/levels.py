@@ -67,7 +67,7 @@ def split_levels(
     anchors: Iterable[str],
     level: Sequence[str] = (),
 ) -> Levels:
-    """Tell the lanes on the level of a place from those that cross above or below it.
+    """Divide lanes into those on the level of a place and those that cross above or below.
 
     Of two crossing roads the one that is fewer joints away from the anchors in
     the graph of roads is on the studied level. Each other road takes the level of

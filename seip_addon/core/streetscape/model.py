@@ -96,7 +96,7 @@ class SiteModel:
     notes : tuple of str
         What was assumed because the map does not say it, a sentence each.
     warnings : tuple of str
-        What makes results of the scene worth little, a sentence each.
+        Reasons to distrust results of the scene, one sentence each.
     """
 
     name: str

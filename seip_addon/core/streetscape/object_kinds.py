@@ -37,8 +37,7 @@ KIND_OF_TYPE = {
 }
 UNTYPED = {"-1", "none", ""}
 """Types that say nothing: name and shape decide."""
-VAGUE_TYPES = UNTYPED | {"obstacle"}
-"""Types of which name and shape say more."""
+VAGUE_TYPES = UNTYPED | {"obstacle"}  # types of which name and shape say more
 
 WORDS_OF_KIND = {
     Kind.LAMP: {"lamp", "lamps", "streetlamp", "streetlight", "lantern", "luminaire", "laterne", "leuchte"},
@@ -51,7 +50,7 @@ WORDS_OF_KIND = {
     Kind.BUILDING: {"building", "house", "haus", "gebaeude", "garage", "church", "school"},
 }
 SIGNAL_WORDS = {"signal", "signals", "traffic", "trafficlight", "light", "ampel", "mast", "gantry", "signalpole"}
-"""Words in the name of a post that say that it carries traffic lights."""
+"""Words in the name of a post that carries traffic lights."""
 SIGN_WORDS = {"sign", "signs", "schild", "verkehrszeichen", "speed"}
 
 MIN_POST_HEIGHT, MAX_POST_THICKNESS, MIN_POST_SLENDERNESS = 2.0, 0.6, 6.0

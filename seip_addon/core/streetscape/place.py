@@ -21,7 +21,7 @@ from .geographic_position import looks_like_degrees
 from .levels import Levels, split_levels
 
 SCENE_MARGIN = 40.0
-"""How far beyond the region of interest (metres) the scene goes on, for what stands in the way at its edge."""
+"""Metres that the scene extends beyond the region of interest, for occluders at its edge."""
 MAX_ROAD_DISTANCE = 10.0
 """Roads this near to the middle of the place (metres) may each be the one that is meant."""
 

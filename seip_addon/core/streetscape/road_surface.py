@@ -62,7 +62,7 @@ MAX_OPEN_MEDIAN_WIDTH = 6.0
 MAX_PAVEMENT_DISTANCE = 6.0
 """A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
 SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0
-"""Sides of roads are looked at in steps (metres), and count as bare where they are so from this length on."""
+"""Metres: sampling step along sides of roads, and least length of a side without pavement."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ class _SignalPost:
 def split_posts(
     objects: Sequence[PlacedObject], signals: Iterable[PlacedSignal], roadside: Roadside
 ) -> tuple[list[PlacedObject], list[tuple[PlacedSignal, Post | None]]]:
-    """Tell the map's posts that carry traffic lights from its other objects.
+    """Divide a map's objects into posts that carry traffic lights and others.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ MIN_OVERLAP = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Overlaps:
-    """Pairs of road users that are in one place at one of the instants looked at; k pairs.
+    """Pairs of road users that overlap at some sampled instant; k pairs.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def without_overlaps(trajectories: Trajectories) -> Generator[Progress, None, tu
     -------
     trajectories : Trajectories
     names : tuple of str
-        Who was left out.
+        Names of the road users removed.
     """
     overlaps = yield from find_overlaps(trajectories)
     pairs = overlaps.pair

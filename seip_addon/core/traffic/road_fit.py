@@ -151,7 +151,7 @@ def _off_the_road(local: Trajectories, user: Integer, near: Boolean, on_road: Bo
 
 
 def _without_gaps(trajectories: Trajectories, user: Integer, keep: Boolean) -> Trajectories:
-    """Keep some samples; what a gap separates becomes two road users, and a single sample none."""
+    """Keep some samples; a gap divides a road user into two, and a single sample is dropped."""
     kept = np.flatnonzero(keep)
     user, time = user[kept], trajectories.time[kept]
     new = np.ones(len(kept), dtype=np.bool_)

@@ -24,7 +24,7 @@ _SAME_TIME = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class VehiclePositions:
-    """Where the vehicles of a run are, at some instants.
+    """Positions of the vehicles of a run, at some instants.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _aligned(one: VehiclePositions, other: VehiclePositions, shift: float) -> fl
 
 
 def _near(xy: Float, others: Float) -> int:
-    """How many points (n, 2) have one of others (k, 2) nearby."""
+    """Return the number of points (n, 2) that have one of others (k, 2) nearby."""
     nearby = shapely.STRtree(shapely.points(others)).query(shapely.points(xy), predicate="dwithin", distance=SAME_PLACE)
     return len(np.unique(nearby[0]))
 

@@ -28,7 +28,7 @@ ROAD_MARGIN = 20.0
 """Metres beyond the road of the scene within which traffic is read."""
 
 OVERLAP_INTERVAL = 1.0
-"""Seconds between two looks for road users in one place, where a file is read."""
+"""Seconds between the instants that are searched for overlapping road users."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
     Raises
     ------
     SeipError
-        The file cannot be read, or nobody in it comes near.
+        The file cannot be read, or no road user in it comes near.
     """
     trajectories = Trajectories.load(path).moved_to(geometry.origin)
     left, bottom, right, top = geometry.region.bounds

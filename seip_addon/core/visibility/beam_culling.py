@@ -42,7 +42,7 @@ _MARGIN = 1e-9  # radians; a ray too many costs a cast, a ray too few a wrong gr
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Where returns near targets can lie, as seen from one place.
+    """Patches: where returns near targets can lie, as seen from one position.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ from .settings import VisibilitySettings
 from .triangle_culling import needed_triangles
 
 SAMPLING_SECONDS = 0.8
-"""Seconds that sample places may take, beyond the first of each thread."""
+"""Seconds for sampled positions beyond the first of each thread."""
 
 _BYTES_PER_TRIANGLE = {"embree": 750, "bvh": 1100}
 """At the peak, while the ray caster is built; measured on a street of a million triangles."""
@@ -138,7 +138,7 @@ class _Sample:
 def _compute_from(
     drawn: Sequence[Integer], submit: Callable[[Integer], Future[Rows]]
 ) -> Generator[Progress, None, _Sample]:
-    """Look from the first of some places, then from as many more as there is time for.
+    """Compute visibility from the first of some positions, then from as many more as there is time for.
 
     The second batch alone counts where it is the larger one: the first pays for what later places find ready.
     """

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from ..arrays import Float, Integer
-from ..geometry.orientation import turned
+from ..geometry.orientation import rotated
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 
@@ -26,7 +26,7 @@ _FLOAT32_ROUNDINGS = 64
 
 @dataclass(frozen=True, eq=False)
 class Cuts:
-    """What balls of radius δ about targets cut out of the planes of the triangles that they meet: discs.
+    """Discs: intersections of balls of radius δ about targets with the planes of triangles.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Cuts:
 
 @dataclass(frozen=True, eq=False)
 class Discs:
-    """Circles about what balls of radius δ about targets cut out of the triangles that they meet.
+    """Circles about the intersections of balls of radius δ about targets with triangles.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Discs:
 
 @dataclass(frozen=True, eq=False)
 class NearSurfaces:
-    """Where returns within δ of targets can lie.
+    """Surfaces on which returns within δ of targets can lie.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurface
     return _about(targets, radius, cuts.bounds(tolerance), tolerance)
 
 
-def turned_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -> NearSurfaces:
+def rotated_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -> NearSurfaces:
     """Return the same surfaces in the axes of a sensor at any position and orientation.
 
     Parameters
@@ -176,7 +176,7 @@ def turned_surfaces(surfaces: NearSurfaces, origin: Float, orientation: Float) -
         normal=cuts.normal @ orientation,
         middle=(cuts.middle - origin) @ orientation,
     )
-    targets = turned(surfaces.xyz - origin, orientation.T)
+    targets = rotated(surfaces.xyz - origin, orientation.T)
     return _about(targets, surfaces.radius, turned_cuts.bounds(tolerance), tolerance)
 
 

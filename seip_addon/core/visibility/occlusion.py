@@ -21,7 +21,7 @@ from .beam_culling import Beams, NearRays, Planes
 
 
 def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, planes: Planes) -> Boolean:
-    """Tell which bundles are stopped, each by its triangle, before they come near their targets.
+    """Return which bundles are blocked, each by its triangle, before they come near their targets.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class RayCaster(Protocol):
 
     @property
     def threads(self) -> int:
-        """How many threads may cast at once to advantage."""
+        """Number of threads that may cast at once to advantage."""
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays from one point, or each from a point of its own.

@@ -57,7 +57,7 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
 
 
 def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
-    """Say from where on the tilted sensors of a type, each on the side that it looks to, count beams."""
+    """Return a warning on the radius from which the tilted sensors of a type do not resolve δ."""
     poses = site.candidates
     height = np.round(poses.height, 2)
     beyond = []

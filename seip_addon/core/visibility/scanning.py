@@ -38,7 +38,7 @@ class Corners(Protocol):
 
 
 class Caster(Protocol):
-    """What a scan needs of a `RayCaster`."""
+    """Interface of a `RayCaster` that scans use."""
 
     @property
     def triangles(self) -> Corners:
@@ -67,7 +67,7 @@ class ScanPosition:
     settings: VisibilitySettings
 
     def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
-        """Tell which of a sensor's hits count as returns: within its range and strong enough, (n,) bool."""
+        """Return which of a sensor's hits count as returns: within its range and strong enough, (n,) bool."""
         counts = (distance >= model.min_range) & (distance <= model.max_range)
         if self.settings.min_intensity > 0:
             corners = self.caster.triangles[triangle[counts]]
@@ -216,7 +216,7 @@ class _Returns:
 
 
 def _points(origin: Float, directions: Float, distance: Float) -> Float:
-    """Where rays end; infinitely far on a miss."""
+    """End points of rays; infinitely far on a miss."""
     far = np.isinf(distance)
     points: Float = origin + np.where(far, 0.0, distance)[:, None] * directions
     points[far] = np.inf

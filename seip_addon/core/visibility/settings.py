@@ -8,7 +8,7 @@ from ..errors import SeipError
 from ..settings import setting
 
 MAX_DELTA = 100.0
-"""Metres: a wider one is a slip of the keyboard."""
+"""Metres; a larger δ is taken for a typing error."""
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,12 @@ from ..site.site import Site
 from ..site.target_squares import target_squares
 
 MAX_LINES = 1500
-"""More than these are a carpet, not lines: a sample of the targets is drawn."""
+"""Limit on the lines drawn: of more targets a sample is taken."""
 SAMPLE_SEED = 0
-"""Of the sample."""
 SAME_PLACE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
 SAME_TURN = 5e-5
-"""Cosines by which it may be turned otherwise."""
+"""Difference of cosines up to which two orientations are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +53,6 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
     ----------
     pose : int
         Index among the site's candidates.
-    model : LidarModel
-        That hangs there.
     row : (t,) bool
         Which targets it sees: its row of the visibility grid.
     """
@@ -74,7 +71,7 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
 
 
 def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float) -> int | None:
-    """Return the candidate pose of a sensor type at a place and turned so, None where there is none.
+    """Return the candidate pose of a sensor type at a position and orientation, None where there is none.
 
     Parameters
     ----------

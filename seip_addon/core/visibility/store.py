@@ -117,7 +117,7 @@ def _load(path: Path) -> VisibilityGrid | None:
 
 
 class GridFolder:
-    """A folder of grids that are kept under their keys; other files in it are let alone."""
+    """A folder of grids, named by their keys; other files in it are left alone."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

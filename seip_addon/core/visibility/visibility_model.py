@@ -15,10 +15,10 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..geometry.orientation import orientation as orientation_of
-from ..geometry.orientation import turned
+from ..geometry.orientation import rotated
 from ..lidar import LidarModel
 from ..site.site import Site
-from .near_surfaces import near_surfaces, turned_surfaces
+from .near_surfaces import near_surfaces, rotated_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
 from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
 from .settings import VisibilitySettings
@@ -71,7 +71,7 @@ class VisibilityModel:
         if _is_upright(orientation):
             return self.see_upright(models, xyz, _yaw(orientation))
         position = _in_sensor_axes(self._position(models, xyz, 0.0), orientation)
-        return seen_by_near_rays(position, turned_surfaces(self._surfaces, xyz, orientation))
+        return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
 
     def see_upright(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> tuple[Boolean, int]:
         """Compute which targets upright sensors see whose azimuth zero points to a yaw in radians; see `see_all`."""
@@ -93,7 +93,7 @@ def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, targets: Float
     orientation = orientation_of(position.yaw, tilt)
     if _is_upright(orientation):
         return seen_by_all_rays(replace(position, yaw=_yaw(orientation)), targets)
-    return seen_by_all_rays(_in_sensor_axes(position, orientation), turned(targets - position.origin, orientation.T))
+    return seen_by_all_rays(_in_sensor_axes(position, orientation), rotated(targets - position.origin, orientation.T))
 
 
 def _is_upright(orientation: Float) -> bool:
@@ -106,12 +106,12 @@ def _yaw(orientation: Float) -> float:
 
 def _in_sensor_axes(position: ScanPosition, orientation: Float) -> ScanPosition:
     """Return a position in the axes of its sensors."""
-    caster = _TurnedCaster(position.caster, position.origin, orientation)
+    caster = _RotatedCaster(position.caster, position.origin, orientation)
     return replace(position, caster=caster, origin=np.zeros(3), yaw=0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnedCaster:
+class _RotatedCaster:
     """A ray caster in the axes of a sensor."""
 
     caster: Caster
@@ -119,21 +119,21 @@ class _TurnedCaster:
     orientation: Float
 
     @property
-    def triangles(self) -> _TurnedTriangles:
-        return _TurnedTriangles(self)
+    def triangles(self) -> _RotatedTriangles:
+        return _RotatedTriangles(self)
 
     def cast(self, origin: Float, directions: Float, max_range: float) -> tuple[Float, Integer]:
         """Cast rays, given in the sensor's axes."""
         start = self.origin + origin @ self.orientation.T
-        return self.caster.cast(start, turned(directions, self.orientation), max_range)
+        return self.caster.cast(start, rotated(directions, self.orientation), max_range)
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnedTriangles:
-    """The triangles of a ray caster in the axes of a sensor, turned as they are asked for."""
+class _RotatedTriangles:
+    """The triangles of a ray caster in the axes of a sensor, rotated on demand."""
 
-    turned: _TurnedCaster
+    rotated: _RotatedCaster
 
     def __getitem__(self, which: Integer) -> Float:
-        corners: Float = (self.turned.caster.triangles[which] - self.turned.origin) @ self.turned.orientation
+        corners: Float = (self.rotated.caster.triangles[which] - self.rotated.origin) @ self.rotated.orientation
         return corners

@@ -1,1 +1,1 @@
-"""Whole jobs that the panel and the commands share: survey, robust placement, recording."""
+"""Whole jobs shared by panel and commands: survey, robust placement, traffic, recording."""

@@ -25,11 +25,11 @@ class RobustSolution:
     Parameters
     ----------
     solution : Solution
-        Objective, bound and gap are of what the robustness settings ask for; its notes say so.
+        Its objective, bound and gap are those of the risk measure, as its notes say.
     study : RobustStudy
-        It beside the solution that trusts the map.
+        Comparison with the nominal placement.
     pose_study : PoseStudy
-        What pose errors do to it.
+        Its coverage under pose errors.
     """
 
     solution: Solution

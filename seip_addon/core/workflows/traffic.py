@@ -69,9 +69,9 @@ class TrafficRuns:
     Parameters
     ----------
     optimisation, evaluation : list of Trajectories
-        To choose a placement on, and to evaluate it in.
+        To optimise a placement on, and to evaluate it on.
     overlap : str
-        How much the two overlap, as a sentence.
+        Message on how much the two overlap.
     """
 
     optimisation: list[Trajectories]
@@ -181,13 +181,13 @@ def place_in_traffic(
         "objective, bound and gap are of that"
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
-    notes = (note, *weighed, *placement.notes, *traffic_sentences(study), *traffic_warnings(study))
+    notes = (note, *weighed, *placement.notes, *traffic_messages(study), *traffic_warnings(study))
     deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
     solution = Solution(with_count(objective, layout.site), replace(placement, notes=notes), None, deployment)
     return TrafficSolution(solution, study)
 
 
-def traffic_sentences(study: TrafficStudy) -> tuple[str, ...]:
-    """Say what placing on traffic gains, and whether the instants that this is evaluated on were too few."""
+def traffic_messages(study: TrafficStudy) -> tuple[str, ...]:
+    """Describe what optimising on traffic gains, and whether it was evaluated on too few instants."""
     gain = f"placing on traffic sees {study.gain(study.layer).describe()} more of the {LAYER_NAMES[study.layer]}"
     return (gain,) if study.is_converged() else (gain, "every other instant says something else: evaluate on more")

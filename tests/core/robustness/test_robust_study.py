@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from functools import cache
 
-from headless.charts.robust import save_blame_chart, save_frontier_chart, save_spread_chart
+from headless.charts.robust import save_frontier_chart, save_loss_chart, save_spread_chart
 from headless.lab.stability.robustness_rows import robust_rows
 
 import numpy as np
@@ -155,6 +155,6 @@ def test_charts_are_drawn(laid_out, study, tmp_path):
     judged = finish(pose_study(around, deployment, PoseStudySettings(PoseErrors(tilt=math.radians(5)), 10, 4)))
     save_spread_chart(tmp_path / "spread.png", study, "spread")
     save_frontier_chart(tmp_path / "frontier.png", study, "frontier")
-    save_blame_chart(tmp_path / "blame.png", judged, "blame")
+    save_loss_chart(tmp_path / "blame.png", judged, "blame")
     for path in tmp_path.iterdir():
         assert imread(path).shape[1] > 1000

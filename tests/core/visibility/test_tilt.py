@@ -17,7 +17,7 @@ from random_cases import cases
 from synthetic_junction import junction_site, make_candidates, prism, rectangle
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import angles_of, describe_tilt, orientation, orientations, turned
+from seip_addon.core.geometry.orientation import angles_of, describe_tilt, orientation, orientations, rotated
 from seip_addon.core.lidar import beam_directions, load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective
@@ -130,8 +130,8 @@ def test_orientations_turn_then_nod_then_roll(yaw, tilt, roll):
 
 def test_rays_are_turned_to_the_same_bits_in_every_batch():
     rays, turn = beam_directions(MODELS["type2"]).reshape(-1, 3), orientation(0.7, 0.2)
-    whole = turned(rays, turn)
-    assert (np.concatenate([turned(rays[n : n + 7], turn) for n in range(0, 700, 7)]) == whole[:700]).all()
+    whole = rotated(rays, turn)
+    assert (np.concatenate([rotated(rays[n : n + 7], turn) for n in range(0, 700, 7)]) == whole[:700]).all()
     assert whole == pytest.approx(rays @ turn.T, abs=1e-15)
 
 
