@@ -36,6 +36,7 @@ def scenario(window: Window) -> Steps:
     asked = sys.argv[sys.argv.index("--") + 2 :]
     parts = (
         _pose_errors_are_asked_for,
+        _traffic_is_placed_on,
         _stopped_work_leaves_no_trace,
         _escape_is_for_the_animation,
         _changes_show_after_opening,
@@ -93,6 +94,19 @@ def _pose_errors_are_asked_for(window: Window) -> Steps:
     yield from _press(window, "seip.solve_placement(")
     assert sum(rays) > 0
     assert any("one of twenty" in note for note in _record()["notes"])
+
+
+def _traffic_is_placed_on(window: Window) -> Steps:
+    goal = _scene().seip.goal
+    yield from window.open_below("seip.solve_placement(", "seip.goal.objective")
+    goal.objective, goal.runs = "TRAFFIC", str((Path("scenes") / "junction_traffic").resolve())
+    yield from window.enter("seip.goal.instants", "4")
+    yield from window.enter("seip.goal.evaluation_instants", "8")
+    yield from window.picture("in-traffic")
+    yield from _press(window, "seip.solve_placement(")
+    assert _record()["settings"]["traffic"]["instants"] == 4
+    assert any(note.startswith("placing on traffic sees") for note in _record()["notes"])
+    assert (yield from _says(window, "placing on traffic sees"))
 
 
 def _stopped_work_leaves_no_trace(window: Window) -> Steps:
