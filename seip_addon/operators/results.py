@@ -32,7 +32,7 @@ from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.write import coverage_of, recolour, show_seen_by, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneSurvey, session
-from .work import LongWork, Outcome, attempt, begun
+from .base import LongWork, Outcome, attempt, started
 
 MOST_RANKED = 50
 EYE_DISTANCE = 10.0
@@ -346,7 +346,7 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
 
     bl_idname = "seip.export_result"
     bl_label = "Export"
-    stopped = "stopped; nothing was written"
+    stopped_message = "stopped; nothing was written"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -362,7 +362,7 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
         """See that the folder can be written, save the scene as it is, and find the placement again."""
         self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
         check_folder(self._folder)
-        return begun(_exported(self._folder, scene))
+        return started(_exported(self._folder, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Say where the files are."""

@@ -12,7 +12,7 @@ from ..core.errors import SeipError
 from ..core.lidar import load_catalogue
 from ..session import session
 from ..viewport import beam_preview
-from .work import Outcome, attempt
+from .base import Outcome, attempt
 
 
 class SEIP_OT_list_sensor_types(bpy.types.Operator):

@@ -26,7 +26,7 @@ from ..scene.build import build_scene
 from ..scene.changes import watch
 from ..scene.check import contents_of
 from ..session import CheckedScene, session
-from .work import LongWork, Outcome, attempt
+from .base import LongWork, Outcome, attempt
 
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""

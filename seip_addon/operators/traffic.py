@@ -29,8 +29,8 @@ from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneSurvey, SceneTraffic, session
+from .base import LongWork, Outcome, Result
 from .results import no_placement, not_evaluated
-from .work import LongWork, Outcome, Result
 
 INSTANTS = 60
 """Of traffic at which a placement is tried."""
@@ -229,7 +229,7 @@ class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types
     bl_idname = "seip.write_dataset"
     bl_label = "Write Dataset"
     bl_options = {"REGISTER"}  # as above
-    stopped = "stopped; what is written stays, and the same run goes on from there"
+    stopped_message = "stopped; what is written stays, and the same run goes on from there"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
         """Read what is recorded."""
