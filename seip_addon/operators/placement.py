@@ -146,7 +146,7 @@ class SEIP_OT_remove_rule(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is a rule to remove."""
+        """Return whether there is a rule to remove."""
         goal = context.scene.seip.goal
         return goal.active_rule in range(len(goal.rules))
 

@@ -44,7 +44,7 @@ class ForPlacement:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         sentence = scene_status.obstacle(context.scene) or no_placement(context.scene)
         if sentence:
             cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
@@ -163,7 +163,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         if not super().poll(context):
             return False
         sentence = not_evaluated(context.scene)
@@ -202,7 +202,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is one."""
+        """Return whether there is one."""
         seip = context.scene.seip
         return seip.active_kept in range(len(seip.kept))
 
@@ -350,7 +350,7 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         if not super().poll(context):
             return False
         sentence = no_folder(context.scene) or not_evaluated(context.scene)

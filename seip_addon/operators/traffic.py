@@ -72,7 +72,7 @@ class _Scanning(LongWork[Result]):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is anything to scan."""
+        """Return whether there is anything to scan."""
         sentence = why_no_scan(context.scene)
         if sentence:
             cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
@@ -87,7 +87,7 @@ class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is a file to read."""
+        """Return whether there is a file to read."""
         reason = why_no_load(context.scene)
         if reason:
             cls.poll_message_set(reason)
@@ -118,7 +118,7 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is traffic."""
+        """Return whether there is traffic."""
         there = contract.find(context.scene, contract.TRAFFIC) is not None
         if not there:
             cls.poll_message_set("there is no traffic in the scene")
@@ -142,7 +142,7 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operat
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there are a placement and traffic."""
+        """Return whether there are a placement and traffic."""
         reason = why_no_trial(context.scene)
         if reason:
             cls.poll_message_set(reason)

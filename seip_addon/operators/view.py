@@ -55,7 +55,7 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is coverage to colour."""
+        """Return whether there is coverage to colour."""
         return _can(cls, why_no_coverage(context.scene))
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -74,7 +74,7 @@ class SEIP_OT_show_coverage_colours(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether this is a view."""
+        """Return whether this is a view."""
         return isinstance(context.space_data, bpy.types.SpaceView3D)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -91,7 +91,7 @@ class SEIP_OT_toggle_legend(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is coverage to explain."""
+        """Return whether there is coverage to explain."""
         return _can(cls, why_no_coverage(context.scene))
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -169,7 +169,7 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operat
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         return super().poll(context) and _can(cls, not_evaluated(context.scene))
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:

@@ -34,7 +34,7 @@ def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.typ
 
 def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: float) -> None:
     """Draw the legend with its lower right corner at a place in pixels."""
-    import blf  # noqa: PLC0415  # of use only where there is a screen
+    import blf  # noqa: PLC0415  # not available in background mode
 
     if not blocks:
         return
