@@ -1,9 +1,9 @@
 """Average precision against training and inference time for alternative detector settings.
 
-python -m headless.compare_detectors scenes/junction.blend -o docs/detector
+python -m headless.compare_detectors scenes/junction.blend -o out/detectors
 
-Every setting trains for the same number of steps on all placements, and is evaluated on the same frames. Seconds
-are those that one core works, whatever else the machine does.
+Every setting is trained for the same number of steps on all placements, and evaluated on the same frames. Times are
+CPU times of one thread, independent of other load.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from seip_addon.core.storage.files import save_json
 
 DEFAULT_NETWORK = NetworkSettings()
 NETWORKS = {
-    ("as published", "as published"): PUBLISHED_NETWORK,  # takes the longest, so it begins first
+    ("as published", "as published"): PUBLISHED_NETWORK,  # slowest, so it starts first
     ("default", "default"): DEFAULT_NETWORK,
     ("pillars", "0.32 m"): replace(DEFAULT_NETWORK, pillar=0.32),
     ("pillars", "0.5 m"): replace(DEFAULT_NETWORK, pillar=0.5),
@@ -41,14 +41,14 @@ NETWORKS = {
     ("width", "64"): replace(DEFAULT_NETWORK, width=64),
     ("head", "anchors"): replace(DEFAULT_NETWORK, head="anchor"),
 }
-"""Networks compared, by family and name."""
+"""Networks compared, by family and name of the setting."""
 
 TIMED_RUNS = 5
-"""Runs of the detector on each frame; the median time counts."""
+"""Timed inferences per frame, of which the median is taken."""
 
 
 def main(argv: list[str]) -> None:
-    """Train and evaluate every setting, and write the chart and its figures."""
+    """Train and evaluate a detector with every setting, and write the chart and its data."""
     options = _parser().parse_args(argv)
     study = evaluate.prepare_study(options)
     models = [
@@ -60,20 +60,20 @@ def main(argv: list[str]) -> None:
         )
         for (family, name), network in NETWORKS.items()
     ]
-    works = [_trained(study, model, options.device) for model in models]
+    trainings = [_train(study, model, options.device) for model in models]
     with deterministic(1):
-        trained = study.surveyed.stopwatch.run("training", side_by_side(works, case_study.PARALLEL_TRAININGS))
+        trained = study.surveyed.stopwatch.run("training", side_by_side(trainings, case_study.PARALLEL_TRAININGS))
     detectors = [detector for detector, _ in trained]
-    judging = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
-    outcomes = study.surveyed.stopwatch.run("evaluation", judging)
+    evaluation = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
+    outcomes = study.surveyed.stopwatch.run("evaluation", evaluation)
     settings = [
         DetectorSetting(
             name=name,
             family=family,
             training=seconds,
-            inference=1000 * _inference(study, detector),
+            inference=1000 * _inference_seconds(study, detector),
             average_precision=float(
-                np.mean([one.evaluation.average_precision for one in outcomes if one.model is model])
+                np.mean([outcome.evaluation.average_precision for outcome in outcomes if outcome.model is model])
             ),
             default=model.network == DEFAULT_NETWORK,
         )
@@ -92,10 +92,10 @@ def main(argv: list[str]) -> None:
         )
 
 
-def _trained(
+def _train(
     study: evaluate.DetectionStudy, model: case_study.ModelConfiguration, device: str
 ) -> Generator[Progress, None, tuple[Detector, float]]:
-    """Simulate what a detector learns from, and train it; return it with the processor's seconds of the training."""
+    """Simulate the training set and train a detector on it; return it with the CPU time of the training in seconds."""
     simulator = Simulator(study.simulator.static, study.simulator.settings, study.simulator.site)
     grid = grid_of(study.surveyed.layout.geometry, model.network.pillar)
     training_set = yield from case_study.simulate_training_set(
@@ -106,18 +106,18 @@ def _trained(
     return trained.detector, time.thread_time() - begin
 
 
-def _inference(study: evaluate.DetectionStudy, detector: Detector) -> float:
-    """Return the processor's seconds for detection in a merged frame: the mean over configurations of medians."""
+def _inference_seconds(study: evaluate.DetectionStudy, detector: Detector) -> float:
+    """Return the CPU time of inference on a merged frame: the median of runs, averaged over configurations."""
     medians = []
     for configuration in study.configurations:
         frame = study.simulator.frame(configuration, study.traffic.test[0], 0)
-        looks = []
+        times = []
         for _ in range(TIMED_RUNS):
             begin = time.thread_time()
             with deterministic(1):
                 detect(detector, frame.points, frame.intensity)
-            looks.append(time.thread_time() - begin)
-        medians.append(np.median(looks))
+            times.append(time.thread_time() - begin)
+        medians.append(np.median(times))
     return float(np.mean(medians))
 
 

@@ -14,7 +14,7 @@ from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
 from .core.workflows.recording import frame_number
 from .session import LastScan, session
-from .viewport import layers
+from .viewport import overlays
 from .viewport.point_cloud import NAME, cloud_overlay
 
 
@@ -55,13 +55,13 @@ def show_cloud(scene: bpy.types.Scene) -> None:
     """Show the points of a scene's last scan, in the colours that its panel asks for."""
     scan = session.scan_of(scene)
     if scan is not None:
-        layers.show(scene, NAME, cloud_overlay(scan.frame, scan.run.sensors, scene.seip.view.cloud_colour))
+        overlays.show(scene, NAME, cloud_overlay(scan.frame, scan.run.sensors, scene.seip.view.cloud_colour))
 
 
 def hide_cloud(scene: bpy.types.Scene) -> None:
     """Let go of a scene's scan."""
     session.scans.pop(scene.session_uid, None)
-    layers.hide(scene, NAME)
+    overlays.hide(scene, NAME)
 
 
 def keep_following() -> None:

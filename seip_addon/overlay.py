@@ -54,7 +54,7 @@ class Layer:
 
     def draw(self, scale: float) -> None:
         """Draw it into the framebuffer that is bound."""
-        import gpu  # noqa: PLC0415  # is not there in the background
+        import gpu  # noqa: PLC0415  # not available in background mode
         from gpu_extras.batch import batch_for_shader  # noqa: PLC0415  # as above
 
         single = isinstance(self.colours, tuple)

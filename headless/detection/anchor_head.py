@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .heads import BoxProposals, TrainingTargets, cell_middles, inner_cells
+from .heads import BoxProposals, TrainingTargets, cell_centres, inner_cells, matched_boxes
 from .losses import focal_loss
 from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid
@@ -28,7 +28,8 @@ DIRECTION_FROM = math.pi / 4
 SMOOTH_L1_BETA = 1 / 9
 """Where the smooth L1 loss turns from a square into a line."""
 
-INITIAL_SCORE = 0.01  # score that every anchor begins with
+INITIAL_SCORE = 0.01
+"""Score of every anchor before training."""
 
 MAX_BOXES = 500
 """Boxes of a cloud before suppression, the best first."""
@@ -100,8 +101,7 @@ class AnchorHead(nn.Module):
         score = focal_loss(predicted[..., 0], positive, counted)
 
         cloud, anchor, row, column = torch.nonzero(positive, as_tuple=True)
-        first = torch.tensor([0, *(len(wanted.boxes) for wanted in targets)]).cumsum(0)[:-1].to(output.device)
-        target = torch.cat([wanted.boxes for wanted in targets])[first[cloud] + assigned[cloud, anchor, row, column]]
+        target = matched_boxes(targets, cloud, assigned[cloud, anchor, row, column])
         anchors = anchor_boxes(grid, anchor, row, column)
         found = predicted[cloud, anchor, row, column]
         count = max(1, len(found))
@@ -167,7 +167,7 @@ def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
 
 def anchor_boxes(grid: PillarGrid, anchor: Tensor, row: Tensor, column: Tensor) -> Tensor:
     """Return the boxes (m, 7) of anchors given by number, row and column."""
-    x, y = cell_middles(grid, OUTPUT_STRIDE, anchor.device)
+    x, y = cell_centres(grid, OUTPUT_STRIDE, anchor.device)
     sizes = torch.tensor([(s.length, s.width, s.height) for s in ANCHOR_SIZES], device=anchor.device)
     size = sizes[anchor // len(ANCHOR_YAWS)]
     yaw = torch.tensor(ANCHOR_YAWS, device=anchor.device)[anchor % len(ANCHOR_YAWS)]
@@ -215,7 +215,7 @@ def direction_of(yaw: Tensor) -> Tensor:
 def _overlaps(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     """Return the overlaps (boxes, anchors, rows, columns) of anchors set along the axes; 0 across classes."""
     boxes = wanted.boxes
-    x, y = cell_middles(grid, OUTPUT_STRIDE, boxes.device)
+    x, y = cell_centres(grid, OUTPUT_STRIDE, boxes.device)
     across = torch.sin(boxes[:, 6]).abs() > math.sqrt(0.5)
     wide = torch.where(across, boxes[:, 4], boxes[:, 3])
     deep = torch.where(across, boxes[:, 3], boxes[:, 4])

@@ -21,7 +21,7 @@ class TrainingTargets:
         As in `frame_results.Detections`.
     category : (k,) int64 Tensor
     learnt : (k,) bool Tensor
-        Whether it has points enough to be asked for; where it is, nothing counts otherwise.
+        Whether it has enough points to learn from; cells and anchors near the others are left out of the loss.
     """
 
     boxes: Tensor
@@ -67,8 +67,14 @@ class DetectionHead(Protocol):
         """Return the boxes of each cloud whose score is not below ``least_score``."""
 
 
-def cell_middles(grid: PillarGrid, stride: int, device: torch.device) -> tuple[Tensor, Tensor]:
-    """Return x (columns,) and y (rows,) of the middles of the cells of a feature map, metres."""
+def matched_boxes(targets: list[TrainingTargets], cloud: Tensor, index: Tensor) -> Tensor:
+    """Return the boxes (m, 7) at indices (m,) of clouds (m,)."""
+    first = torch.tensor([0, *(len(part.boxes) for part in targets)]).cumsum(0)[:-1].to(cloud.device)
+    return torch.cat([part.boxes for part in targets])[first[cloud] + index]
+
+
+def cell_centres(grid: PillarGrid, stride: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Return x (columns,) and y (rows,) of the centres of the cells of a feature map, metres."""
     side = grid.pillar * stride
     x = grid.west + side * (torch.arange(grid.columns // stride, device=device) + 0.5)
     y = grid.south + side * (torch.arange(grid.rows // stride, device=device) + 0.5)
@@ -77,7 +83,7 @@ def cell_middles(grid: PillarGrid, stride: int, device: torch.device) -> tuple[T
 
 def inner_cells(grid: PillarGrid, stride: int, margin: float, device: torch.device) -> Tensor:
     """Return which cells (rows, columns) of a feature map are ``margin`` or more from the border."""
-    x, y = cell_middles(grid, stride, device)
+    x, y = cell_centres(grid, stride, device)
     wide, deep = grid.columns * grid.pillar, grid.rows * grid.pillar
     across = (x - grid.west >= margin) & (x - grid.west <= wide - margin)
     along = (y - grid.south >= margin) & (y - grid.south <= deep - margin)

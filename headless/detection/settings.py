@@ -1,4 +1,4 @@
-"""Settings of the detector and of its training, with measured defaults."""
+"""Settings of the detection network and its training, their limits, and the detector's classes."""
 
 from __future__ import annotations
 
@@ -18,18 +18,16 @@ CLASS_CATEGORIES = {
 }
 """Classes of the detector and the categories of road users in each.
 
-A van is a high car and a bus a truck with windows: in sparse clouds they look
-alike, one class for both spends no detection on their difference, and their
-sizes are regressed anyway.
+Cars and vans, and trucks and buses, look alike in sparse clouds. A common class
+avoids confusing them; their sizes are regressed anyway.
 """
 
 CLASSES = tuple(CLASS_CATEGORIES)
 CLASS_OF = {category: number for number, group in enumerate(CLASS_CATEGORIES.values()) for category in group}
-"""Number of the class of each category of road users."""
+"""Index of the class of each category of road users."""
 
 GRID_STRIDE = 8
-"""Pillars along a side of the coarsest cell of the network: grids have a multiple of it."""
-
+"""Stride of the network's coarsest feature map in pillars; grids have a multiple of it along each side."""
 
 GROUND_ABOVE_BOTTOM = 1.0
 """Metres from the bottom of a detector's extent to the lowest road."""
@@ -38,13 +36,13 @@ HEADROOM = 4.5
 """Metres from the highest road to the top of a detector's extent."""
 
 
-def _require(checks: dict[str, bool]) -> None:
-    for sentence, holds in checks.items():
+def _require(rules: dict[str, bool]) -> None:
+    for rule, holds in rules.items():
         if not holds:
-            raise SeipError(f"detector: {sentence}")
+            raise SeipError(f"detector: {rule}")
 
 
-def _whole(value: object, least: int, most: int) -> bool:
+def _is_integer(value: object, least: int, most: int) -> bool:
     return isinstance(value, int) and least <= value <= most
 
 
@@ -57,17 +55,16 @@ class NetworkSettings:
     pillar : float, metres
         Side of a pillar.
     most_points : int
-        Points that a pillar keeps, chosen at random.
+        Maximum number of points per pillar; of more a random choice is kept.
     width : int
-        Channels of the pillars and of the first block; the second has twice, the third four times as many.
+        Channels of the pillar features and of the first block, doubled in the second and in the third.
     blocks : tuple of three int
-        Convolutions of each block after the one that halves its resolution.
+        Convolutions of each block after the one with stride 2.
     head : str
-        ``centre``: a heat map of centres for each class and one box in each cell (Yin, Zhou, Krähenbühl 2021).
-        ``anchor``: boxes of given sizes at 0 and 90 degrees in each cell (Lang et al. 2019).
+        ``centre``: a heat map of centres for each class and one box per cell (Yin, Zhou, Krähenbühl 2021).
+        ``anchor``: anchor boxes at 0 and 90 degrees in each cell (Lang et al. 2019).
     padded : bool
-        Whether the empty places of pillars count as points of nothing but zeros, as where padding is not masked:
-        to see what harm that does.
+        Whether pillars are filled up with zero points that are not masked, as an ablation.
     """
 
     pillar: float = setting(0.4, "side of a pillar in metres", unit="m", minimum=0.05, maximum=2.0, metavar="M")
@@ -78,17 +75,17 @@ class NetworkSettings:
     padded: bool = False
 
     def __post_init__(self) -> None:
-        checks = {
+        rules = {
             "a pillar must be 0.05 to 2 m wide": 0.05 <= self.pillar <= 2,
-            "a pillar must keep 1 to 32 points": _whole(self.most_points, 1, 32),
-            "the width must lie between 8 and 256 channels": _whole(self.width, 8, 256),
+            "a pillar must keep 1 to 32 points": _is_integer(self.most_points, 1, 32),
+            "the width must lie between 8 and 256 channels": _is_integer(self.width, 8, 256),
             "there must be three blocks of 0 to 20 convolutions": (
-                len(self.blocks) == 3 and all(_whole(count, 0, 20) for count in self.blocks)
+                len(self.blocks) == 3 and all(_is_integer(count, 0, 20) for count in self.blocks)
             ),
             "the head must be centre or anchor": self.head in {"centre", "anchor"},
             "padded must be true or false": isinstance(self.padded, bool),
         }
-        _require(checks)
+        _require(rules)
 
 
 PUBLISHED_NETWORK = NetworkSettings(pillar=0.24, most_points=32, width=64, blocks=(3, 5, 5), head="anchor")
@@ -102,23 +99,27 @@ class TrainingSettings:
     Parameters
     ----------
     steps : int
-        Updates of the weights at most.
+        Maximum number of weight updates.
     batch : int
-        Windows in each step, each from a configuration, a frame and a place of its own.
+        Windows per step, each of its own sensor configuration, frame and place.
     window : float, metres
-        Side of a window. Training on windows about road users wastes no time on the empty parts of the extent, and
-        many small ones are more different from each other than few large ones.
+        Side of a window. Windows around road users leave out the empty parts of the extent, and many small ones vary
+        more than few large ones.
     learning_rate : float
-        Largest of the cycle: one warm-up over 30 % of the steps, then a cosine to nothing (Smith 2018).
+        Maximum of the one-cycle schedule: warm-up over 30 % of the steps, then cosine annealing (Smith 2018).
+    weight_decay : float
+        Of AdamW.
     least_points : int
-        A road user with fewer returns is neither asked for nor held against the network.
+        Road users with fewer returns are left out of loss and validation, as targets and as false positives.
     validate_every : int
-        Steps from one validation to the next; the state is stored with each.
+        Steps between validations; each also stores a checkpoint.
     patience : int
-        Validations without improvement after which training stops.
+        Validations without improvement before training stops.
+    seed : int
+        Of the initial weights and the order of samples.
     threads : int
-        Of torch on the CPU. Sums depend on how they are split: the same number gives the same bytes. One is nearly
-        as quick as two on windows of this size, and far quicker where other work wants the second core.
+        CPU threads of torch. The number determines the order of sums, and so the exact result; one is nearly as fast
+        as two with windows of this size.
     """
 
     steps: int = setting(1800, "updates of the weights", minimum=1)
@@ -133,7 +134,7 @@ class TrainingSettings:
     threads: int = setting(1, "of torch on the CPU", minimum=1)
 
     def __post_init__(self) -> None:
-        checks = {
+        rules = {
             "training must have 1 step or more": self.steps >= 1,
             "a batch must have 1 window or more": self.batch >= 1,
             "a window must be 5 m wide or more": self.window >= 5,
@@ -145,4 +146,4 @@ class TrainingSettings:
             "the seed must be 0 or more": self.seed >= 0,
             "torch needs 1 thread or more": self.threads >= 1,
         }
-        _require(checks)
+        _require(rules)

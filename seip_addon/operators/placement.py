@@ -24,8 +24,8 @@ from ..core.workflows.survey import Layout, place, record_of
 from ..core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs, runs_in
 from ..scene.write import write_result
 from ..session import SceneSurvey
+from .base import ForReadyScene, LongWork, Outcome, attempt
 from .results import keep_result
-from .work import ForReadyScene, LongWork, Outcome, attempt
 
 _Placing = Callable[[Layout, VisibilityGrid], Generator[Progress, None, Solution]]
 
@@ -146,7 +146,7 @@ class SEIP_OT_remove_rule(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is a rule to remove."""
+        """Return whether there is a rule to remove."""
         goal = context.scene.seip.goal
         return goal.active_rule in range(len(goal.rules))
 

@@ -32,7 +32,7 @@ from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.write import coverage_of, recolour, show_seen_by, take_over
 from ..sensor_edits import position_names, sensor_edits
 from ..session import SceneSurvey, session
-from .work import LongWork, Outcome, attempt, begun
+from .base import LongWork, Outcome, attempt, started
 
 MOST_RANKED = 50
 EYE_DISTANCE = 10.0
@@ -44,7 +44,7 @@ class ForPlacement:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         sentence = scene_status.obstacle(context.scene) or no_placement(context.scene)
         if sentence:
             cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
@@ -163,7 +163,7 @@ class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         if not super().poll(context):
             return False
         sentence = not_evaluated(context.scene)
@@ -202,7 +202,7 @@ class SEIP_OT_drop_placement(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is one."""
+        """Return whether there is one."""
         seip = context.scene.seip
         return seip.active_kept in range(len(seip.kept))
 
@@ -346,11 +346,11 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
 
     bl_idname = "seip.export_result"
     bl_label = "Export"
-    stopped = "stopped; nothing was written"
+    stopped_message = "stopped; nothing was written"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         if not super().poll(context):
             return False
         sentence = no_folder(context.scene) or not_evaluated(context.scene)
@@ -362,7 +362,7 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
         """See that the folder can be written, save the scene as it is, and find the placement again."""
         self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
         check_folder(self._folder)
-        return begun(_exported(self._folder, scene))
+        return started(_exported(self._folder, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Say where the files are."""

@@ -12,7 +12,7 @@ from ..core.errors import SeipError
 from ..core.lidar import load_catalogue
 from ..session import session
 from ..viewport import beam_preview
-from .work import Outcome, attempt
+from .base import Outcome, attempt
 
 
 class SEIP_OT_list_sensor_types(bpy.types.Operator):
@@ -43,7 +43,7 @@ class SEIP_OT_add_catalogue(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Tell whether there are preferences to keep it in."""
+        """Return whether there are preferences to keep it in."""
         return _has_preferences(cls)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
@@ -77,7 +77,7 @@ class SEIP_OT_remove_catalogue(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Tell whether there are preferences."""
+        """Return whether there are preferences."""
         return _has_preferences(cls)
 
     def execute(self, _context: bpy.types.Context) -> Outcome:
@@ -104,7 +104,7 @@ class SEIP_OT_empty_cache(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Tell whether there is anything to delete, and nothing that needs it."""
+        """Return whether there is anything to delete, and nothing that needs it."""
         reason = "Wait for the work under way" if session.running is not None else preferences.why_not_empty()
         if reason:
             cls.poll_message_set(reason)

@@ -26,7 +26,7 @@ from ..scene.build import build_scene
 from ..scene.changes import watch
 from ..scene.check import contents_of
 from ..session import CheckedScene, session
-from .work import LongWork, Outcome, attempt
+from .base import LongWork, Outcome, attempt
 
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
@@ -87,7 +87,7 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether a map is chosen."""
+        """Return whether a map is chosen."""
         missing = missing_for_build(context.scene)
         if missing:
             cls.poll_message_set(missing)
@@ -162,7 +162,7 @@ class _RoleOperator:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether anything is selected."""
+        """Return whether anything is selected."""
         reason = why_no_role(context)
         if reason:
             cls.poll_message_set(reason)  # type: ignore[attr-defined]  # of Blender's operators
@@ -240,7 +240,7 @@ class SEIP_OT_add_area(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether objects can be added."""
+        """Return whether objects can be added."""
         reason = scene_status.LINKED if scene_status.is_linked(context.scene) else ""
         if not reason and context.mode != "OBJECT":
             reason = "Leave Edit Mode first"
@@ -322,7 +322,7 @@ class SEIP_OT_show_problem(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is an object to be shown."""
+        """Return whether there is an object to be shown."""
         nothing = nothing_to_show(context)
         if nothing:
             cls.poll_message_set(nothing)

@@ -29,8 +29,8 @@ from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
 from ..session import LastScan, SceneSurvey, SceneTraffic, session
+from .base import LongWork, Outcome, Result
 from .results import no_placement, not_evaluated
-from .work import LongWork, Outcome, Result
 
 INSTANTS = 60
 """Of traffic at which a placement is tried."""
@@ -72,7 +72,7 @@ class _Scanning(LongWork[Result]):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is anything to scan."""
+        """Return whether there is anything to scan."""
         sentence = why_no_scan(context.scene)
         if sentence:
             cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
@@ -87,7 +87,7 @@ class SEIP_OT_load_traffic(LongWork[LoadedTraffic], bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is a file to read."""
+        """Return whether there is a file to read."""
         reason = why_no_load(context.scene)
         if reason:
             cls.poll_message_set(reason)
@@ -118,7 +118,7 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is traffic."""
+        """Return whether there is traffic."""
         there = contract.find(context.scene, contract.TRAFFIC) is not None
         if not there:
             cls.poll_message_set("there is no traffic in the scene")
@@ -142,7 +142,7 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operat
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there are a placement and traffic."""
+        """Return whether there are a placement and traffic."""
         reason = why_no_trial(context.scene)
         if reason:
             cls.poll_message_set(reason)
@@ -229,7 +229,7 @@ class SEIP_OT_write_dataset(_Scanning[tuple[Record, tuple[str, ...]]], bpy.types
     bl_idname = "seip.write_dataset"
     bl_label = "Write Dataset"
     bl_options = {"REGISTER"}  # as above
-    stopped = "stopped; what is written stays, and the same run goes on from there"
+    stopped_message = "stopped; what is written stays, and the same run goes on from there"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Record, tuple[str, ...]]]:
         """Read what is recorded."""

@@ -21,11 +21,11 @@ from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of
 from ..scene.write import colour_coverage, coverage_of
 from ..session import SceneSurvey, session
-from ..viewport import coverage, layers
+from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
+from .base import LongWork, Outcome, attempt, started
 from .results import ForPlacement, not_evaluated
-from .work import LongWork, Outcome, attempt, begun
 
 NO_COVERAGE = "There is no coverage to show: place sensors first."
 
@@ -55,14 +55,14 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is coverage to colour."""
+        """Return whether there is coverage to colour."""
         return _can(cls, why_no_coverage(context.scene))
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Colour it."""
         outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
         if outcome == {"FINISHED"}:
-            layers.show(context.scene, coverage.NAME, coverage.coverage_overlay())
+            overlays.show(context.scene, coverage.NAME, coverage.coverage_overlay())
         return outcome
 
 
@@ -74,7 +74,7 @@ class SEIP_OT_show_coverage_colours(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether this is a view."""
+        """Return whether this is a view."""
         return isinstance(context.space_data, bpy.types.SpaceView3D)
 
     def execute(self, context: bpy.types.Context) -> Outcome:
@@ -91,15 +91,15 @@ class SEIP_OT_toggle_legend(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is coverage to explain."""
+        """Return whether there is coverage to explain."""
         return _can(cls, why_no_coverage(context.scene))
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Show it where it is hidden, and the other way round."""
-        if layers.find(context.scene, coverage.NAME) is None:
-            layers.show(context.scene, coverage.NAME, coverage.coverage_overlay())
+        if overlays.find(context.scene, coverage.NAME) is None:
+            overlays.show(context.scene, coverage.NAME, coverage.coverage_overlay())
         else:
-            layers.hide(context.scene, coverage.NAME)
+            overlays.hide(context.scene, coverage.NAME)
         return {"FINISHED"}
 
 
@@ -140,7 +140,7 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneSurvey], bpy.types.Op
         if pose is None:
             raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
         sight = sight_lines(site, pose, result.layout.models[key], result.grid.sees(pose))
-        layers.show(scene, SIGHT, sight_overlay(sight, self.sensor))
+        overlays.show(scene, SIGHT, sight_overlay(sight, self.sensor))
 
 
 class SEIP_OT_hide_sight_lines(bpy.types.Operator):
@@ -151,7 +151,7 @@ class SEIP_OT_hide_sight_lines(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Hide them."""
-        layers.hide(context.scene, SIGHT)
+        overlays.hide(context.scene, SIGHT)
         return {"FINISHED"}
 
 
@@ -169,14 +169,14 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operat
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
         return super().poll(context) and _can(cls, not_evaluated(context.scene))
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
         """Find the placement again, and render it where that is asked for."""
         self._path = _free(_named(scene.seip.view.picture))
         self._is_view = scene.seip.view.picture_of == "VIEW"
-        return scene_survey.with_placement(scene) if self._is_view else begun(_rendered_sheet(self._path, scene))
+        return scene_survey.with_placement(scene) if self._is_view else started(_rendered_sheet(self._path, scene))
 
     def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
         """Take the picture of a viewport."""

@@ -11,7 +11,7 @@ from .. import scene_survey
 from ..core.progress import Progress
 from ..core.workflows.survey import estimate
 from ..session import SceneSurvey, session
-from .work import ForReadyScene, LongWork
+from .base import ForReadyScene, LongWork
 
 
 class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):

@@ -60,7 +60,7 @@ class _Result(Sidebar):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether there is a placement."""
+        """Return whether there is a placement."""
         return not results.no_placement(context.scene)
 
 

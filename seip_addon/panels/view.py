@@ -16,7 +16,7 @@ from ..operators.view import (
 )
 from ..scene.write import ASPECT, coverage_of
 from ..session import session
-from ..viewport import coverage, layers
+from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from .run_button import draw_run, is_running
 from .sidebar import Sidebar
@@ -42,7 +42,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         column = self.layout.column(align=True)
         head = column.row()
         head.label(text="Coverage")
-        shown = layers.find(context.scene, coverage.NAME) is not None
+        shown = overlays.find(context.scene, coverage.NAME) is not None
         head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
         thing = coverage_of(context.scene)
         row = column.row(align=True)
@@ -60,7 +60,7 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
     def _draw_sight(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         column.label(text="Sight Lines")
-        overlay = layers.find(context.scene, SIGHT)
+        overlay = overlays.find(context.scene, SIGHT)
         row = column.row(align=True)
         words = "From Sensor" if overlay is None else overlay.about
         row.operator_menu_enum(SEIP_OT_show_sight_lines.bl_idname, "sensor", text=words, icon="LIGHT_SPOT")

@@ -29,7 +29,7 @@ def legend_of_coverage(scene: bpy.types.Scene) -> Block | None:
 
 
 def shows_coverage(space: bpy.types.SpaceView3D) -> bool:
-    """Tell whether a view's shading shows the colours of the coverage."""
+    """Return whether a view's shading shows the colours of the coverage."""
     shading = space.shading
     return shading.type in {"MATERIAL", "RENDERED"} or (shading.type == "SOLID" and shading.color_type in SHOWN_BY)
 

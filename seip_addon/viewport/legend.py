@@ -34,7 +34,7 @@ def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.typ
 
 def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: float) -> None:
     """Draw the legend with its lower right corner at a place in pixels."""
-    import blf  # noqa: PLC0415  # of use only where there is a screen
+    import blf  # noqa: PLC0415  # not available in background mode
 
     if not blocks:
         return
@@ -78,7 +78,7 @@ def _write(words: str, x: float, y: float, scale: float) -> None:
 
 def _fill(x: float, y: float, width: float, height: float, colours: tuple[Colour, ...]) -> None:
     """Fill a rectangle with a colour on the left that runs into one on the right."""
-    import gpu  # noqa: PLC0415  # is not there in the background
+    import gpu  # noqa: PLC0415  # not available in background mode
     from gpu_extras.batch import batch_for_shader  # noqa: PLC0415  # as above
 
     left, right = colours

@@ -7,8 +7,8 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from .layers import draw_layers, legend_blocks
 from .legend import MARGIN, draw_legend_at
+from .overlays import draw_overlays, legend_blocks
 
 WIDTH = 1920
 """Pixels."""
@@ -22,7 +22,7 @@ def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint
     area : bpy.types.Area
         A 3D viewport.
     """
-    import gpu  # noqa: PLC0415  # is not there in the background
+    import gpu  # noqa: PLC0415  # not available in background mode
 
     region = next(region for region in area.regions if region.type == "WINDOW")
     space = area.spaces.active
@@ -48,7 +48,7 @@ def _draw_over(scene: bpy.types.Scene, view: Matrix, projection: Matrix, height:
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_matrix(view)
         gpu.matrix.load_projection_matrix(projection)
-        draw_layers(scene)
+        draw_overlays(scene)
         gpu.matrix.load_matrix(Matrix.Identity(4))
         gpu.matrix.load_projection_matrix(_pixels(WIDTH, height))
         draw_legend_at(legend_blocks(scene), WIDTH - MARGIN, MARGIN, scale)

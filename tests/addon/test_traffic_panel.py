@@ -13,7 +13,7 @@ from seip_addon.core.results.placement_record import load_placement_record
 from seip_addon.core.scans import Frame
 from seip_addon.scene.write import write_result
 from seip_addon.session import session
-from seip_addon.viewport import layers
+from seip_addon.viewport import overlays
 from seip_addon.viewport.point_cloud import NAME as CLOUD
 from tests.scene_by_hand import make_scene
 from tests.small_junction import ORIGIN, make_example
@@ -108,14 +108,14 @@ def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
     seen = []
     for by in ("sensor", "intensity", "instance"):
         placed.seip.view.cloud_colour = by
-        (layer,) = layers.find(placed, CLOUD).layers
+        (layer,) = overlays.find(placed, CLOUD).layers
         assert layer.colours.shape == (len(frame), 4)
         assert layer.colours.dtype == np.float32
         seen.append(layer.colours)
     assert not np.array_equal(seen[0], seen[1])
     assert len(np.unique(seen[0], axis=0)) == 2
     bpy.ops.seip.hide_scan()
-    assert layers.drawing() == 0
+    assert overlays.handler_count() == 0
 
 
 def test_animated_objects_are_scanned_as_the_file_is(placed):

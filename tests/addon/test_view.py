@@ -1,4 +1,4 @@
-"""What the viewport shows: colours of the coverage, sight lines, and layers that are always removed."""
+"""What the viewport shows: colours of the coverage, sight lines, and overlays that are always removed."""
 
 import bpy
 import numpy as np
@@ -8,7 +8,7 @@ from PIL import Image
 import seip_addon
 from seip_addon.scene import render
 from seip_addon.session import session
-from seip_addon.viewport import layers
+from seip_addon.viewport import overlays
 from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
 from seip_addon.viewport.sight_lines import NAME as SIGHT
 
@@ -24,7 +24,7 @@ def test_nothing_can_be_shown_before_a_placement(junction):
         bpy.ops.seip.colour_coverage()
     with pytest.raises(RuntimeError, match="There is no placement yet: place sensors first"):
         bpy.ops.seip.show_sight_lines()
-    assert layers.drawing() == 0
+    assert overlays.handler_count() == 0
 
 
 @pytest.mark.parametrize("aspect", ["seen", "times", "weights"])
@@ -33,14 +33,14 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
     block = legend_of_coverage(placed)
     shares = [float(entry.words.split()[-1].rstrip("%")) for entry in block.entries]
     assert sum(shares) == pytest.approx(100.0, abs=0.3)
-    assert layers.drawing() == 2
+    assert overlays.handler_count() == 2
 
 
 def test_sight_lines_are_the_row_of_the_grid(placed):
     held = session.survey_of(placed)
     sensor = held.solution.deployment.sensors[1]
     assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
-    overlay = layers.find(placed, SIGHT)
+    overlay = overlays.find(placed, SIGHT)
     faces, lines = overlay.layers
     row = held.grid.visible[sensor.pose]
     assert len(lines.positions) == 2 * row.sum()
@@ -71,10 +71,10 @@ def test_undo_takes_colours_and_legend_back(placed):
 def test_draw_handlers_are_always_removed(placed, ending):
     bpy.ops.seip.colour_coverage(aspect="times")
     bpy.ops.seip.show_sight_lines(sensor="S1")
-    assert layers.drawing() == 2
+    assert overlays.handler_count() == 2
     if ending == "toggle":
         bpy.ops.seip.toggle_legend()
-        assert layers.drawing() == 2
+        assert overlays.handler_count() == 2
         bpy.ops.seip.hide_sight_lines()
     elif ending == "another file":
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -83,8 +83,8 @@ def test_draw_handlers_are_always_removed(placed, ending):
     else:
         other = bpy.data.scenes.new("other")
         bpy.data.scenes.remove(placed)
-        layers.hide(other, SIGHT)
-    assert layers.drawing() == 0
+        overlays.hide(other, SIGHT)
+    assert overlays.handler_count() == 0
     if ending == "unregister":
         seip_addon.register()
 
@@ -110,8 +110,8 @@ def test_a_picture_of_a_viewport_needs_one(placed, tmp_path):
 def test_another_scene_shows_nothing_of_this_one(placed):
     bpy.ops.seip.colour_coverage(aspect="times")
     other = bpy.data.scenes.new("other")
-    assert layers.overlays(other) == []
-    assert len(layers.overlays(placed)) == 1
+    assert overlays.overlays_of(other) == []
+    assert len(overlays.overlays_of(placed)) == 1
 
 
 def test_a_view_that_hides_the_colours_is_set_in_one_click(placed):

@@ -13,7 +13,7 @@ from seip_addon import live_coverage, preferences, registration, scene_status, s
 from seip_addon.background import Background
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import parsed_record
-from seip_addon.operators import results, work
+from seip_addon.operators import base, results
 from seip_addon.panels import missing_package
 from seip_addon.panels import placement as placement_panel
 from seip_addon.panels import results as results_panel
@@ -176,7 +176,7 @@ def endless():
 def test_work_under_way_ends_with_the_add_on(add_on):
     running = session.running = RunningWork("seip.check_site", Background(endless()))
     running.timer = bpy.context.window_manager.event_timer_add(1.0, window=bpy.context.window)
-    work.detach()
+    base.detach()
     assert session.running is None
     assert running.timer is None
     assert running.work.join(5.0)

@@ -137,7 +137,7 @@ def test_mmdetection3d_numbers_its_classes_in_order(tmp_path):
 
 
 def test_pcd_header():
-    points = np.zeros((3, 4), dtype="<f4").view(pcd.FIELDS)[:, 0]
+    points = np.zeros((3, 4), dtype="<f4").view(pcd.POINT_TYPE)[:, 0]
     head, data = pcd.encode(points).split(b"DATA binary\n")
     assert head.decode().splitlines()[1:] == [
         "VERSION 0.7",

@@ -152,7 +152,7 @@ def test_what_is_known_costs_nothing():
     output = perfect_output(wanted, GRID)
     row, column = torch.nonzero(output[0, CAR] > 0)[0].tolist()
     told = output[:, len(CLASSES) :, row, column].clone()
-    middles = centre_head.cell_bottoms(GRID, torch.tensor([row]), torch.tensor([column]))
+    middles = centre_head.reference_points(GRID, torch.tensor([row]), torch.tensor([column]))
     parts = centre_head.box_losses(told, wanted.boxes, middles, torch.ones(1))
     for name in ("offset", "size", "axis"):
         assert float(parts[name]) < 1e-5

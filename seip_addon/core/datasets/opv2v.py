@@ -1,8 +1,7 @@
-r"""The format of OPV2V, which OpenCOOD reads: each sensor is an agent that shares what it sees.
+r"""The OPV2V format, as OpenCOOD reads it: each sensor is an agent with its own point clouds and labels.
 
-OpenCOOD stands on CARLA's left-handed axes (x forward, y **right**, z up): with M = diag(1, −1, 1), a place p here is
-M p there and a rotation R is M R M. A pose is x, y, z in metres and roll, yaw, pitch in degrees, of which the
-rotation is [1]_
+OpenCOOD uses CARLA's left-handed axes (x forward, y **right**, z up): with M = diag(1, −1, 1), a point p becomes M p
+and a rotation R becomes M R M. A pose is x, y, z in metres and roll, yaw, pitch in degrees, with the rotation [1]_
 
 .. math::
    \begin{pmatrix}
@@ -11,8 +10,8 @@ rotation is [1]_
    s_p & -c_p s_r & c_p c_r
    \end{pmatrix}
 
-Clouds are in the axes of their sensor, with the intensity in the red channel of a packed colour, 8 bits. Agents are
-numbered as the sensors are, from 0: a negative number would make it one that cannot be the ego vehicle.
+Clouds are in their sensor's frame, with the intensity as the 8-bit red channel of a packed colour. Agents have the
+indices of the sensors, from 0: OpenCOOD takes negative numbers for roadside units, which cannot be the ego.
 
 .. [1] R. Xu et al., "OPV2V: An Open Benchmark Dataset and Fusion Pipeline for Perception with Vehicle-to-Vehicle
    Communication", ICRA 2022; OpenCOOD, opencood/utils/transformation_utils.py.
@@ -27,24 +26,23 @@ from functools import partial
 import numpy as np
 
 from ..arrays import Float
+from . import pcd
 from .format_interface import Format
-from .pcd import encode
 from .sample import Sample, SensorPose, TrafficRun, subset
 
 CLASSES = {"car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus"}
-"""OpenCOOD knows one class, the vehicle; two-wheelers and pedestrians are none."""
+"""OpenCOOD has a single class, vehicles, without two-wheelers and pedestrians."""
 
 SPLIT_FOLDERS = {"train": "train", "val": "validate", "test": "test"}
-MAX_AGENTS = 7
-MAX_AGENT_DISTANCE = 70.0
-"""What OpenCOOD takes by default: agents, and metres from the ego in plan."""
+MAX_AGENTS, MAX_AGENT_DISTANCE = 7, 70.0
+"""OpenCOOD's defaults of max_cav, and of COM_RANGE: metres in plan from the ego."""
 
-FIELDS = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4")])
-MIRROR = np.array([1.0, -1.0, 1.0])
+POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4")])
+MIRROR = np.array([1.0, -1.0, 1.0])  # the diagonal of M
 
 
 def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
-    """Return the cloud and the labels of each agent, ``SPLIT/RUN/AGENT/FRAME``."""
+    """Return the writers of each agent's cloud and labels, by path: ``SPLIT/RUN/AGENT/FRAME.pcd`` and ``.yaml``."""
     run = sample.run
     files: dict[str, Callable[[], bytes]] = {}
     for number in range(len(run.sensors)):
@@ -60,32 +58,35 @@ def left_handed_pose(xyz: Float, orientation: Float) -> list[float]:
     Parameters
     ----------
     xyz : (3,) float64, metres
-        In right-handed axes.
+        Position in right-handed axes.
     orientation : (3, 3) float64
-        Rotation to these axes.
+        Rotation from the sensor's frame to these axes.
     """
-    turn = MIRROR[:, None] * orientation * MIRROR
-    pitch = math.atan2(turn[2, 0], math.hypot(turn[2, 1], turn[2, 2]))
-    if math.hypot(turn[2, 1], turn[2, 2]) > 1e-9:  # below that x points straight up or down
-        roll, yaw = math.atan2(-turn[2, 1], turn[2, 2]), math.atan2(turn[1, 0], turn[0, 0])
-    else:
-        roll, yaw = 0.0, math.atan2(-turn[0, 1], turn[1, 1])
+    rotation = MIRROR[:, None] * orientation * MIRROR
+    cos_pitch = math.hypot(rotation[2, 1], rotation[2, 2])
+    pitch = math.atan2(rotation[2, 0], cos_pitch)
+    if cos_pitch > 1e-9:
+        roll, yaw = math.atan2(-rotation[2, 1], rotation[2, 2]), math.atan2(rotation[1, 0], rotation[0, 0])
+    else:  # gimbal lock: only the sum or difference of roll and yaw is known
+        roll, yaw = 0.0, math.atan2(-rotation[0, 1], rotation[1, 1])
     return [*(xyz * MIRROR).tolist(), *(math.degrees(angle) for angle in (roll, yaw, pitch))]
 
 
 def notes(run: TrafficRun) -> tuple[str, ...]:
-    """Name the agents that OpenCOOD would leave out."""
+    """Return warnings about agents that OpenCOOD ignores by default."""
     ego = run.sensors[0]
     far = [sensor.label for sensor in run.sensors if _distance(sensor, ego) > MAX_AGENT_DISTANCE]
-    found = []
+    warnings = []
     if len(run.sensors) > MAX_AGENTS:
-        found.append(f"there are {len(run.sensors)} agents; set max_cav to that, or OpenCOOD takes {MAX_AGENTS} alone")
+        warnings.append(
+            f"there are {len(run.sensors)} agents; set max_cav to that, or OpenCOOD takes {MAX_AGENTS} alone"
+        )
     if far:
-        found.append(
+        warnings.append(
             f"{', '.join(far)}: farther than {MAX_AGENT_DISTANCE:g} m from {ego.label}, the ego; OpenCOOD leaves them "
             "out unless COM_RANGE is raised"
         )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def _distance(sensor: SensorPose, other: SensorPose) -> float:
@@ -94,38 +95,34 @@ def _distance(sensor: SensorPose, other: SensorPose) -> float:
 
 def _cloud(sample: Sample, number: int) -> bytes:
     sensor, frame = sample.run.sensors[number], sample.frame
-    mine = frame.sensor == number
-    own = (frame.points[mine].astype(np.float64) - sensor.xyz) @ sensor.orientation * MIRROR
-    red = np.round(np.clip(frame.intensity[mine], 0.0, 1.0) * 255).astype("<u4")
-    points = np.empty(len(own), dtype=FIELDS)
-    points["x"], points["y"], points["z"] = own.T
+    own = frame.sensor == number
+    xyz = (frame.points[own].astype(np.float64) - sensor.xyz) @ sensor.orientation * MIRROR
+    red = np.round(np.clip(frame.intensity[own], 0.0, 1.0) * 255).astype("<u4")
+    points = np.empty(len(xyz), dtype=POINT_TYPE)
+    points["x"], points["y"], points["z"] = xyz.T
     points["rgb"] = (red << np.uint32(16)).astype("<u4").view("<f4")
-    return encode(points)
+    return pcd.encode(points)
 
 
 def _labels(sample: Sample, number: int) -> bytes:
-    """Return an agent's file: its pose, and of the vehicles those that it has returns from.
-
-    A vehicle that is written though no sensor sees it is in every agent's.
-    """
+    """Return an agent's YAML: its pose, and the vehicles with returns from it or from no sensor at all."""
     sensor, boxes = sample.run.sensors[number], sample.boxes
-    seen = (boxes.points[:, number] > 0) | (boxes.points.sum(axis=1) == 0)
+    listed = (boxes.points[:, number] > 0) | (boxes.points.sum(axis=1) == 0)
     pose = left_handed_pose(sensor.xyz, sensor.orientation)
-    keys = ("lidar_pose", "true_ego_pos", "predicted_ego_pos")
-    lines = [f"{key}: {_list(pose)}" for key in keys]
-    lines += ["ego_speed: 0.0", "vehicles:" if seen.any() else "vehicles: {}"]
-    mine = subset(boxes, seen)
-    for row, user in enumerate(mine.user):
-        half = mine.size[row] / 2
-        up = np.array([0.0, 0.0, half[2]])
+    lines = [f"{key}: {_list(pose)}" for key in ("lidar_pose", "true_ego_pos", "predicted_ego_pos")]
+    lines += ["ego_speed: 0.0", "vehicles:" if listed.any() else "vehicles: {}"]
+    vehicles = subset(boxes, listed)
+    for row, user in enumerate(vehicles.user):
+        half_size = vehicles.size[row] / 2
+        centre_offset = np.array([0.0, 0.0, half_size[2]])  # from the ground, where OPV2V locates a vehicle
         lines += [
             f"  {user}:",
-            f"    angle: {_list([0.0, -math.degrees(mine.yaw[row]), math.degrees(mine.pitch[row])])}",
-            f"    center: {_list(up)}",
-            f"    extent: {_list(half)}",
-            f"    location: {_list((mine.centre[row] - up) * MIRROR)}",
-            f"    obj_type: {CLASSES[str(mine.category[row])]}",
-            f"    speed: {_number(mine.speed[row] * 3.6)}",
+            f"    angle: {_list([0.0, -math.degrees(vehicles.yaw[row]), math.degrees(vehicles.pitch[row])])}",
+            f"    center: {_list(centre_offset)}",
+            f"    extent: {_list(half_size)}",
+            f"    location: {_list((vehicles.centre[row] - centre_offset) * MIRROR)}",
+            f"    obj_type: {CLASSES[str(vehicles.category[row])]}",
+            f"    speed: {_number(vehicles.speed[row] * 3.6)}",
         ]
     return ("\n".join(lines) + "\n").encode()
 
@@ -135,7 +132,7 @@ def _list(values: Sequence[float] | Float) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number without an exponent, which YAML would read as text, to the nanometre."""
+    """Return a number with nine decimals and no exponent, which PyYAML would read as text."""
     return f"{round(float(value), 9) + 0.0:.9f}"
 
 

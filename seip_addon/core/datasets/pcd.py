@@ -17,7 +17,7 @@ from .format_interface import Format
 from .sample import Sample, TrafficRun, cloud
 
 MERGED = "merged"
-FIELDS = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
+POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
 
 
 def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
@@ -25,10 +25,10 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
     points = cloud(sample.frame)
 
     def only(number: int) -> Callable[[], bytes]:
-        return lambda: encode(points[sample.frame.sensor == number].view(FIELDS)[:, 0])
+        return lambda: encode(points[sample.frame.sensor == number].view(POINT_TYPE)[:, 0])
 
     labels = [sensor.label for sensor in sample.run.sensors]
-    clouds = {MERGED: lambda: encode(points.view(FIELDS)[:, 0])}
+    clouds = {MERGED: lambda: encode(points.view(POINT_TYPE)[:, 0])}
     clouds |= {label: only(number) for number, label in enumerate(labels)}
     run = sample.run
     return {f"{run.split}/{run.name}/{folder}/{sample.frame_id}.pcd": content for folder, content in clouds.items()}

@@ -30,7 +30,7 @@ from ..progress import Progress
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-ITERATIONS = 1000
+MAX_ITERATIONS = 1000
 PATIENCE = 20
 STEP_REDUCTION = 0.7
 DEFLECTION = 0.85
@@ -215,7 +215,7 @@ def lagrangian_bound(
     goal: float,
     clock: Clock,
     start: Float | None = None,
-    iterations: int = ITERATIONS,
+    iterations: int = MAX_ITERATIONS,
     layers: Float | None = None,
 ) -> Generator[Progress, None, tuple[Integer, Bound]]:
     """Search for multipliers with a small bound by deflected subgradients.

@@ -1,17 +1,17 @@
-r"""Upper bounds by Lagrangian decomposition into parts, for many sensors.
+r"""Upper bounds on coverage by Lagrangian decomposition of the candidates into parts, for many sensors.
 
-The linear relaxation counts a target twice that two sensors see. Here the
-candidates are divided into parts, and only a target that several parts
-see is relaxed: with multipliers :math:`0 \le \lambda_j \le w_j`,
+The linear relaxation is weak where sensors overlap. Here the candidates are
+partitioned, and only targets that several parts see are relaxed: with
+multipliers :math:`0 \le \lambda_j \le w_j`,
 
 .. math::
     L(\lambda) = \sum_j (w_j - \lambda_j) + \max_{\sum_d m_d \le N} \sum_d F_d(m_d),
 
-where :math:`F_d(m)` bounds what m sensors of part d cover together of the
-weights :math:`\lambda`: for one and two it is the best choice itself, for more
-the smaller of :math:`m/2` times the best two (coverage is submodular) and all
-that the part sees. This is Lagrangian decomposition (Guignard and Kim 1987) with
-overlaps kept within the parts.
+where :math:`F_d(m)` bounds the weight :math:`\lambda` that m sensors of part d
+cover: the optimum for one and two sensors; for more the smaller of :math:`m/2`
+times the optimum for two (coverage is submodular) and the weight of all
+targets of the part. This is Lagrangian decomposition (Guignard and Kim 1987)
+with overlaps within a part kept in its subproblem.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from .greedy import greedy
 from .reduced_problem import Instance, Numbers
 from .search_limits import Clock
 
-ITERATIONS = 2000
+MAX_ITERATIONS = 2000
 
 SENSORS_PER_PART = 1.8
-"""So many sensors there are for each part: of two their overlap is known."""
+"""Sensors of a placement for each part; about two, as the overlap of pairs is computed exactly."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Candidates near each other.
+    """Part of the partition: n candidates, and the s targets that any of them sees.
 
     Parameters
     ----------
     targets : (s,) int64
-        Those that any of them sees.
     matrix : (n, s) float
+        1 where a candidate sees a target, else 0.
     excluded : (n, n) bool
-        Pairs that cannot be chosen together, everyone with itself included.
+        Pairs that cannot be chosen together, each candidate with itself included.
     """
 
     targets: Integer
@@ -53,48 +53,49 @@ class _Part:
     excluded: Boolean
 
     def values(self, multipliers: Float, count: int) -> tuple[Float, list[Float]]:
-        """Return F for no sensor up to ``count``, and how often each target counts in it for 1, 2 and all."""
+        """Return F(0) … F(count), and the targets (s,) seen by the best one, the best two and all, as 0 or 1."""
         weight = multipliers[self.targets].astype(self.matrix.dtype)
-        score = self.matrix @ weight
-        first = int(np.argmax(score))
-        on_top = np.where(self.excluded[first], 0.0, score - self.matrix @ (weight * self.matrix[first]))
-        # with a partner of a smaller score no pair is better than the best with the first
-        rows = np.flatnonzero(score >= on_top.max())
-        pairs = score[rows, None] + score[rows] - (self.matrix[rows] * weight) @ self.matrix[rows].T
+        covered = self.matrix @ weight
+        first = int(np.argmax(covered))
+        gain = np.where(self.excluded[first], 0.0, covered - self.matrix @ (weight * self.matrix[first]))
+        # a pair with a candidate that covers less than the greatest gain is no better than the best pair with `first`
+        rows = np.flatnonzero(covered >= gain.max())
+        pairs = covered[rows, None] + covered[rows] - (self.matrix[rows] * weight) @ self.matrix[rows].T
         pairs[self.excluded[np.ix_(rows, rows)]] = 0.0
         one, other = np.unravel_index(int(np.argmax(pairs)), pairs.shape)
-        best_two = max(float(pairs[one, other]), float(score[first]))
+        best_two = max(float(pairs[one, other]), float(covered[first]))
         seen_by_two = np.maximum(self.matrix[rows[one]], self.matrix[rows[other]])
-        if best_two == score[first]:
+        if best_two == covered[first]:
             seen_by_two = self.matrix[first]
         number = np.arange(count + 1)
         value = np.minimum(best_two * np.maximum(number, 2) / 2, float(weight.sum(dtype=np.float64)))
-        value[:2] = 0.0, score[first]
+        value[:2] = 0.0, covered[first]
         return value, [self.matrix[first], seen_by_two, np.ones(len(self.targets))]
 
 
 def decomposition_bound(
     instance: Instance, goal: float, clock: Clock, seconds: float
 ) -> Generator[Progress, None, float]:
-    """Return a weight that no placement exceeds, the budget and the mandatory groups aside.
+    """Return an upper bound on the covered weight of placements, without the budget and the mandatory groups.
 
     Parameters
     ----------
     goal : float
-        The search ends when the bound falls below.
+        Covered weight; the descent stops once the bound is below it.
     seconds : float
-        Longest time to search.
+        Maximum time, in units of work where the clock counts these.
     """
-    parts = _parts(instance)
+    parts = _partition(instance)
     end = clock.elapsed + min(seconds, clock.left)
-    shared = np.zeros(len(instance.weight))
+    parts_seeing = np.zeros(len(instance.weight))
     for part in parts:
-        shared[part.targets] += 1
-    descent = SubgradientDescent(_bound(instance, parts, instance.weight / np.maximum(shared, 1)), instance.total)
-    for iteration in range(ITERATIONS):
+        parts_seeing[part.targets] += 1
+    start = _bound(instance, parts, instance.weight / np.maximum(parts_seeing, 1))
+    descent = SubgradientDescent(start, instance.total)
+    for iteration in range(MAX_ITERATIONS):
         if descent.best.value < goal - instance.margin or descent.step < MIN_STEP or clock.elapsed > end:
             break
-        yield Progress(iteration, ITERATIONS, "bounding by parts of the candidates")
+        yield Progress(iteration, MAX_ITERATIONS, "bounding by parts of the candidates")
         clock.spend(6 * sum(part.matrix.size for part in parts))
         multipliers, seen = descent.current.multipliers, descent.current.seen
         change = descent.move(np.where(multipliers < instance.weight, seen - 1.0, np.maximum(seen - 1.0, 0.0)), goal)
@@ -105,15 +106,15 @@ def decomposition_bound(
     return _bound(instance, precise, descent.best.multipliers).value
 
 
-def _parts(instance: Instance) -> list[_Part]:
-    """Part the candidates around the first of a greedy choice, each clique where it overlaps most."""
+def _partition(instance: Instance) -> list[_Part]:
+    """Assign each clique of candidates to the greedily chosen candidate that it overlaps most."""
     number = max(1, round(instance.count / SENSORS_PER_PART))
-    free = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
-    centres = greedy(free, np.zeros(0, np.int64))
+    unconstrained = replace(instance, count=number, budget=math.inf, mandatory=np.zeros((0, len(instance)), bool))
+    centres = greedy(unconstrained, np.zeros(0, np.int64))
     overlap = instance.gains((instance.visible[centres] * instance.weight).T)
-    shared = np.zeros((int(instance.clique.max()) + 1, len(centres)))
-    np.add.at(shared, instance.clique, overlap)
-    nearest = shared.argmax(axis=1)[instance.clique]
+    clique_overlap = np.zeros((int(instance.clique.max()) + 1, len(centres)))
+    np.add.at(clique_overlap, instance.clique, overlap)
+    nearest = clique_overlap.argmax(axis=1)[instance.clique]
     return [_part(instance, np.flatnonzero(nearest == index)) for index in np.unique(nearest)]
 
 
@@ -125,7 +126,7 @@ def _part(instance: Instance, members: Integer) -> _Part:
 
 @dataclass(frozen=True, eq=False)
 class _PartsBound:
-    """L at some multipliers, and how often each target counts in it."""
+    """The bound L(λ), its multipliers λ, and how often each target counts in Σ F; arrays (t,) float64."""
 
     value: float
     multipliers: Float
@@ -134,29 +135,31 @@ class _PartsBound:
 
 def _bound(instance: Instance, parts: list[_Part], multipliers: Float) -> _PartsBound:
     found = [part.values(multipliers, instance.count) for part in parts]
-    value, numbers = _share_out(np.array([values for values, _ in found]))
+    value, counts = _allocate(np.array([values for values, _ in found]))
     seen = np.zeros(len(multipliers))
-    for part, (values, counted), number in zip(parts, found, numbers, strict=True):
-        if number == 1:
-            seen[part.targets] += counted[0]
-        elif number > 1 and values[number] == values[2] * number / 2:
-            seen[part.targets] += counted[1] * number / 2
-        elif number > 1:
-            seen[part.targets] += counted[2]
+    for part, (values, (by_one, by_two, by_all)), count in zip(parts, found, counts, strict=True):
+        if count == 1:
+            seen[part.targets] += by_one
+        elif count > 1:
+            limited_by_pairs = values[count] == values[2] * count / 2
+            seen[part.targets] += by_two * count / 2 if limited_by_pairs else by_all
     return _PartsBound(math.fsum(instance.weight - multipliers) + value, multipliers, seen)
 
 
-def _share_out(values: Float) -> tuple[float, list[int]]:
-    """Return the largest sum of one value of each row, the columns adding up to the last at most, and the columns."""
-    best, taken = np.zeros(values.shape[1]), []
+def _allocate(values: Float) -> tuple[float, list[int]]:
+    """Return the largest total value of N sensors over all parts, and the number in each, by dynamic programming.
+
+    ``values`` (parts, N + 1) float64 has the value of 0 … N sensors in each part.
+    """
+    best, choices = np.zeros(values.shape[1]), []
     for row in values:
         sums = np.full((len(row), len(row)), -np.inf)
-        for number, value in enumerate(row):
-            sums[number:, number] = best[: len(row) - number] + value
-        taken.append(sums.argmax(axis=1))
+        for count, value in enumerate(row):
+            sums[count:, count] = best[: len(row) - count] + value
+        choices.append(sums.argmax(axis=1))
         best = sums.max(axis=1)
-    left, numbers = len(best) - 1, []
-    for choice in reversed(taken):
-        numbers.append(int(choice[left]))
-        left -= numbers[-1]
-    return float(best[-1]), numbers[::-1]
+    left, counts = len(best) - 1, []
+    for choice in reversed(choices):
+        counts.append(int(choice[left]))
+        left -= counts[-1]
+    return float(best[-1]), counts[::-1]

@@ -21,7 +21,7 @@ from ..lidar import LidarModel, find_models
 from ..progress import REPORT_INTERVAL, Progress
 from ..site.site import Site
 from .chunks import Rows, sharing_rays
-from .executors import VisibilityTask, threads_of
+from .executors import VisibilityTask, thread_executor
 from .ray_casting import Engine, engine_name
 from .settings import VisibilitySettings
 from .triangle_culling import needed_triangles
@@ -98,7 +98,7 @@ def estimate_visibility(
     task = VisibilityTask(site, used, settings, engine_name(engine), needed.keep)
     everywhere = sharing_rays(poses.xyz, poses.yaw, poses.tilt)
     drawn = [everywhere[place] for place in _spread_lot(len(everywhere), seed)]
-    with threads_of(task, threads) as submit:
+    with thread_executor(task, threads) as submit:
         setting_up = time.perf_counter() - began
         yield Progress(1, 2, "sample for the estimate")
         sample = yield from _compute_from(drawn, submit)

@@ -1,4 +1,4 @@
-"""Executors for chunks of the visibility grid: threads or a Dask cluster."""
+"""Executors that compute chunks of the visibility grid: local threads or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .settings import VisibilitySettings
 from .visibility_model import VisibilityModel
 
 Submit = Callable[[Integer], Future[Rows]]
+"""Submits the pose indices of a chunk, (n,) int64; the future holds their rows of the grid."""
 
-_RAYS_BETWEEN_CHECKS = 1 << 15  # a tenth of a second's work or less
-_ANSWER_SECONDS = 20
-_MAX_LOST_WORKERS = 3  # so many die over one chunk before the chunk is held to be the cause
+_RAYS_BETWEEN_CHECKS = 1 << 15  # at most a tenth of a second's work
+_CONNECT_TIMEOUT = 20  # seconds
 
 
 @dataclass(frozen=True, eq=False)
 class VisibilityTask:
-    """Inputs of rows of a visibility grid, to be sent to workers.
+    """Inputs of the rows of a visibility grid, picklable for workers.
 
     Parameters
     ----------
     engine : {"bvh", "embree"}
     keep : (n,) bool
-        Which triangles of the site rays are cast against.
+        Triangles of the site that can affect the grid; rays are cast against these only.
     """
 
     site: Site
@@ -48,41 +48,41 @@ class VisibilityTask:
         """Return a new ray caster of the site's triangles."""
         return make_ray_caster(self.site.triangles, self.engine, self.keep)
 
-    def rows_by(self, caster: RayCaster) -> Callable[[Integer], Rows]:
-        """Return the function that computes the rows of poses."""
+    def row_function(self, caster: RayCaster) -> Callable[[Integer], Rows]:
+        """Return the function from pose indices (n,) to their rows of the grid."""
         model = VisibilityModel(self.site, self.settings, caster)
         return lambda poses: compute_rows(model, self.site.candidates, self.models, poses)
 
 
 @contextmanager
-def threads_of(task: VisibilityTask, threads: int | None = None) -> Iterator[Submit]:
-    """Yield what starts the work on a chunk in a thread of this process; unfinished work ends with the block, soon.
+def thread_executor(task: VisibilityTask, threads: int | None = None) -> Iterator[Submit]:
+    """Yield a function that submits chunks to threads of this process; leaving the block cancels unfinished chunks.
 
     Parameters
     ----------
     threads : int, optional
-        How many work at once at most.
+        Maximum number of threads; by default as many as the ray caster can use.
     """
     stop = threading.Event()
     caster = StoppableCaster(task.ray_caster(), stop)
-    rows = task.rows_by(caster)
+    compute = task.row_function(caster)
     pool = ThreadPoolExecutor(min(caster.threads, threads or caster.threads))
     try:
-        yield lambda poses: pool.submit(rows, poses)
+        yield lambda poses: pool.submit(compute, poses)
     finally:
         stop.set()
         pool.shutdown(cancel_futures=True)
 
 
 class StoppableCaster:
-    """A ray caster that can be stopped: it casts some rays at a time.
+    """Ray caster that works in batches and can be stopped between them.
 
     Parameters
     ----------
     caster : RayCaster
-        That does it.
+        Casts each batch.
     stop : Event
-        Casting raises `CancelledError` once this is set.
+        Once set, casting raises `CancelledError`.
     """
 
     def __init__(self, caster: RayCaster, stop: threading.Event) -> None:
@@ -95,26 +95,26 @@ class StoppableCaster:
         for begin in range(0, max(len(directions), 1), _RAYS_BETWEEN_CHECKS):
             if self._stop.is_set():
                 raise CancelledError
-            some = slice(begin, begin + _RAYS_BETWEEN_CHECKS)
-            hits.append(self._caster.cast(origin if origin.ndim == 1 else origin[some], directions[some], max_range))
+            batch = slice(begin, begin + _RAYS_BETWEEN_CHECKS)
+            hits.append(self._caster.cast(origin if origin.ndim == 1 else origin[batch], directions[batch], max_range))
         distance, triangle = zip(*hits, strict=True)
         return np.concatenate(distance), np.concatenate(triangle)
 
 
 @contextmanager
-def cluster(address: str, task: VisibilityTask) -> Iterator[Submit]:
-    """Yield what starts the work on a chunk at a worker of a Dask scheduler.
+def dask_executor(task: VisibilityTask, address: str) -> Iterator[Submit]:
+    """Yield a function that submits chunks to the workers of a Dask scheduler.
 
     Parameters
     ----------
     address : str
-        Of the scheduler, like ``tcp://10.0.0.1:8786``, or ``tls://10.0.0.1:8786`` with the certificates that Dask's
-        settings name. Its workers must be able to import this package.
+        Address of the scheduler, such as ``tcp://10.0.0.1:8786``, or ``tls://10.0.0.1:8786`` with the certificates
+        from Dask's configuration. Its workers must be able to import this package.
 
     Raises
     ------
     SeipError
-        Dask is not installed, no scheduler answers, it has no workers, or a chunk ended one worker after the other.
+        Dask is not installed, the scheduler does not answer or has no workers, or several workers died over one chunk.
     """
     try:
         import dask  # noqa: PLC0415 - an extra that need not be installed
@@ -124,8 +124,8 @@ def cluster(address: str, task: VisibilityTask) -> Iterator[Submit]:
             "a scheduler needs Dask, which is not installed; install the group 'cluster' of pyproject.toml"
         ) from error
     try:
-        client = Client(address, timeout=_ANSWER_SECONDS, set_as_default=False)
-    except TypeError as error:  # what distributed raises on an address with TLS, and no certificates
+        client = Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+    except TypeError as error:  # raised by distributed for a TLS address without certificates
         raise SeipError(
             f"{address} needs certificates: name them in Dask's settings distributed.comm.tls.ca-file, client.cert and "
             "client.key"
@@ -137,22 +137,22 @@ def cluster(address: str, task: VisibilityTask) -> Iterator[Submit]:
             raise SeipError(f"the Dask scheduler at {address} has no workers; start some where this package is")
         try:
             with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"}):
-                # a task, not scattered data: a scheduler computes it again where the worker that held it dies
-                everywhere = client.submit(_same, task, pure=False)
+                # submitted, not scattered: the scheduler recomputes it when the worker that holds it dies
+                shared_task = client.submit(_identity, task, pure=False)
             with client.get_executor(pure=False) as executor:
-                yield lambda poses: executor.submit(_see, everywhere, poses)
+                yield lambda poses: executor.submit(_compute_on_worker, shared_task, poses)
         except KilledWorker as error:
             raise SeipError(f"workers of {address} died over one chunk of the work: {error}") from error
 
 
-def _same(task: VisibilityTask) -> VisibilityTask:
+def _identity(task: VisibilityTask) -> VisibilityTask:
     return task
 
 
-def _see(task: VisibilityTask, poses: Integer) -> Rows:
-    return _rows_by_worker(task)(poses)
+def _compute_on_worker(task: VisibilityTask, poses: Integer) -> Rows:
+    return _worker_row_function(task)(poses)
 
 
-@functools.lru_cache(maxsize=1)  # a worker holds one visibility model for all chunks
-def _rows_by_worker(task: VisibilityTask) -> Callable[[Integer], Rows]:
-    return task.rows_by(task.ray_caster())
+@functools.lru_cache(maxsize=1)  # one visibility model per worker, for all chunks
+def _worker_row_function(task: VisibilityTask) -> Callable[[Integer], Rows]:
+    return task.row_function(task.ray_caster())

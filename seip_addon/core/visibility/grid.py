@@ -1,10 +1,10 @@
 """The visibility grid: candidates × targets.
 
-V_ij = 1 if and only if some return of candidate i's full scan lies nearer than
-δ to target j and, where a least intensity is asked for, is at least as strong.
+V_ij = 1 if and only if a return of candidate i's full scan lies nearer than δ
+to target j and has at least the minimum intensity, where one is set.
 
-The grid is exactly the full scan's, but only rays that can change it are cast
-(`scanning`), against triangles that can change it (`needed_triangles`).
+The result equals that of full scans, but only rays that can affect it are cast
+(`scanning`), against triangles that can affect it (`needed_triangles`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..storage.files import digest
 from ..storage.source_digest import source_digest
 from .chunks import Checkpoint, chunks_of, compute_chunks
-from .executors import VisibilityTask, cluster, threads_of
+from .executors import VisibilityTask, dask_executor, thread_executor
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import ScanPosition
 from .settings import VisibilitySettings
@@ -45,7 +45,7 @@ FILE = ArrayFile(
 
 @dataclass(frozen=True, eq=False)
 class VisibilityGrid:
-    """Which of c candidate poses sees which of t targets.
+    """Visibility of t targets from c candidate poses.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class VisibilityGrid:
     shape : tuple of int
         c and t.
     key : str
-        Digest of everything that the grid follows from; see `visibility_key`.
+        Digest of all inputs; see `visibility_key`.
     parameters : dict
-        What made it, for people: delta, min_intensity, engine, sensors, numbers of rays.
+        Provenance, for information: delta, min_intensity, engine, sensors, numbers of rays and triangles.
     """
 
     packed: NDArray[np.uint8]
@@ -70,11 +70,11 @@ class VisibilityGrid:
         return np.unpackbits(self.packed, axis=1, count=self.shape[1]).astype(bool)
 
     def sees(self, pose: int) -> Boolean:
-        """Return which targets a pose sees, (t,) bool."""
+        """Return the targets that a pose sees, (t,) bool."""
         return np.unpackbits(self.packed[pose], count=self.shape[1]).astype(bool)
 
     def times_seen(self, poses: Integer) -> Integer:
-        """Return by how many of the given poses each target is seen, (t,) int64."""
+        """Return the number of the given poses that see each target, (t,) int64."""
         rows = np.unpackbits(self.packed[poses], axis=1, count=self.shape[1])
         times: Integer = rows.sum(axis=0, dtype=np.int64)
         return times
@@ -86,7 +86,7 @@ class VisibilityGrid:
         ----------
         poses : (n,) int64
         weight : (t,) float64, optional
-            Importance of the targets; all alike if not given.
+            Weights of the targets; equal by default.
         """
         seen = self.times_seen(poses) > 0
         return float(np.average(seen, weights=weight))
@@ -103,7 +103,7 @@ class VisibilityGrid:
         Raises
         ------
         SeipError
-            The file is not there, damaged, or something else.
+            The file is missing, damaged or not a visibility grid.
         """
         with FILE.reading(path) as (header, arrays):
             packed = arrays["packed"]
@@ -114,30 +114,24 @@ class VisibilityGrid:
 
 
 def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, engine: str) -> str:
-    """Return the digest of all that a grid follows from, the program's code among it and names left out.
+    """Return the digest of all inputs of a grid, including the source code but not names.
 
-    A stored grid with this key needs no computing again. ``engine`` is ``bvh`` or ``embree``.
+    A stored grid with this key need not be computed again. ``engine`` is ``bvh`` or ``embree``.
     """
-    used = _models_of(site, models)
-    patterns = [
-        part
-        for model in used.values()
-        for part in (
-            *(model.elevations, model.azimuth_offsets, float(model.azimuth_count)),
-            *(float(model.min_range), float(model.max_range), float(model.attenuation)),
-        )
-    ]
-    which = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
-    tilts = (site.candidates.tilt,) if site.candidates.tilt.any() else ()  # a level grid has the key that it always had
-    return digest(
-        *(FILE.schema, source_digest(__name__), engine, float(settings.delta), float(settings.min_intensity)),
-        *(site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, which),
-        *patterns,
-        *tilts,
-    )
+    used = _used_models(site, models)
+    model_index = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
+    inputs: list[NDArray[Any] | str | float] = [FILE.schema, source_digest(__name__), engine]
+    inputs += [float(settings.delta), float(settings.min_intensity)]
+    inputs += [site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, model_index]
+    for model in used.values():
+        inputs += [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
+        inputs += [float(model.min_range), float(model.max_range), float(model.attenuation)]
+    if site.candidates.tilt.any():
+        inputs.append(site.candidates.tilt)
+    return digest(*inputs)
 
 
-def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who does the work
+def compute_visibility(  # noqa: PLR0913, PLR0917  # the inputs, and how to compute
     site: Site,
     models: Mapping[str, LidarModel],
     settings: VisibilitySettings,
@@ -146,44 +140,44 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
     scheduler: str | None = None,
     threads: int | None = None,
 ) -> Generator[Progress, None, VisibilityGrid]:
-    """Find which pose sees which target, casting only rays that can matter.
+    """Compute which targets each candidate pose sees, casting only rays that can affect the grid.
 
     Parameters
     ----------
     models : mapping of str to LidarModel
-        At least those that the candidates name.
+        Must contain the sensor types of all candidates.
     engine : {"auto", "bvh", "embree"}
-        What casts the rays.
+        Ray-casting engine.
     checkpoint : Checkpoint, optional
-        Chunks of an earlier run with the same key, to which those of this run are added.
+        Finished chunks of an interrupted run with the same key; chunks of this run are added.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers do the work, instead of this process.
+        Address of a Dask scheduler whose workers compute the chunks; by default this process does.
     threads : int, optional
-        How many of this process work at once at most.
+        Maximum number of threads in this process.
 
     Yields
     ------
     Progress
-        Ten times a second, and after each chunk of the work.
+        Ten times a second, and after each chunk.
 
     Returns
     -------
     VisibilityGrid
-        The same, bit for bit, as `full_scan_visibility`, wherever the work is done.
+        Identical to that of `full_scan_visibility`, wherever it is computed.
 
     Raises
     ------
     SeipError
-        A sensor is unknown, or there is no pose or target, or a coordinate is not
-        finite, or the engine or the scheduler is not there.
+        A sensor is unknown, there are no poses or targets, a coordinate is not finite, or the engine or the scheduler
+        is not available.
     """
-    used = _models_of(site, models)
-    _require_finite(site)
+    used = _used_models(site, models)
+    _check_site(site)
     longest = max(model.max_range for model in used.values())
     needed = needed_triangles(site.triangles, site.candidates.xyz, site.targets.xyz, settings.delta, longest)
     task = VisibilityTask(site, used, settings, engine_name(engine), needed.keep)
     chunks = chunks_of(site)
-    with threads_of(task, threads) if scheduler is None else cluster(scheduler, task) as submit:
+    with thread_executor(task, threads) if scheduler is None else dask_executor(task, scheduler) as submit:
         rows = yield from compute_chunks(chunks, submit, checkpoint)
     packed = np.zeros((len(site.candidates), (len(site.targets) + 7) // 8), dtype=np.uint8)
     packed[np.concatenate(chunks)] = np.concatenate([row.packed for row in rows])
@@ -194,9 +188,9 @@ def compute_visibility(  # noqa: PLR0913, PLR0917  # what is looked for, and who
 def full_scan_visibility(
     site: Site, models: Mapping[str, LidarModel], settings: VisibilitySettings, caster: RayCaster
 ) -> Generator[Progress, None, VisibilityGrid]:
-    """Find which pose sees which target by casting every ray: the reference for `compute_visibility`."""
-    used = _models_of(site, models)
-    _require_finite(site)
+    """Compute the grid from full scans of all poses: the reference for `compute_visibility`."""
+    used = _used_models(site, models)
+    _check_site(site)
     poses, targets = site.candidates, site.targets.xyz
     packed = np.zeros((len(poses), (len(targets) + 7) // 8), dtype=np.uint8)
     for pose, key in enumerate(poses.sensor.tolist()):
@@ -215,11 +209,11 @@ def _grid(
     packed: NDArray[np.uint8],
     parameters: Mapping[str, Any],
 ) -> VisibilityGrid:
-    """Join bits and what is known of them."""
-    known = {"engine": engine, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
+    """Return the grid with its key and provenance."""
+    origin = {"engine": engine, "sensors": list(used), "rays_of_full_scan": _rays_of_full_scan(site, used)}
     key = visibility_key(site, used, settings, engine)
     return VisibilityGrid(
-        packed, (len(site.candidates), len(site.targets)), key, {**asdict(settings), **known, **parameters}
+        packed, (len(site.candidates), len(site.targets)), key, {**asdict(settings), **origin, **parameters}
     )
 
 
@@ -227,22 +221,21 @@ def _rays_of_full_scan(site: Site, used: Mapping[str, LidarModel]) -> int:
     return sum(used[key].channels * used[key].azimuth_count for key in site.candidates.sensor.tolist())
 
 
-def _models_of(site: Site, models: Mapping[str, LidarModel]) -> dict[str, LidarModel]:
+def _used_models(site: Site, models: Mapping[str, LidarModel]) -> dict[str, LidarModel]:
     return find_models(models, np.unique(site.candidates.sensor).tolist())
 
 
-def _require_finite(site: Site) -> None:
+def _check_site(site: Site) -> None:
     if len(site.candidates) == 0:
         raise SeipError("there is no candidate pose to compute visibility for")
     if len(site.targets) == 0:
         raise SeipError("there is no target to be seen")
-    poses = site.candidates
     arrays = {
         "target": site.targets.xyz,
-        "candidate": poses.xyz,
-        "candidate's yaw": poses.yaw,
-        "candidate's tilt": poses.tilt,
+        "candidate": site.candidates.xyz,
+        "candidate's yaw": site.candidates.yaw,
+        "candidate's tilt": site.candidates.tilt,
     }
-    for what, array in arrays.items():
+    for name, array in arrays.items():
         if not np.isfinite(array).all():
-            raise SeipError(f"the coordinates of a {what} are not finite; check the scene's meshes")
+            raise SeipError(f"the coordinates of a {name} are not finite; check the scene's meshes")

@@ -1,7 +1,6 @@
-"""Drawing of overlays: show and hide them by scene and name.
+"""Overlays of each scene: shown, hidden and found by name, and drawn in the scene's viewports.
 
-Everything belongs to a scene and shows in that one's views alone. Blender's
-draw handlers are there while there is something to draw, and no longer.
+Blender's draw handlers are registered only while there is an overlay.
 """
 
 from __future__ import annotations
@@ -18,40 +17,40 @@ _handles: list[Any] = []
 
 
 def show(scene: bpy.types.Scene, name: str, overlay: Overlay) -> None:
-    """Draw an overlay in a scene's views, in place of that of the same name."""
+    """Show an overlay in a scene's viewports, replacing any of the same name."""
     session.overlays.setdefault(scene.session_uid, {})[name] = overlay
-    _keep_handlers()
+    _update_handlers()
 
 
 def hide(scene: bpy.types.Scene, name: str) -> None:
-    """Draw an overlay no longer."""
+    """Remove an overlay from a scene's viewports, if it is there."""
     session.overlays.get(scene.session_uid, {}).pop(name, None)
-    _keep_handlers()
+    _update_handlers()
 
 
 def find(scene: bpy.types.Scene, name: str) -> Overlay | None:
-    """Return an overlay of a scene, None where there is none of that name."""
+    """Return a scene's overlay with a name, or None."""
     return session.overlays.get(scene.session_uid, {}).get(name)
 
 
-def overlays(scene: bpy.types.Scene) -> list[Overlay]:
-    """Return what is drawn in a scene's views, in the order of the names."""
+def overlays_of(scene: bpy.types.Scene) -> list[Overlay]:
+    """Return a scene's overlays, sorted by name."""
     own = session.overlays.get(scene.session_uid, {})
     return [own[name] for name in sorted(own)]
 
 
-def drawing() -> int:
-    """Return how many draw handlers there are."""
+def handler_count() -> int:
+    """Return the number of registered draw handlers."""
     return len(_handles)
 
 
-def draw_layers(scene: bpy.types.Scene) -> None:
-    """Draw a scene's overlays into the framebuffer that is bound, behind what stands before them."""
-    import gpu  # noqa: PLC0415  # is not there in the background
+def draw_overlays(scene: bpy.types.Scene) -> None:
+    """Draw a scene's overlays into the bound framebuffer, with depth test."""
+    import gpu  # noqa: PLC0415  # not available in background mode
 
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.blend_set("ALPHA")
-    for overlay in overlays(scene):
+    for overlay in overlays_of(scene):
         for layer in overlay.layers:
             layer.draw(bpy.context.preferences.system.ui_scale)
     gpu.state.blend_set("NONE")
@@ -59,21 +58,21 @@ def draw_layers(scene: bpy.types.Scene) -> None:
 
 
 def redraw() -> None:
-    """Have all viewports drawn anew, with their sidebars."""
+    """Redraw all viewports with their sidebars."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
 
 
-def _keep_handlers() -> None:
-    """Have handlers while there is something to draw."""
+def _update_handlers() -> None:
+    """Forget scenes without overlays and deleted ones, and register or remove the draw handlers as needed."""
     existing = {scene.session_uid for scene in bpy.data.scenes}
-    for number in [number for number, own in session.overlays.items() if not own or number not in existing]:
-        del session.overlays[number]
+    for uid in [uid for uid, own in session.overlays.items() if not own or uid not in existing]:
+        del session.overlays[uid]
     if session.overlays and not _handles:
-        for draw, moment in ((_draw_view, "POST_VIEW"), (_draw_pixels, "POST_PIXEL")):
-            _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", moment))
+        for draw, event in ((_draw_view, "POST_VIEW"), (_draw_pixels, "POST_PIXEL")):
+            _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", event))
     if not session.overlays:
         while _handles:
             bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
@@ -81,12 +80,12 @@ def _keep_handlers() -> None:
 
 
 def legend_blocks(scene: bpy.types.Scene) -> list[Block]:
-    """Return what explains all that is drawn in a scene's views."""
-    return [block for overlay in overlays(scene) if (block := overlay.legend(scene)) is not None]
+    """Return the legend of all overlays of a scene."""
+    return [block for overlay in overlays_of(scene) if (block := overlay.legend(scene)) is not None]
 
 
 def _draw_view() -> None:
-    draw_layers(bpy.context.scene)
+    draw_overlays(bpy.context.scene)
 
 
 def _draw_pixels() -> None:
@@ -98,6 +97,6 @@ CLASSES: tuple[type, ...] = ()
 
 
 def forget() -> None:
-    """Draw nothing any more, in any scene."""
+    """Remove the overlays of all scenes."""
     session.overlays.clear()
-    _keep_handlers()
+    _update_handlers()

@@ -1,4 +1,4 @@
-"""Base classes of operators: error reports, and long work that can be stopped."""
+"""Base classes of operators: error reports, and modal operators whose work runs in a thread and can be stopped."""
 
 from __future__ import annotations
 
@@ -16,87 +16,86 @@ from ..session import RunningWork, scene_of, session
 Result = TypeVar("Result")
 Outcome = set[str]
 
-PERIOD = 0.1
-"""Seconds between two looks at work that is under way."""
-PATIENCE = 3.0
-"""Seconds at most that Blender waits for work to stop before it ends: what cannot be stopped is left to itself."""
+TIMER_INTERVAL = 0.1
+"""Seconds between timer events while work is running."""
+JOIN_TIMEOUT = 3.0
+"""Maximum seconds that Blender waits for the thread when it closes; a thread that does not stop is abandoned."""
 
 
 def attempt(operator: bpy.types.Operator, work: Callable[[], None]) -> Outcome:
-    """Do something, and report a user's mistake, or a package that is gone, instead of raising it."""
+    """Call a function, report its `SeipError` or `ImportError` to the user, and return the operator's result set."""
     try:
         work()
     except SeipError as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
-    except ImportError as error:  # some come only when they are needed
+    except ImportError as error:  # some packages are imported on first use
         operator.report({"ERROR"}, f"a package of the extension is missing or broken ({error}): install its zip again")
         return {"CANCELLED"}
     return {"FINISHED"}
 
 
-def begun(steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
-    """Do work up to its first report at once, and return the rest of it: what touches Blender's data comes first."""
+def started(steps: Generator[Progress, None, Result]) -> Generator[Progress, None, Result]:
+    """Run a generator to its first yield and return it, so that what reads Blender's data runs on the main thread."""
     next(steps)
     return steps
 
 
 class ForReadyScene:
-    """Mixin that enables an operator only where the scene has what any computation needs."""
+    """Mixin that enables an operator only where the scene has all inputs of a computation."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Tell whether it works, and why not."""
-        sentence = scene_status.obstacle(context.scene)
-        if sentence:
-            cls.poll_message_set(sentence)  # type: ignore[attr-defined]  # of Blender's operators
-        return not sentence
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
+        obstacle = scene_status.obstacle(context.scene)
+        if obstacle:
+            cls.poll_message_set(obstacle)  # type: ignore[attr-defined]  # of Blender's operators
+        return not obstacle
 
 
 class LongWork(Generic[Result]):
-    """A mixin for operators with work of more than an instant.
+    """Mixin for operators with long computations.
 
-    From a script, or where there is no window, `execute` does it at once. A
-    click does it in a thread: Blender stays responsive, the panel shows how far
-    it is, and its Stop button stops it within a tenth of a second. Keys are left
-    to Blender: Esc ends an animation that plays, or a drag, and no computation.
+    From a script, or without a window, `execute` blocks until the result is
+    there. From the interface the operator is modal and computes in a thread:
+    Blender stays responsive, the panel shows the progress, and its Stop button
+    stops the work within a tenth of a second. Esc is left to Blender.
     """
 
     bl_options = {"REGISTER", "UNDO"}
-    stopped = "stopped; nothing was changed"
-    """What is reported of work that was stopped."""
+    stopped_message = "stopped; nothing was changed"
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, Result]:
-        """Read what is needed from the scene and return the work.
+        """Read the inputs from the scene, on the main thread, and return the work.
 
-        It touches neither Blender's data nor what `state` holds: it returns its result, which nobody looks at if the
-        work is stopped.
+        The work runs in a thread: it must touch neither Blender's data nor `session`, only return its result, which
+        is discarded if the work is stopped.
         """
         raise NotImplementedError
 
     def conclude(self, scene: bpy.types.Scene, result: Result) -> None:
-        """Take the result over, on the main thread: write it into the scene, have `state` hold it, and report it."""
+        """Store the result in the scene and in `session`, and report it; called on the main thread."""
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        """Do the work at once."""
+        """Do the work and wait for it."""
         scene = context.scene
         return attempt(self, lambda: self.conclude(scene, finish(self.prepare(scene))))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Begin the work in a thread."""
+        """Start the work in a thread."""
         if bpy.app.background:
             return self.execute(context)
-        outcome = attempt(self, lambda: self._begin(context))
+        outcome = attempt(self, lambda: self._start(context))
         return {"RUNNING_MODAL"} if outcome == {"FINISHED"} else outcome
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
-        """Look how far the work is, and write its result once it is done."""
+        """Redraw the progress on timer events, and conclude once the work has ended."""
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         if self._running is not session.running or self._running.stop:
             self._end(context)
-            self.report({"INFO"}, self.stopped)  # type: ignore[attr-defined]  # of Blender's operators
+            self.report({"INFO"}, self.stopped_message)  # type: ignore[attr-defined]  # of Blender's operators
             return {"CANCELLED"}
         if not self._running.work.ended:
             _redraw(context)
@@ -105,25 +104,27 @@ class LongWork(Generic[Result]):
         return attempt(self, lambda: self.conclude(scene_of(self._scene), self._running.work.result()))
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop because Blender ends, closes the window or opens another file; no thread may outlive its data."""
+        """Stop because Blender quits, closes the window or opens another file, so that no thread outlives its data."""
         self._end(context)
-        self._running.work.join(PATIENCE)
+        self._running.work.join(JOIN_TIMEOUT)
 
-    def _begin(self, context: bpy.types.Context) -> None:
+    def _start(self, context: bpy.types.Context) -> None:
         if session.running is not None:
             raise SeipError("other work is under way: wait for it, or stop it with the button beside its bar")
         self._scene = context.scene.session_uid
-        name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators; as panels know it: the instance's own is another spelling, SEIP_OT_…
+        # of the class, as panels spell it: Blender gives the instance's as SEIP_OT_…
+        name = type(self).bl_idname  # type: ignore[attr-defined]  # of Blender's operators
         self._running = session.running = RunningWork(name, Background(self.prepare(context.scene)))
-        self._running.timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
+        self._running.timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
         context.window_manager.modal_handler_add(self)
 
     def _end(self, context: bpy.types.Context) -> None:
-        _put_away(self._running)
+        _stop(self._running)
         _redraw(context)
 
 
-def _put_away(running: RunningWork) -> None:
+def _stop(running: RunningWork) -> None:
+    """Ask work to stop, remove its timer and free the session for other work."""
     running.work.stop()
     if running.timer is not None:
         bpy.context.window_manager.event_timer_remove(running.timer)
@@ -133,11 +134,12 @@ def _put_away(running: RunningWork) -> None:
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    """Have the sidebars of all viewports drawn anew, and not what the viewports show: that may take long."""
-    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
-    for region in (region for area in areas if area.type == "VIEW_3D" for region in area.regions):
-        if region.type == "UI":
-            region.tag_redraw()
+    """Redraw the sidebars of all viewports, but not the viewports, which may take long."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI":
+                    region.tag_redraw()
 
 
 class SEIP_OT_stop(bpy.types.Operator):
@@ -148,7 +150,7 @@ class SEIP_OT_stop(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Tell whether there is anything to stop."""
+        """Return whether any work is running."""
         if session.running is None:
             cls.poll_message_set("nothing is under way")
         return session.running is not None
@@ -164,8 +166,7 @@ CLASSES = (SEIP_OT_stop,)
 
 
 def detach() -> None:
-    """Stop what is under way: Blender drops its operator with the add-on, and asks it nothing."""
-    if session.running is not None:
-        running = session.running
-        _put_away(running)
-        running.work.join(PATIENCE)
+    """Stop running work: when the add-on is disabled Blender drops its modal operators without calling `cancel`."""
+    if (running := session.running) is not None:
+        _stop(running)
+        running.work.join(JOIN_TIMEOUT)
