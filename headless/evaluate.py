@@ -104,7 +104,9 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=COUNTS[-1])))
+    surveyed = survey.survey(
+        options, lambda layout: check_objective(layout.site, layout.models, Objective(count=COUNTS[-1]))
+    )
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
     runtime.LOG.info(traffic.overlap())

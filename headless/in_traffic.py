@@ -21,7 +21,8 @@ from headless.options import add_objective, add_settings, new_parser, read_objec
 from seip_addon.core.placement.objective import Solution, check_objective
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_study import LAYER_NAMES, TrafficEvaluation, TrafficStudy
-from seip_addon.core.workflows.traffic import TrafficSettings, place_in_traffic, read_runs
+from seip_addon.core.workflows.survey import Layout
+from seip_addon.core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs
 
 CHARTS = ("time_seen.png", "traffic.png")
 
@@ -30,9 +31,14 @@ def main(argv: list[str]) -> None:
     """Optimise a placement for traffic and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective, settings = read_objective(options), read_settings(TrafficSettings, options)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
-    layout = surveyed.layout
-    runs = finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout))
+    traffic: list[TrafficRuns] = []
+
+    def check(layout: Layout) -> None:
+        check_objective(layout.site, layout.models, objective)
+        traffic.append(finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout)))
+
+    surveyed = survey.survey(options, check)
+    layout, (runs,) = surveyed.layout, traffic
     runtime.LOG.info(runs.overlap)
     steps = place_in_traffic(layout, surveyed.grid, objective, runs, settings)
     placed = surveyed.stopwatch.run("placement in traffic", steps)

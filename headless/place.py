@@ -33,7 +33,7 @@ def main(argv: list[str]) -> None:
     objective = read_objective(options)
     tolerance = options.tolerance
     refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective), refine)
+    surveyed = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, objective), refine)
     steps = place(surveyed.layout, surveyed.grid, objective, pose_errors=options.pose_errors)
     solution = surveyed.stopwatch.run("placement", steps)
     runtime.print_line(_in_words(solution))

@@ -22,7 +22,7 @@ from seip_addon.core.placement.objective import check_objective
 from seip_addon.core.robustness.pose_errors import PoseErrors
 from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_study import RobustnessSettings
-from seip_addon.core.workflows.robust import RobustSolution, place_robustly
+from seip_addon.core.workflows.robust import RobustSolution, check_robust_objective, place_robustly
 
 CHARTS = ("spread.png", "blame.png", "frontier.png")
 
@@ -31,7 +31,8 @@ def main(argv: list[str]) -> None:
     """Optimise a robust placement and write the result to a folder."""
     options = _parser().parse_args(argv)
     objective, robustness = read_objective(options), _robustness(options)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, objective))
+    check_robust_objective(objective, robustness.risk)
+    surveyed = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, objective))
     steps = place_robustly(surveyed.layout, surveyed.grid, objective, robustness)
     robust = surveyed.stopwatch.run("robust placement", steps)
     solution, study = robust.solution, robust.study

@@ -31,7 +31,7 @@ PAGE, CHARTS = "stability.md", "stability"
 
 
 def main(argv: list[str], scope: StabilityScope | None = None) -> None:
-    """Study what has not been scene yet, and write the page; tests give a small ``scope``."""
+    """Study what has not been studied yet, and write the page; tests give a small ``scope``."""
     options = _parser().parse_args(argv)
     charts = options.output / CHARTS
     for other in options.other:
@@ -39,7 +39,7 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     runtime.check_folder(charts)
     surveyed = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
-        lambda site, models: check_objective(site, models, Objective(count=DEFAULT_COUNT)),
+        lambda layout: check_objective(layout.site, layout.models, Objective(count=DEFAULT_COUNT)),
     )
     runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
     scene = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())

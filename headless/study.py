@@ -28,7 +28,7 @@ from seip_addon.core.placement.objective import Objective, check_objective
 def main(argv: list[str]) -> None:
     """Run the study on one scene and write charts, tables and plans to a folder."""
     options = _parser().parse_args(argv)
-    surveyed = survey.survey(options, lambda site, models: check_objective(site, models, Objective(count=1)))
+    surveyed = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, Objective(count=1)))
     site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
     steps = coverage_study(site, surveyed.layout.models, visible, surveyed.layout.settings.limits)
     study = surveyed.stopwatch.run("study", steps)
@@ -45,7 +45,8 @@ def main(argv: list[str]) -> None:
                 case = study.find(sensor, COUNTS[-1], weight=weight)
                 if case is not None:
                     name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
-                    save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment)
+                    notes = [] if weight == 1.0 else [f"Optimised with weight {weight:g} in weighted regions."]
+                    save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment, notes)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
         runtime.print_line(claim.describe())

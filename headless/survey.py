@@ -20,7 +20,6 @@ import bpy
 import numpy as np
 
 from seip_addon.core.geometry.orientation import describe_tilt
-from seip_addon.core.lidar import LidarModel
 from seip_addon.core.placement.deployment import Sensor
 from seip_addon.core.placement.objective import Solution
 from seip_addon.core.progress import Progress, finish
@@ -104,9 +103,7 @@ def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
 Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
 
 
-def survey(
-    options: argparse.Namespace, check: Callable[[Site, dict[str, LidarModel]], None], refine: Refine | None = None
-) -> Survey:
+def survey(options: argparse.Namespace, check: Callable[[Layout], None], refine: Refine | None = None) -> Survey:
     """Read the scene, lay out its site, and find or compute its visibility grid.
 
     Parameters
@@ -114,7 +111,7 @@ def survey(
     options : Namespace
         Of a parser with `add_options`.
     check : callable
-        Called with the site and the models before any ray is cast: refuses what the site cannot do.
+        Called before any ray is cast: refuses what cannot be had on the layout.
     refine : callable, optional
         Finds the spacings of targets and candidates.
     """
@@ -131,7 +128,7 @@ def survey(
     layout = watch.time("lay out the site", lambda: lay_out(reading.geometry, settings, reading.warnings))
     LOG.info(_in_words(layout.site))
     runtime.warn(layout.warnings)
-    check(layout.site, layout.models)
+    check(layout)
     grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
     LOG.info(culling_message(grid.parameters["triangles"]))
     return Survey(layout, grid, watch)

@@ -86,8 +86,8 @@ def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     _bars(shares, 0, [empty.mean for empty, _ in rows], "held in traffic")
     _bars(shares, 1, [traffic.mean for _, traffic in rows], "held, placed on traffic")
     shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)
-    _dots(changes, -0.5, [negative(empty.loss) for empty, _ in rows], 1, "lost to traffic")
-    _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "won by placing on traffic")
+    _dots(changes, -0.5, [negative(empty.loss) for empty, _ in rows], 1, "change by traffic")
+    _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "gain by placing on traffic")
     changes.axhline(0.0, color=SOFT_INK, linewidth=0.8, zorder=0)
     changes.set_ylabel("change, 95 % interval", color=INK)
     for axes, decimals in ((shares, 0), (changes, 1)):

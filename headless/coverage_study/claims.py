@@ -99,9 +99,11 @@ def _weighting(study: CoverageStudy) -> Claim:
             rows.append(f"{sensor}: no placement")
             continue
         changes = [_change(plain, case) for case in cases]
-        gain, loss = max((c for c in changes if c[1] > -MIN_CHANGE), default=max(changes))
+        cheap = [change for change in changes if change[1] > -MIN_CHANGE]
+        gain, loss = max(cheap or changes)
         central, whole = _views(plain)
-        rows.append(f"{sensor}: central {central:.1%} {gain:+.2%}, whole {whole:.1%} {loss:+.2%}")
+        costly = "" if cheap else ", the largest gain: every weight costs more"
+        rows.append(f"{sensor}: central {central:.1%} {gain:+.2%}, whole {whole:.1%} {loss:+.2%}{costly}")
         proven = [_is_proven(plain) and case is not None and _is_proven(case) for case in weighted]
         verdicts.append(_weighting_verdict(changes, proven, is_best=sensor == study.sensors[-1]))
     return Claim(

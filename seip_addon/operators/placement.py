@@ -41,7 +41,7 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
         asked = scene.seip.goal
         objective, robustness, traffic = asked.goal(), asked.robustness(), asked.traffic()
         if robustness is not None or traffic is not None:
-            check_robust_objective(objective)
+            check_robust_objective(objective, robustness and robustness.risk)
         surveying = scene_survey.survey(scene)
         self._asked: dict[str, object] = {}
         if traffic is not None:

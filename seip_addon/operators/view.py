@@ -226,7 +226,7 @@ def _save_sheet(path: Path, surveyed: SceneSurvey, view: Any) -> None:  # noqa: 
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
         chosen = [sensor.model.key for sensor in solution.deployment.sensors]
-        notes = [solution.certificate, *relevant_warnings(layout.warnings, layout.models, chosen)]
+        notes = [*solution.caption, *relevant_warnings(layout.warnings, layout.models, chosen)]
         save_plan_view(drawn, layout.geometry, layout.site, solution.deployment, notes)
         with Image.open(drawn) as picture:
             save_sheet(path, view, picture)

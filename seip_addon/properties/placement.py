@@ -110,7 +110,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     )
     weights_from_traffic: of_setting(TrafficSettings, "weights_from_traffic", "Weights from Traffic")
     instants: of_setting(TrafficSettings, "instants", "Instants")
-    evaluation_instants: of_setting(TrafficSettings, "evaluation_instants", "Evaluation Instants")
+    evaluation_instants: of_setting(TrafficSettings, "evaluation_instants", "Evaluated At")
     pose_errors: BoolProperty(
         name="Test Pose Errors",
         description="Note with the placement what it loses where sensors do not hang quite as planned; this casts rays",

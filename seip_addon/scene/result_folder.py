@@ -117,4 +117,4 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
     yield Progress(2, 3, "drawing the plan")
     warnings = relevant_warnings(record.warnings, models, (sensor.model.key for sensor in deployment.sensors))
-    save_plan_view(part["plan.png"], geometry, site, deployment, [solution.certificate, *warnings])
+    save_plan_view(part["plan.png"], geometry, site, deployment, [*solution.caption, *warnings])

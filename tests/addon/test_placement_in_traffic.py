@@ -39,6 +39,8 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     goal.layer, goal.weights_from_traffic = "height", True
     goal.pose_errors = True  # left from another objective, and not shown for this one
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
+    certificate, purpose = session.survey_of(coarse).solution.caption
+    assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -95,7 +97,7 @@ def damaged(folder):
     [
         (shutil.rmtree, r"there is no run of traffic \(\.npz\) in .*runs: choose another folder, or make two or more"),
         (lambda folder: None, "there is no run of traffic"),
-        (lambda folder: make_run(1, 30.0).save(folder / "run.npz"), "1 runs of traffic are too few: give two or more"),
+        (lambda folder: make_run(1, 30.0).save(folder / "run.npz"), "two runs of traffic or more are needed, not 1"),
         (other_place, "traffic of another place"),
         (copies, r"run-1\.npz and .*run-2\.npz are nearly the same traffic"),
         (damaged, r"run-2\.npz is no file of trajectories, or is damaged.*import or simulate them again"),

@@ -58,8 +58,11 @@ def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, option
 
 def test_traffic_that_is_of_no_use_is_refused(tmp_path, run):
     here = trajectories(tmp_path / "here.npz")
-    with pytest.raises(SeipError, match="1 runs of traffic are too few"):
+    with pytest.raises(SeipError, match="two runs of traffic or more are needed, not 1"):
         run(tmp_path / "out", "--traffic", here)
+    with pytest.raises(SeipError, match=r"here.npz is named twice"):
+        run(tmp_path / "out", "--traffic", here, here)
+    assert not (tmp_path / "out" / "visibility.npz").exists()  # refused before any ray is cast
     with pytest.raises(SeipError, match="traffic of another place"):
         run(tmp_path / "out", "--traffic", here, trajectories(tmp_path / "there.npz", x=9000.0))
     with pytest.raises(SeipError, match="simulate more traffic"):

@@ -26,6 +26,8 @@ def test_it_writes_a_result_and_says_what_it_was_chosen_for(tmp_path, capsys, ru
     assert {*FILES, *robust.CHARTS, "visibility.npz"} - {"view.png"} <= names
     record = json.loads((tmp_path / "placement.json").read_text(encoding="utf-8"))
     assert "coverage in the worst scenario" in json.dumps(record)
+    asked = record["settings"]["robustness"]
+    assert (asked["risk"]["tail"], asked["errors"]["tilt_deg"]) == (0.0, 2.0)
     assert "unseen draws" in capsys.readouterr().out
 
 
@@ -37,6 +39,7 @@ def test_errors_that_cannot_be_meant_are_refused(tmp_path, run):
 def test_one_sensor_cannot_be_lost_of_one(tmp_path, run):
     with pytest.raises(SeipError, match="at least 2 sensors"):
         run(tmp_path, "--count", "1", "--failure", "worst")
+    assert not (tmp_path / "visibility.npz").exists()  # refused before any ray is cast
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ DEFAULT_COUNT = 4
 MOVED = "moved by hand"
 """Status of a placement whose sensors hang where a hand has put them."""
 MOVED_MESSAGE = "Moved by hand: judged where the sensors hang; nothing is proven of it."
+CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,11 @@ class Solution:
     def certificate(self) -> str:
         """The certificate as a message: proven optimal, or within which gap."""
         return certificate(self.placement.status, self.placement.gap, cheapest=self.objective.cheapest)
+
+    @property
+    def caption(self) -> tuple[str, ...]:
+        """What a picture says of it: the certificate, and what was optimised where that is not nominal coverage."""
+        return (self.certificate, *(note for note in self.placement.notes if note.startswith(CHOSEN_FOR)))
 
 
 def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:

@@ -123,7 +123,7 @@ class PoseDraws:
 def require_draws(draws: int) -> None:
     """Raise SeipError where the number of draws is below one."""
     if draws < 1:
-        raise SeipError(f"asked for {draws} draws of pose errors; ask for at least 1")
+        raise SeipError(f"asked for {draws} draws or scenarios of pose errors; ask for at least 1")
 
 
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:

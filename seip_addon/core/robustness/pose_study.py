@@ -103,13 +103,13 @@ class PoseStudy:
         return {kind: mean_of(self.planned.whole[0] - each.whole) for kind, each in self.by_kind.items()}
 
     def worst_sensor(self) -> tuple[str, bool]:
-        """Return the sensor whose error costs most, and whether the draws tell it from every other."""
+        """Return the sensor whose error costs most, and whether the draws tell that it does, and costs any coverage."""
         losses = self.loss_by_sensor()
         worst = max(range(len(losses)), key=lambda number: losses[number].value)
         behind = [
             self.alone[number].whole - self.alone[worst].whole for number in range(len(losses)) if number != worst
         ]
-        return self.labels[worst], all(mean_of(difference).low > 0 for difference in behind)
+        return self.labels[worst], losses[worst].low > 0 and all(mean_of(difference).low > 0 for difference in behind)
 
     def is_converged(self) -> bool:
         """Whether half of the draws give the same mean and quantiles, within their intervals."""

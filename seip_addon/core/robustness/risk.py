@@ -66,6 +66,11 @@ class Risk:
         """Number of sensors below which every outcome is zero."""
         return self.seen_by + (self.failure != "none")
 
+    def require_sensors(self, most: int) -> None:
+        """Raise SeipError where ``most`` sensors leave nothing in any outcome."""
+        if most < self.least_sensors:
+            raise SeipError(f"{self.describe()} needs at least {self.least_sensors} sensors, not {most}; allow more")
+
     def describe(self) -> str:
         """Name the risk measure."""
         of = {1.0: "expected coverage", 0.0: "coverage in the worst scenario"}.get(

@@ -36,7 +36,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Float, Integer
-from ..errors import SeipError
 from ..placement import Placement, PlacementProblem, solve
 from ..placement.bounds import lagrangian_bound
 from ..placement.branch_and_bound import FIRST_STEPS
@@ -98,8 +97,7 @@ def solve_robust(
         As `placement.solve`, or fewer sensors are allowed than the risk asks for.
     """
     most = problem.most_sensors
-    if most < risk.least_sensors:
-        raise SeipError(f"{risk.describe()} needs at least {risk.least_sensors} sensors, not {most}; allow more")
+    risk.require_sensors(most)
     different = _without_copies(scenarios)
     plain = risk.seen_by == 1 and risk.failure == "none"
     if plain and len(different) == 1:

@@ -121,7 +121,8 @@ def dask_executor(task: VisibilityTask, address: str) -> Iterator[Submit]:
         from distributed import Client, KilledWorker  # noqa: PLC0415 - as above
     except ImportError as error:
         raise SeipError(
-            "a scheduler needs Dask, which is not installed; install the group 'cluster' of pyproject.toml"
+            "a scheduler needs Dask, which is not installed; install the extra 'cluster' in the project's folder: "
+            "pip install '.[cluster]'"
         ) from error
     try:
         client = Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 from ..errors import SeipError
 from ..placement.deployment import deploy
-from ..placement.objective import Objective, Solution, placement_problem, with_count
+from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, with_count
 from ..progress import Progress
 from ..robustness.pose_study import PoseStudy, PoseStudySettings, pose_study, pose_warnings
+from ..robustness.risk import Risk
 from ..robustness.robust_study import RobustnessSettings, RobustStudy, robust_study
 from ..visibility.grid import VisibilityGrid
 from .survey import Layout, surroundings
@@ -37,13 +38,15 @@ class RobustSolution:
     pose_study: PoseStudy
 
 
-def check_robust_objective(objective: Objective) -> None:
-    """Raise SeipError where an objective allows no settings."""
+def check_robust_objective(objective: Objective, risk: Risk | None = None) -> None:
+    """Raise SeipError where an objective asks for no most coverage, or for fewer sensors than a risk needs."""
     if objective.cheapest:
         raise SeipError(
             "a placement for what may go wrong needs a number of sensors or a budget: the least price for a coverage "
             "is of poses as planned and the empty road"
         )
+    if risk is not None and objective.count is not None:
+        risk.require_sensors(objective.count)
 
 
 def place_robustly(
@@ -63,7 +66,7 @@ def place_robustly(
     SeipError
         As for `check_robust_objective`, `placement_problem` and `solve_robust`.
     """
-    check_robust_objective(objective)
+    check_robust_objective(objective, settings.risk)
     site, models, around = layout.site, layout.models, surroundings(layout)
     problem = placement_problem(site, grid.visible, models, objective)
     study = yield from robust_study(around, problem, settings, [settings.risk], layout.settings.limits)
@@ -71,7 +74,7 @@ def place_robustly(
     deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
     tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
     under_errors = yield from pose_study(around, deployment, tried)
-    note = f"chosen for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
+    note = f"{CHOSEN_FOR}for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"
     notes = (note, *chosen.placement.notes, robustness_message(study), *pose_warnings(under_errors))
     solution = Solution(with_count(objective, site), replace(chosen.placement, notes=notes), None, deployment)
     return RobustSolution(solution, study, under_errors)

@@ -11,7 +11,7 @@ from typing import TypeVar
 from ..arrays import Float
 from ..errors import SeipError
 from ..placement.deployment import deploy
-from ..placement.objective import Objective, Solution, placement_problem, with_count
+from ..placement.objective import CHOSEN_FOR, Objective, Solution, placement_problem, with_count
 from ..progress import Progress
 from ..robustness.traffic_instants import check_runs, spread_instants
 from ..robustness.traffic_presence import road_user_seconds
@@ -120,8 +120,11 @@ def read_runs(paths: Sequence[Path], layout: Layout) -> Generator[Progress, None
     Raises
     ------
     SeipError
-        A file cannot be read, or as for `independent_runs`.
+        A file is named twice or cannot be read, or as for `independent_runs`.
     """
+    for path in paths:
+        if paths.count(path) > 1:
+            raise SeipError(f"{path} is named twice: name each run of traffic once")
     runs: dict[str, Trajectories] = {}
     for number, path in enumerate(paths):
         yield Progress(number, len(paths), "reading runs of traffic")
@@ -139,8 +142,8 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
     """
     if len(runs) < 2:
         raise SeipError(
-            f"{len(runs)} runs of traffic are too few: give two or more, made by headless/traffic.py with a seed each; "
-            "the last third of them judges what is chosen on the others"
+            f"two runs of traffic or more are needed, not {len(runs)}: make them by headless/traffic.py with a seed "
+            "each; what is chosen on the others is evaluated on the last third"
         )
     check_runs(list(runs.values()), site.region)
     positions = [vehicle_positions(name, run) for name, run in runs.items()]
@@ -177,7 +180,7 @@ def place_in_traffic(
     study = yield from traffic_study(around, problem, scenarios, evaluation, layout.settings.limits)
     placement = study.traffic.placement
     note = (
-        f"chosen to see the {LAYER_NAMES[study.layer]} in traffic, on average over {study.chosen_at} instants: "
+        f"{CHOSEN_FOR}to see the {LAYER_NAMES[study.layer]} in traffic, on average over {study.chosen_at} instants: "
         "objective, bound and gap are of that"
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()

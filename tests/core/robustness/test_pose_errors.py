@@ -165,6 +165,7 @@ def test_without_errors_every_draw_covers_what_was_planned(placed):
     assert study.planned.central.tolist() == [deployment.central]
     assert (study.together.whole == deployment.coverage).all()
     assert study.by_kind == {}
+    assert not study.worst_sensor()[1]  # nothing is lost, so that no sensor's error stands out
     assert pose_warnings(study) == ()
 
 

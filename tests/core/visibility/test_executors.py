@@ -40,7 +40,7 @@ def cluster() -> Iterator[object]:
 
 @pytest.mark.skipif(HAS_DASK, reason="Dask is installed")
 def test_a_missing_dask_has_its_sentence() -> None:
-    with pytest.raises(SeipError, match="the group 'cluster'"):
+    with pytest.raises(SeipError, match="the extra 'cluster'"):
         finish(compute_visibility(SITE, MODELS, SETTINGS, ANY, scheduler="tcp://127.0.0.1:1"))
 
 
