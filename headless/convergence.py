@@ -95,7 +95,7 @@ class Convergence:
             f"picked for a tolerance of {self.tolerance:g}: targets {grid.grid_spacing:g} m apart, whose placement "
             f"covers {grid.evaluated:.2%} against {finest.evaluated:.2%} with {finest.grid_spacing:g} m; "
             f"posts {posts.candidate_spacing:g} m apart, {posts.evaluated:.2%} against {most.evaluated:.2%} "
-            f"with {most.candidate_spacing:g} m; all judged on targets {self.evaluation_spacing:g} m apart"
+            f"with {most.candidate_spacing:g} m; all evaluated on targets {self.evaluation_spacing:g} m apart"
         )
 
 

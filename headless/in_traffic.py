@@ -81,8 +81,8 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=[],
         metavar="NPZ",
-        help="runs of traffic: the last third judges what is chosen on the others (those in the folder SCENE_traffic "
-        "beside the scene)",
+        help="runs of traffic: what is chosen on the others is evaluated on the last third (those in the folder "
+        "SCENE_traffic beside the scene)",
     )
     names = ("layer", "weights_from_traffic", "instants", "evaluation_instants", "seed")
     add_settings(traffic, TrafficSettings, *names)

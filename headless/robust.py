@@ -58,7 +58,7 @@ def _in_words(robust: RobustSolution) -> str:
             f"over {study.settings.draws} unseen draws, {chosen.evaluated_by.describe_outcome()}:",
             f"mean {chosen.mean.describe()}, the nominal optimum's {nominal.mean.describe()}",
             f"5 % quantile {chosen.low.describe()}, the nominal optimum's {nominal.low.describe()}",
-            f"which is {study.saving(chosen).describe()} more, draw for draw",
+            f"the 5 % quantile is higher by {study.saving(chosen).describe()}",
             solution.certificate,
             *solution.placement.notes,
         ]

@@ -81,10 +81,10 @@ def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
         shares,
         -1,
         [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
-        "promised, empty road",
+        "empty road",
     )
-    _bars(shares, 0, [empty.mean for empty, _ in rows], "held in traffic")
-    _bars(shares, 1, [traffic.mean for _, traffic in rows], "held, placed on traffic")
+    _bars(shares, 0, [empty.mean for empty, _ in rows], "in traffic")
+    _bars(shares, 1, [traffic.mean for _, traffic in rows], "in traffic, placed on traffic")
     shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)
     _dots(changes, -0.5, [negative(empty.loss) for empty, _ in rows], 1, "change by traffic")
     _dots(changes, 0.5, [traffic.more_than(empty) for empty, traffic in rows], 2, "gain by placing on traffic")

@@ -128,7 +128,7 @@ class Evaluation:
 
 
 def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
-    """Judge all detections.
+    """Evaluate all detections.
 
     Raises
     ------

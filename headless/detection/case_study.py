@@ -336,7 +336,7 @@ def evaluate_all(
                             found = detect(detector, frame.points, frame.intensity)
                         result = _result(simulator, configuration, run, frame, cloud, found)
                         results.setdefault((model.name, configuration.name), []).append(result)
-    yield Progress(total, total, "judged")
+    yield Progress(total, total, "evaluated")
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
 
 

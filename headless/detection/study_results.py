@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -239,4 +240,5 @@ def in_words(results: StudyResults) -> Iterator[str]:
         )
     correlation, interval = results.correlation
     between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
-    yield f"rank correlation of coverage and AP: {correlation:.2f}{between}"
+    found = f"{correlation:.2f}{between}" if math.isfinite(correlation) else "none, where all have the same"
+    yield f"rank correlation of coverage and AP: {found}"

@@ -154,7 +154,7 @@ def _draw_answer(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 
 def figures(record: PlacementRecord) -> list[tuple[str, str]]:
-    """Return what a placement is judged by, in words."""
+    """Return what a placement is evaluated by, as text."""
     coverage, objective = record.coverage, record.objective
     lines = [("Coverage", f"{coverage.whole:.2%}")]
     if coverage.central is not None:

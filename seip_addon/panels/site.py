@@ -98,15 +98,15 @@ class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
 
 
 def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
-    held = roles.roles_of(scene, thing)
+    assigned = roles.roles_of(scene, thing)
     box = layout.box()
     box.label(text=thing.name, icon="OBJECT_DATA")
-    draw_sentence(box, ", ".join(role.value for role in held).capitalize() or "No role")
+    draw_sentence(box, ", ".join(role.value for role in assigned).capitalize() or "No role")
     column = settings_column(box)
     column.enabled = thing.is_editable
-    if Role.WEIGHTED_REGIONS in held:
+    if Role.WEIGHTED_REGIONS in assigned:
         column.prop(thing, "seip_region_weight")
-    if Role.POLES in held:
+    if Role.POLES in assigned:
         column.prop(thing, "seip_pole_rule")
 
 

@@ -69,4 +69,4 @@ def _close(road_map: RoadMap, asked: str) -> str:
     if not known:
         return "the map has no junctions, choose a place by its coordinates"
     close = difflib.get_close_matches(asked, known, n=5, cutoff=0.4) or known[:5]
-    return f"the closest are {', '.join(dict.fromkeys(close))}"
+    return f"the closest: {', '.join(dict.fromkeys(close))}"

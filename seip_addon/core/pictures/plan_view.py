@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 DPI = 160
 MARGIN, HEAD = 0.3, 0.95  # inches
+ARROW_LENGTH = 0.34  # inches
 MIN_MAP_WIDTH, MAX_MAP_WIDTH = 9.6, 15.0  # inches
 MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 6.6, 10.5  # inches
 MARGIN_SHARE = 0.06  # of the region's size, shown around it
@@ -93,6 +94,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
     sensors = np.array([sensor.xyz[:2] for sensor in deployment.sensors]).reshape(-1, 2)
     draw_sensors(plan, deployment, sensors, site.targets.xyz[:, :2], zorder=SENSOR)
     inch = (window[2] - window[0]) / map_width
+    _draw_headings(plan, deployment, inch)
     draw_scale(plan, inch)
     _draw_north(plan, inch)
     draw_title(figure, site, deployment, MARGIN)
@@ -223,6 +225,16 @@ def _draw_candidates(plan: Axes, geometry: SceneGeometry, site: Site) -> None:
         (assumed, ASSUMED_MARK),
     ):
         plan.plot(places[:, 0], places[:, 1], zorder=CANDIDATE, **style)
+
+
+def _draw_headings(plan: Axes, deployment: Deployment, inch: float) -> None:
+    """Draw an arrow from each tilted sensor, the way it looks; upright ones look all round."""
+    for sensor in deployment.sensors:
+        if sensor.tilt != 0.0:
+            x, y, _ = sensor.xyz.tolist()
+            ahead = (x + ARROW_LENGTH * inch * math.cos(sensor.yaw), y + ARROW_LENGTH * inch * math.sin(sensor.yaw))
+            style = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0}
+            plan.annotate("", xy=ahead, xytext=(x, y), arrowprops=style, zorder=SENSOR - 0.2)
 
 
 def draw_scale(plan: Axes, inch: float) -> None:

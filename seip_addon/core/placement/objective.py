@@ -26,7 +26,7 @@ DEFAULT_COUNT = 4
 
 MOVED = "moved by hand"
 """Status of a placement whose sensors hang where a hand has put them."""
-MOVED_MESSAGE = "Moved by hand: judged where the sensors hang; nothing is proven of it."
+MOVED_MESSAGE = "Moved by hand: evaluated where the sensors hang; nothing is proven of it."
 CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
 
 

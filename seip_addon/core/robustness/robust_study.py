@@ -52,7 +52,7 @@ class RobustnessSettings:
     risk: Risk = field(default_factory=Risk)
     errors: PoseErrors = field(default_factory=PoseErrors)
     scenarios: int = setting(20, "draws to choose on", minimum=1)
-    draws: int = setting(500, "unseen draws to judge by", minimum=1)
+    draws: int = setting(500, "unseen draws to evaluate on", minimum=1)
     seed: int = setting(0, "of the scenarios; unseen draws have the next")
 
     def __post_init__(self) -> None:

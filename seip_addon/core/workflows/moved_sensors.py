@@ -64,7 +64,7 @@ def evaluate_moved_sensors(
         A sensor hangs below the ground.
     """
     site, models = layout.site, layout.models
-    eyes: VisibilityModel | None = None
+    visibility: VisibilityModel | None = None
     sensors: list[Sensor] = []
     rows: list[Boolean] = []
     for done, one in enumerate(mounted):
@@ -74,11 +74,11 @@ def evaluate_moved_sensors(
             sensors.append(sensor_at(site, models, one.label, pose))
             rows.append(grid.visible[pose])
             continue
-        if eyes is None:
-            eyes = visibility_model(site, layout.settings.visibility, layout.settings.engine)
+        if visibility is None:
+            visibility = visibility_model(site, layout.settings.visibility, layout.settings.engine)
         sensor = _elsewhere(layout, one, places.get(one.label, BY_HAND))
         sensors.append(sensor)
-        rows.append(eyes.see(sensor.model, sensor.xyz, sensor.orientation))
+        rows.append(visibility.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
     deployment = deployment_of(site, sensors, seen)
     covered = float(target_weights(site, objective)[deployment.seen_by > 0].sum())

@@ -169,8 +169,8 @@ def test_a_junction_is_found_by_its_id_or_its_name(three_junctions):
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ("Nort gate", "no junction 'Nort gate' in map 'map'; the closest are North gate"),
-        ("zzz", "the closest are 700, North gate, 701"),
+        ("Nort gate", "no junction 'Nort gate' in map 'map'; the closest: North gate"),
+        ("zzz", "the closest: 700, North gate, 701"),
         ("South gate", "several junctions are called 'South gate'; choose one by its id: 701, 702"),
         ("800", "junction '800' has no lanes"),
     ],

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import matplotlib as mpl
@@ -97,6 +98,19 @@ def test_the_legend_gives_the_weight_of_an_area_whether_or_not_it_counted(exampl
 def test_names_are_taken_as_they_are(example, tmp_path):
     site = type(example.site)(**{**vars(example.site), "name": "Corner of $1 and $2_x"})
     save_plan_view(tmp_path / "plan.png", example.geometry, site, example.deployment)
+
+
+def test_tilted_sensors_alone_show_where_they_look(example):
+    first, *others = example.deployment.sensors
+    tilted = replace(first, tilt=math.radians(15), yaw=math.radians(90))
+    figure = draw_plan(example.geometry, example.site, replace(example.deployment, sensors=(tilted, *others)))
+    (arrow,) = (text for text in figure.axes[0].texts if getattr(text, "arrow_patch", None))
+    assert arrow.xy[0] == pytest.approx(tilted.xyz[0])
+    assert arrow.xy[1] > tilted.xyz[1]
+    words = [text.get_text() for text in figure.axes[1].texts]
+    assert sum("tilted 15°" in text for text in words) == 1
+    upright = draw_plan(example.geometry, example.site, example.deployment)
+    assert not any(getattr(text, "arrow_patch", None) for text in upright.axes[0].texts)
 
 
 def test_each_type_has_its_marker(example):
