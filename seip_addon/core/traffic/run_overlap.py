@@ -108,4 +108,5 @@ def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions
                 "for runs that are to be independent: name runs that were simulated with other demand and other seeds"
             )
         said.append(f"{one.name} and {other.name} {'cannot be told' if share is None else format(share, '.0%')}")
-    return f"vehicles of one run within {SAME_PLACE:g} m of one of another at the same instant: {', '.join(said)}"
+    measure = f"vehicles of one run within {SAME_PLACE:g} m of one of another at the same instant"
+    return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(said)}"
