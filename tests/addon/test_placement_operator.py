@@ -41,6 +41,7 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_pose_errors_are_tried_where_that_is_asked_for(junction, tmp_path, small_scene):
     junction.seip.goal.pose_errors = True
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}

@@ -60,6 +60,7 @@ def test_what_traffic_leaves_of_a_placement_stands_with_it(placed, tmp_path):
     assert list(load_placement_record(tmp_path / "placement.json").notes) == notes
 
 
+@pytest.mark.slow
 def test_a_dataset_is_that_of_the_batch_command(placed, tmp_path, small_scene):
     traffic = placed.seip.traffic
     traffic.whole, traffic.start, traffic.duration, traffic.rate, traffic.seed = False, 20.0, 0.2, 5.0, 7

@@ -103,6 +103,7 @@ def test_more_sensors_than_positions_leave_those_cells_empty_and_the_rest_solved
     assert all((row["coverage"] == "") == (row["count"] == "4") for row in rows)
 
 
+@pytest.mark.slow
 def test_a_type_that_is_blind_from_one_height_leaves_that_height_empty(example, tmp_path):
     candidates = example.site.candidates
     visible = example.visible.copy()
@@ -183,6 +184,7 @@ def test_a_name_with_a_bar_stays_in_its_markdown_cell(tmp_path, study):
     assert "| a \\| b |" in (tmp_path / "claims.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_charts_take_more_types_than_there_are_colours(study, tmp_path):
     keys = [f"type {index} for $1 and $2" for index in range(8)]
     cells = [replace(cell, sensor=key) for key in keys for cell in study.cells if cell.sensor == study.sensors[0]]

@@ -40,7 +40,9 @@ def trajectories(path, *, x=0.0, end=30.0):
     return str(path)
 
 
-@pytest.mark.parametrize("options", [[], ["--see", "height", "--weights-from-traffic"]])
+@pytest.mark.parametrize(
+    "options", [[], pytest.param(["--see", "height", "--weights-from-traffic"], marks=pytest.mark.slow)]
+)
 def test_it_writes_a_result_and_says_what_traffic_hides(tmp_path, capsys, options, run):
     run(tmp_path, "--count", "2", *options)
     names = {path.name for path in tmp_path.iterdir()}

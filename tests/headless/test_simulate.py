@@ -125,6 +125,7 @@ def test_a_started_run_is_finished(folder, run):
     assert contents(run) == before
 
 
+@pytest.mark.slow
 def test_options_reach_the_frames(folder):
     simulate.main(
         arguments(folder, "exact", "--no-noise", "--rolling-shutter", "--start", "0.5", "--rate", "2", "--seed", "9")

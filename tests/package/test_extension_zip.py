@@ -84,6 +84,7 @@ def test_the_extension_tool_refuses_with_its_own_words(tmp_path):
         build_extension.blender_extension("validate", str(tmp_path))
 
 
+@pytest.mark.slow
 def test_the_root_package_is_lazy():
     """A checkout of any name can be imported without loading the add-on a second time."""
     script = (

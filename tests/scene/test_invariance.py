@@ -77,6 +77,7 @@ def built(path, near):
     return site_of(scene)
 
 
+@pytest.mark.slow
 def test_five_thousand_kilometres_change_nothing(far_map):
     here = built(SCENES / "junction.xodr", (0.0, 0.0))
     there = built(far_map, (FAR, -FAR))

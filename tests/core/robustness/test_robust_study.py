@@ -92,6 +92,7 @@ def study_of_losses(laid_out):
     return finish(robust_study(*laid_out, SETTINGS, LOSSES, LIMITS))
 
 
+@pytest.mark.slow
 def test_who_was_chosen_for_a_loss_is_judged_by_that_loss_as_is_the_nominal_optimum(laid_out, study_of_losses):
     around, problem = laid_out
 

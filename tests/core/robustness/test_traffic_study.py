@@ -58,7 +58,7 @@ def laid_out():
     return around, replace(problem, forbidden=site.candidates.sensor == "hdl32e")
 
 
-@pytest.fixture(scope="module", params=["road", "height"])
+@pytest.fixture(scope="module", params=["road", pytest.param("height", marks=pytest.mark.slow)])
 def study(request, laid_out):
     around, problem = laid_out
     scenarios = finish(traffic_scenarios(around, problem, spread_instants([queue(1), queue(2)], 6, 0), request.param))

@@ -199,6 +199,7 @@ def test_nobody_near_the_scene_is_refused(tmp_path):
         read_trajectories(data, BUILT_IN, np.zeros(3), "f")
 
 
+@pytest.mark.slow
 def test_what_lies_elsewhere_takes_no_memory(tmp_path):
     """Four times as long a file takes hardly more memory: two road users' samples, where 200 would be kept.
 

@@ -149,6 +149,7 @@ def test_same_as_the_full_scan_on_a_junction(engine: Engine, key: str) -> None:
     assert lazy.parameters["rays_cast"] < 0.03 * full.parameters["rays_cast"]
 
 
+@pytest.mark.slow
 @needs_bvh
 @needs_embree
 def test_engines_differ_only_where_the_distance_is_delta_but_for_rounding() -> None:
@@ -163,6 +164,7 @@ def test_engines_differ_only_where_the_distance_is_delta_but_for_rounding() -> N
     assert different <= 1e-3 * total
 
 
+@pytest.mark.slow
 @needs_bvh
 @needs_embree
 def test_engines_differ_in_few_targets_of_a_junction() -> None:
