@@ -62,10 +62,10 @@ def main(argv: list[str]) -> None:
     ]
     trainings = [_train(study, model, options.device) for model in models]
     with deterministic(1):
-        trained = study.surveyed.stopwatch.run("training", side_by_side(trainings, case_study.PARALLEL_TRAININGS))
+        trained = study.stopwatch.run("training", side_by_side(trainings, case_study.PARALLEL_TRAININGS))
     detectors = [detector for detector, _ in trained]
     evaluation = case_study.evaluate_all(study.simulator, models, detectors, study.traffic)
-    outcomes = study.surveyed.stopwatch.run("evaluation", evaluation)
+    outcomes = study.stopwatch.run("evaluation", evaluation)
     settings = [
         DetectorSetting(
             name=name,
@@ -79,9 +79,7 @@ def main(argv: list[str]) -> None:
         )
         for (family, name), model, (detector, seconds) in zip(NETWORKS, models, trained, strict=True)
     ]
-    title = (
-        f"{study.surveyed.layout.site.name}: mean over {len(study.configurations)} placements, {options.steps} steps"
-    )
+    title = f"{study.surveyed.site.name}: mean over {len(study.configurations)} placements, {options.steps} steps"
     with runtime.incomplete_if_interrupted(options.output):
         save_setting_chart(options.output / "settings.png", settings, title)
         save_json(options.output / "settings.json", [vars(setting) for setting in settings])
@@ -97,7 +95,7 @@ def _train(
 ) -> Generator[Progress, None, tuple[Detector, float]]:
     """Simulate the training set and train a detector on it; return it with the CPU time of the training in seconds."""
     simulator = Simulator(study.simulator.static, study.simulator.settings, study.simulator.site)
-    grid = grid_of(study.surveyed.layout.geometry, model.network.pillar)
+    grid = grid_of(study.surveyed.geometry, model.network.pillar)
     training_set = yield from case_study.simulate_training_set(
         simulator, model.configurations, study.traffic, grid, model.network.most_points
     )

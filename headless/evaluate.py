@@ -33,6 +33,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.objective import Objective, check_objective
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import ScanSettings, static_scene
+from seip_addon.core.workflows.survey import Survey
 
 
 def main(argv: list[str]) -> None:
@@ -41,9 +42,9 @@ def main(argv: list[str]) -> None:
     if options.seeds < 1:
         raise SeipError(f"ask for one training or more, not {options.seeds}")
     study = prepare_study(options)
-    watch, simulator, folder = study.surveyed.stopwatch, study.simulator, options.output
+    watch, simulator, folder = study.stopwatch, study.simulator, options.output
     network = NetworkSettings()
-    grid = grid_of(study.surveyed.layout.geometry, network.pillar)
+    grid = grid_of(study.surveyed.geometry, network.pillar)
     steps = case_study.simulate_training_set(simulator, study.configurations, study.traffic, grid, network.most_points)
     training_set = watch.run("simulation", steps)
     models = case_study.model_configurations(
@@ -62,12 +63,12 @@ def main(argv: list[str]) -> None:
     outcomes = watch.run("evaluation", case_study.evaluate_all(simulator, models, detectors, study.traffic))
     claims = detection_claims([outcome.seed_result for outcome in outcomes])
 
-    site = study.surveyed.layout.site
+    site = study.surveyed.site
     with runtime.incomplete_if_interrupted(folder):
         results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = study.surveyed.layout.settings.as_record() | {
+        settings = study.surveyed.settings.as_record() | {
             "seeds": options.seeds,
             "frames_every_s": options.every,
         }
@@ -93,7 +94,8 @@ class DetectionStudy:
         1, 2 and 4 sensors of each type.
     """
 
-    surveyed: survey.Survey
+    surveyed: Survey
+    stopwatch: survey.Stopwatch
     traffic: case_study.Traffic
     configurations: tuple[SensorConfiguration, ...]
     simulator: Simulator
@@ -104,22 +106,16 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     check_device(options.device)
     if options.every <= 0:
         raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
-    surveyed = survey.survey(
+    surveyed, watch = survey.survey(
         options, lambda layout: check_objective(layout.site, layout.models, Objective(count=COUNTS[-1]))
     )
     paths = options.traffic or survey.runs_beside(options.scene)
-    traffic = case_study.read_traffic(paths, surveyed.layout.geometry.origin, options.every)
+    traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
     runtime.LOG.info(traffic.overlap())
-    steps = case_study.place_all(
-        surveyed.layout.site,
-        surveyed.layout.models,
-        surveyed.grid,
-        surveyed.layout.settings.limits,
-    )
-    configurations = surveyed.stopwatch.run("placements", steps)
+    configurations = watch.run("placements", case_study.place_all(surveyed))
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
-    simulator = Simulator(static_scene(surveyed.layout.geometry), scans, surveyed.layout.site.name)
-    return DetectionStudy(surveyed, traffic, configurations, simulator)
+    simulator = Simulator(static_scene(surveyed.geometry), scans, surveyed.site.name)
+    return DetectionStudy(surveyed, watch, traffic, configurations, simulator)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -37,23 +37,22 @@ def main(argv: list[str]) -> None:
         check_objective(layout.site, layout.models, objective)
         traffic.append(finish(read_runs(options.traffic or survey.runs_beside(options.scene), layout)))
 
-    surveyed = survey.survey(options, check)
-    layout, (runs,) = surveyed.layout, traffic
+    surveyed, watch = survey.survey(options, check)
+    (runs,) = traffic
     runtime.LOG.info(runs.overlap)
-    steps = place_in_traffic(layout, surveyed.grid, objective, runs, settings)
-    placed = surveyed.stopwatch.run("placement in traffic", steps)
+    placed = watch.run("placement in traffic", place_in_traffic(surveyed, objective, runs, settings))
     solution, study = placed.solution, placed.study
     runtime.print_line(_in_words(study, solution))
     with runtime.incomplete_if_interrupted(options.output):
-        name = layout.site.name
+        name = surveyed.site.name
         title = f"{name}: for how long the placement sees what, {study.road_users:.0f} road users at a time"
         save_time_map(
-            options.output / CHARTS[0], layout.geometry, layout.site, solution.deployment, study.traffic, title
+            options.output / CHARTS[0], surveyed.geometry, surveyed.site, solution.deployment, study.traffic, title
         )
         sensors = f"{len(solution.deployment.sensors)} sensors"
         save_traffic_chart(options.output / CHARTS[1], [(sensors, study)], f"{name}: empty road and traffic")
         asked = {"render": not options.no_render, "traffic": asdict(settings)}
-        survey.save_solution(surveyed, solution, options.output, asked)
+        survey.save_solution(surveyed, watch, solution, options.output, asked)
     runtime.print_line(f"written to {options.output}/")
 
 

@@ -33,13 +33,14 @@ def main(argv: list[str]) -> None:
     objective = read_objective(options)
     tolerance = options.tolerance
     refine = None if tolerance is None else partial(coarsest_settings, objective=objective, tolerance=tolerance)
-    surveyed = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, objective), refine)
-    steps = place(surveyed.layout, surveyed.grid, objective, pose_errors=options.pose_errors)
-    solution = surveyed.stopwatch.run("placement", steps)
+    surveyed, watch = survey.survey(
+        options, lambda layout: check_objective(layout.site, layout.models, objective), refine
+    )
+    solution = watch.run("placement", place(surveyed, objective, pose_errors=options.pose_errors))
     runtime.print_line(_in_words(solution))
     with runtime.incomplete_if_interrupted(options.output):
         asked = {"render": not options.no_render, "pose_errors": options.pose_errors}
-        survey.save_solution(surveyed, solution, options.output, asked)
+        survey.save_solution(surveyed, watch, solution, options.output, asked)
     runtime.print_line(f"written to {options.output}/")
 
 
@@ -61,7 +62,7 @@ def _in_words(solution: Solution) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = new_parser("place", "Place roadside LiDARs in a scene.")
-    survey.add_options(parser)
+    survey.add_options(parser, in_full=True)
     add_settings(add_objective(parser), Objective, "coverage")
     parser.add_argument(
         "--tolerance",

@@ -32,18 +32,17 @@ def main(argv: list[str]) -> None:
     options = _parser().parse_args(argv)
     objective, robustness = read_objective(options), _robustness(options)
     check_robust_objective(objective, robustness.risk)
-    surveyed = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, objective))
-    steps = place_robustly(surveyed.layout, surveyed.grid, objective, robustness)
-    robust = surveyed.stopwatch.run("robust placement", steps)
+    surveyed, watch = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, objective))
+    robust = watch.run("robust placement", place_robustly(surveyed, objective, robustness))
     solution, study = robust.solution, robust.study
     runtime.print_line(_in_words(robust))
     with runtime.incomplete_if_interrupted(options.output):
-        layout = surveyed.layout
-        save_spread_chart(options.output / CHARTS[0], study, f"{layout.site.name}: coverage under pose errors")
-        save_loss_chart(options.output / CHARTS[1], robust.pose_study, f"{layout.site.name}: what costs coverage")
-        save_frontier_chart(options.output / CHARTS[2], study, f"{layout.site.name}: what robustness costs and saves")
+        name = surveyed.site.name
+        save_spread_chart(options.output / CHARTS[0], study, f"{name}: coverage under pose errors")
+        save_loss_chart(options.output / CHARTS[1], robust.pose_study, f"{name}: what costs coverage")
+        save_frontier_chart(options.output / CHARTS[2], study, f"{name}: what robustness costs and saves")
         asked = {"render": not options.no_render, "robustness": robustness.as_record()}
-        survey.save_solution(surveyed, solution, options.output, asked)
+        survey.save_solution(surveyed, watch, solution, options.output, asked)
     runtime.print_line(f"written to {options.output}/")
 
 

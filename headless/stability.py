@@ -37,15 +37,15 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     for other in options.other:
         _check_other(other)
     runtime.check_folder(charts)
-    surveyed = survey.survey(
+    surveyed, watch = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
         lambda layout: check_objective(layout.site, layout.models, Objective(count=DEFAULT_COUNT)),
     )
-    runs = load_runs(survey.runs_beside(options.scene), surveyed.layout.geometry.origin)
+    runs = load_runs(survey.runs_beside(options.scene), surveyed.geometry.origin)
     scene = StudiedScene(surveyed, runs, options.scene, options.other, options.work, charts, scope or StabilityScope())
     made_from = digest(
-        grid_key(surveyed.layout),
-        repr(surveyed.layout.settings),
+        grid_key(surveyed),
+        repr(surveyed.settings),
         repr(scene.scope),
         *(run.key for run in runs),
         *(other.name for other in options.other),
@@ -55,9 +55,9 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     for name, work in chapters(scene):
         kept = load_chapter(options.work / f"{name}.json", made_from)
         if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
-            kept = surveyed.stopwatch.run(name, work(scene))
+            kept = watch.run(name, work(scene))
             save_chapter(options.work / f"{name}.json", kept, made_from)
-            runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {surveyed.stopwatch.seconds[name]:.0f} s")
+            runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {watch.seconds[name]:.0f} s")
         done.append(kept)
     with runtime.incomplete_if_interrupted(options.output):
         save_page(options.output / PAGE, introduction(scene), done, CHARTS)

@@ -28,10 +28,12 @@ from seip_addon.core.placement.objective import Objective, check_objective
 def main(argv: list[str]) -> None:
     """Run the study on one scene and write charts, tables and plans to a folder."""
     options = _parser().parse_args(argv)
-    surveyed = survey.survey(options, lambda layout: check_objective(layout.site, layout.models, Objective(count=1)))
-    site, visible, folder = surveyed.layout.site, surveyed.grid.visible, options.output
-    steps = coverage_study(site, surveyed.layout.models, visible, surveyed.layout.settings.limits)
-    study = surveyed.stopwatch.run("study", steps)
+    surveyed, watch = survey.survey(
+        options, lambda layout: check_objective(layout.site, layout.models, Objective(count=1))
+    )
+    site, visible, folder = surveyed.site, surveyed.grid.visible, options.output
+    steps = coverage_study(site, surveyed.models, visible, surveyed.settings.limits)
+    study = watch.run("study", steps)
     claims = coverage_claims(study)
 
     with runtime.incomplete_if_interrupted(folder):
@@ -46,7 +48,7 @@ def main(argv: list[str]) -> None:
                 if case is not None:
                     name = f"plan_{sensor}_{'vanilla' if weight == 1.0 else 'weighted'}.png"
                     notes = [] if weight == 1.0 else [f"Optimised with weight {weight:g} in weighted regions."]
-                    save_plan_view(folder / name, surveyed.layout.geometry, site, case.deployment, notes)
+                    save_plan_view(folder / name, surveyed.geometry, site, case.deployment, notes)
         save_claims(folder / "claims.md", claims, site.name)
     for claim in claims:
         runtime.print_line(claim.describe())

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from headless import runtime
 from headless.convergence import Convergence
-from headless.options import add_settings, read_settings
+from headless.options import add_settings, name_only, read_settings
 
 import bpy
 import numpy as np
@@ -27,10 +27,9 @@ from seip_addon.core.results.placement_record import Provenance, versions
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
-from seip_addon.core.visibility.grid import VisibilityGrid
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.triangle_culling import culling_message
-from seip_addon.core.workflows.survey import Layout, SurveySettings, lay_out, record_of, see
+from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, record_of, see
 from seip_addon.core.workflows.traffic import runs_in, traffic_folder
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
@@ -59,17 +58,14 @@ class Stopwatch:
             return self.time(step, lambda: finish(steps, report))
 
 
-@dataclass(frozen=True, eq=False)
-class Survey:
-    """A scene with its site layout and visibility grid."""
+def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> None:
+    """Add the scene, the folder of results and the options of a survey to a command.
 
-    layout: Layout
-    grid: VisibilityGrid
-    stopwatch: Stopwatch
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the scene, the folder of results and the options of a survey to a command."""
+    Parameters
+    ----------
+    in_full : bool
+        Whether the command's help explains the options of a survey; otherwise it names them.
+    """
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     sensors = parser.add_argument_group("sensors")
@@ -93,6 +89,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--time-limit", type=float, metavar="S", help="for each answer, in seconds (default: 60, or none with --effort)"
     )
     add_settings(work, SurveySettings, "effort")
+    if not in_full:
+        for group in (sensors, metres, work):
+            name_only(group, "see: seip place --help")
 
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
@@ -103,8 +102,10 @@ def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:
 Refine = Callable[[SceneGeometry, SurveySettings], Generator[Progress, None, Convergence]]
 
 
-def survey(options: argparse.Namespace, check: Callable[[Layout], None], refine: Refine | None = None) -> Survey:
-    """Read the scene, lay out its site, and find or compute its visibility grid.
+def survey(
+    options: argparse.Namespace, check: Callable[[Layout], None], refine: Refine | None = None
+) -> tuple[Survey, Stopwatch]:
+    """Read the scene, lay out its site, and find or compute its visibility grid; return with it how long that took.
 
     Parameters
     ----------
@@ -129,24 +130,25 @@ def survey(options: argparse.Namespace, check: Callable[[Layout], None], refine:
     LOG.info(_in_words(layout.site))
     runtime.warn(layout.warnings)
     check(layout)
-    grid = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
-    LOG.info(culling_message(grid.parameters["triangles"]))
-    return Survey(layout, grid, watch)
+    surveyed = watch.run("visibility", see(layout, options.output / "visibility.npz", options.scheduler))
+    LOG.info(culling_message(surveyed.grid.parameters["triangles"]))
+    return surveyed, watch
 
 
-def save_solution(surveyed: Survey, solution: Solution, folder: Path, asked: Mapping[str, object]) -> None:
+def save_solution(
+    surveyed: Survey, watch: Stopwatch, solution: Solution, folder: Path, asked: Mapping[str, object]
+) -> None:
     """Write a solution of a survey, with its record, to the folder of results; for what was asked see `record_of`."""
-    layout, grid = surveyed.layout, surveyed.grid
-    now = Provenance(datetime.now(UTC), surveyed.stopwatch.seconds, versions(blender=bpy.app.version_string))
+    now = Provenance(datetime.now(UTC), watch.seconds, versions(blender=bpy.app.version_string))
     write_result_folder(
         folder,
         bpy.context.scene,
-        layout.geometry,
-        layout.site,
+        surveyed.geometry,
+        surveyed.site,
         solution,
-        record_of(layout, grid, solution, now, asked),
-        visible=grid.visible,
-        models=layout.models,
+        record_of(surveyed, solution, now, asked),
+        visible=surveyed.grid.visible,
+        models=surveyed.models,
         render=bool(asked["render"]),
     )
 

@@ -13,10 +13,10 @@ Examples
 >>> layout = seip.lay_out(geometry, seip.SurveySettings(candidates, grid_spacing=4.0))
 >>> len(layout.site.targets), len(layout.site.candidates)
 (306, 36)
->>> grid = seip.compute_visibility(layout)
->>> grid.visible.shape
+>>> survey = seip.compute_visibility(layout)
+>>> survey.grid.visible.shape
 (36, 306)
->>> solution = seip.place(layout, grid, seip.Objective(count=2))
+>>> solution = seip.place(survey, seip.Objective(count=2))
 >>> solution.placement.status, round(solution.deployment.coverage, 4)
 ('optimal', 0.8922)
 >>> traffic = seip.load_traffic("scenes/junction_traffic/run-1.npz", geometry)
@@ -38,11 +38,10 @@ from .core.site.scene_geometry import SceneGeometry
 from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
 from .core.traffic.source import load_traffic as _load_traffic
-from .core.visibility.grid import VisibilityGrid
 from .core.visibility.grid import compute_visibility as _compute
 from .core.visibility.settings import VisibilitySettings
 from .core.workflows.recording import RecordingSettings, frame_number, make_run, simulation_of
-from .core.workflows.survey import Layout, SurveySettings, lay_out
+from .core.workflows.survey import Layout, Survey, SurveySettings, lay_out, with_grid
 from .core.workflows.survey import place as _place
 
 __all__ = [
@@ -83,7 +82,7 @@ def read_scene(path: str | os.PathLike[str] | None = None) -> SceneGeometry:
     return read(bpy.context.scene).geometry
 
 
-def compute_visibility(layout: Layout, threads: int | None = None) -> VisibilityGrid:
+def compute_visibility(layout: Layout, threads: int | None = None) -> Survey:
     """Compute which candidate sees which target.
 
     Parameters
@@ -93,14 +92,15 @@ def compute_visibility(layout: Layout, threads: int | None = None) -> Visibility
 
     Returns
     -------
-    VisibilityGrid
-        Its ``visible`` is a (candidates, targets) bool array.
+    Survey
+        The layout with its ``grid``, whose ``visible`` is a (candidates, targets) bool array.
     """
     settings = layout.settings
-    return finish(_compute(layout.site, layout.models, settings.visibility, settings.engine, threads=threads))
+    steps = _compute(layout.site, layout.models, settings.visibility, settings.engine, threads=threads)
+    return with_grid(layout, finish(steps))
 
 
-def place(layout: Layout, grid: VisibilityGrid, objective: Objective) -> Solution:
+def place(survey: Survey, objective: Objective) -> Solution:
     """Solve the placement problem.
 
     Returns
@@ -114,7 +114,7 @@ def place(layout: Layout, grid: VisibilityGrid, objective: Objective) -> Solutio
     SeipError
         The objective contradicts itself or the site.
     """
-    return finish(_place(layout, grid, objective))
+    return finish(_place(survey, objective))
 
 
 def load_traffic(path: str | os.PathLike[str], geometry: SceneGeometry) -> Trajectories:

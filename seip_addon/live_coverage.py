@@ -22,20 +22,18 @@ from .scene import contract
 from .scene.sensors import read_sensors
 from .scene.write import show_seen_by
 from .sensor_edits import same_pose
-from .session import FollowedSensors, SceneSurvey, scene_of, session
+from .session import FollowedSensors, SceneState, scene_of, session
 
 DELAY = 0.02
 """Seconds from a movement to the look at it: a drag reports many."""
 
 
-def start(scene: bpy.types.Scene, survey: SceneSurvey, visibility: VisibilityModel) -> None:
+def start(scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel) -> None:
     """Follow the sensors of a scene from now on, from what the placement's own see."""
     stop()
-    if survey.solution is None or survey.grid is None:
-        raise RuntimeError("there is no placement to follow")
-    session.following = FollowedSensors(
-        scene.session_uid, survey, visibility, _as_placed(survey.solution.deployment, survey.grid.visible)
-    )
+    survey, solution = state.placed()
+    known = _as_placed(solution.deployment, survey.grid.visible)
+    session.following = FollowedSensors(scene.session_uid, state, visibility, known)
     for event, handler in _handlers():
         getattr(bpy.app.handlers, event).append(handler)
     update()
@@ -66,9 +64,9 @@ def update() -> None:
 
 
 def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
-    if followed.survey.watch.changed:
+    if followed.state.watch.changed:
         raise SeipError("the scene has changed: place again, or turn this off")
-    if followed.survey.record != scene.seip.result.record:
+    if followed.state.record != scene.seip.result.record:
         raise SeipError("this is another placement: turn this off and on again")
     sensors = {sensor.label: sensor for sensor in read_sensors(scene, preferences.catalogue())}
     for label in [label for label in followed.sensors if label not in sensors]:
@@ -83,7 +81,7 @@ def _update(followed: FollowedSensors, scene: bpy.types.Scene) -> None:
 
 
 def _moved(followed: FollowedSensors, sensors: dict[str, MountedSensor]) -> tuple[str, ...]:
-    solution = followed.survey.solution
+    solution = followed.state.solution
     placed = {} if solution is None else {sensor.label: sensor for sensor in solution.deployment.sensors}
     return tuple(
         label for label, sensor in sensors.items() if label not in placed or not _same(sensor, _mounted(placed[label]))

@@ -10,7 +10,7 @@ from .core.errors import SeipError
 from .core.results.placement_record import PlacementRecord, parsed_record
 from .core.workflows.survey import SurveySettings
 from .scene import contract
-from .session import SceneSurvey, session
+from .session import SceneState, session
 
 FILE_VERSION = 1
 """Of what the add-on keeps with a scene: a file with a higher one was saved by a newer add-on."""
@@ -46,13 +46,13 @@ def obstacle(scene: bpy.types.Scene) -> str:
 
 def stale_survey(scene: bpy.types.Scene) -> str:
     """Return why the survey of a scene is not of the scene as it is, in a sentence; empty if it is."""
-    survey = session.survey_of(scene)
-    if survey is None:
+    state = session.state_of(scene)
+    if state is None:
         return ""
-    if survey.watch.changed:
+    if state.watch.changed:
         return "The scene has changed since it was computed."
     try:
-        same = same_grid(scene.seip.survey.settings(), survey.layout.settings)
+        same = same_grid(scene.seip.survey.settings(), state.layout.settings)
     except SeipError as error:
         return str(error)
     return "" if same else "The settings have changed since it was computed."
@@ -60,10 +60,10 @@ def stale_survey(scene: bpy.types.Scene) -> str:
 
 def stale_placement(scene: bpy.types.Scene) -> str:
     """Return why the scene's placement is not of the scene as it is, in a sentence; empty if it is."""
-    survey = session.survey_of(scene)
-    if survey is None:
+    state = session.state_of(scene)
+    if state is None:
         return NOT_COMPARED
-    return stale_survey(scene) or ("" if is_of(parsed_record(scene.seip.result.record), survey) else ANOTHER_SITE)
+    return stale_survey(scene) or ("" if is_of(parsed_record(scene.seip.result.record), state) else ANOTHER_SITE)
 
 
 def stale_check(scene: bpy.types.Scene) -> str:
@@ -89,9 +89,9 @@ def same_grid(one: SurveySettings, other: SurveySettings) -> bool:
     return _without_search(one) == _without_search(other)
 
 
-def is_of(record: PlacementRecord, survey: SceneSurvey) -> bool:
+def is_of(record: PlacementRecord, state: SceneState) -> bool:
     """Return whether a record's placement was made on a survey; an older record holds fewer digests."""
-    return all(survey.inputs.get(name) == key for name, key in record.inputs.items())
+    return all(state.inputs.get(name) == key for name, key in record.inputs.items())
 
 
 def _without_search(settings: SurveySettings) -> SurveySettings:

@@ -1,7 +1,7 @@
 """Background jobs that read a scene and compute its layout, visibility grid and placement.
 
 Each public function returns a generator that may run in a thread: it touches
-neither Blender's data nor the session, and returns a `SceneSurvey`, which the
+neither Blender's data nor the session, and returns a `SceneState`, which the
 operator keeps.
 """
 
@@ -20,19 +20,18 @@ from .core.errors import SeipError
 from .core.placement.objective import MOVED
 from .core.progress import Progress
 from .core.results.placement_record import PlacementRecord, parsed_record
-from .core.visibility.grid import VisibilityGrid
 from .core.workflows.moved_sensors import restored_by_hand
-from .core.workflows.survey import SurveySettings, inputs_of, lay_out, restored_solution, see
+from .core.workflows.survey import Survey, SurveySettings, inputs_of, lay_out, restored_solution, see
 from .scene.changes import Watch, on_update, watch
 from .scene.read import SceneReading, read_scene
 from .scene_status import FILE_VERSION, is_of, obstacle, same_grid
-from .session import Resources, SceneSurvey, session
+from .session import Resources, SceneState, session
 
 LOAD_DELAY = 0.2
 """Seconds from the opening of a file to the work on it."""
 
 
-def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     """Return a job that lays out a scene with the panel's settings; the scene is read at once, if it has changed.
 
     Raises
@@ -44,31 +43,31 @@ def survey(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
     settings.models()  # refuses before the scene is read
     catalogues = tuple((path, path.stat().st_mtime_ns) for path in settings.catalogue)
     resources = Resources(preferences.cache_folder(), preferences.cores())
-    surveyed = session.survey_of(scene)
-    if surveyed is not None and not surveyed.watch.look(scene) and surveyed.catalogues == catalogues:
-        if same_grid(settings, surveyed.layout.settings):
-            layout = replace(surveyed.layout, settings=settings)
-            return _nothing_to_do(replace(surveyed, layout=layout, resources=resources))
-        reading = SceneReading(surveyed.layout.geometry, surveyed.warnings)
-        return _laid_out(reading, settings, surveyed.watch, resources, catalogues)
+    state = session.state_of(scene)
+    if state is not None and not state.watch.look(scene) and state.catalogues == catalogues:
+        if same_grid(settings, state.layout.settings):
+            layout = replace(state.layout, settings=settings)
+            return _nothing_to_do(replace(state, layout=layout, resources=resources))
+        reading = SceneReading(state.layout.geometry, state.warnings)
+        return _laid_out(reading, settings, state.watch, resources, catalogues)
     began = time.perf_counter()
     watching = watch(scene)
     reading = read_scene(scene)
     return _laid_out(reading, settings, watching, resources, catalogues, time.perf_counter() - began)
 
 
-def with_visibility(surveyed: SceneSurvey) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
-    """Compute the visibility grid of a survey, or take it from the cache; return the survey with it, and it alone."""
-    if surveyed.grid is not None:
-        return surveyed, surveyed.grid
+def with_visibility(state: SceneState) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+    """Compute the visibility grid of a survey, or take it from the cache; return the state and the survey."""
+    if state.survey is not None:
+        return state, state.survey
     began = time.perf_counter()
-    surveyed.resources.check()
-    file = surveyed.resources.grid_file(surveyed.inputs["visibility"])
-    grid = yield from see(surveyed.layout, file, threads=surveyed.resources.cores)
-    return replace(surveyed, grid=grid, durations=surveyed.timed("visibility", began)), grid
+    state.resources.check()
+    file = state.resources.grid_file(state.inputs["visibility"])
+    survey = yield from see(state.layout, file, threads=state.resources.cores)
+    return replace(state, layout=survey, durations=state.timed("visibility", began)), survey
 
 
-def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     """Return a job that restores a scene's placement from the record in the file and the cached grid.
 
     Raises
@@ -83,14 +82,14 @@ def with_placement(scene: bpy.types.Scene) -> Generator[Progress, None, SceneSur
     return _restored(survey(scene), text)
 
 
-def with_grid_of_placement(scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
+def with_grid_of_placement(scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, Survey]]:
     """Return a job that restores the grid of a scene's placement; raises as `with_placement` does."""
     return _grid_again(survey(scene), parsed_record(scene.seip.result.record))
 
 
-def _nothing_to_do(surveyed: SceneSurvey) -> Generator[Progress, None, SceneSurvey]:
+def _nothing_to_do(state: SceneState) -> Generator[Progress, None, SceneState]:
     yield from ()
-    return surveyed
+    return state
 
 
 def _laid_out(
@@ -100,37 +99,35 @@ def _laid_out(
     resources: Resources,
     catalogues: tuple[tuple[Path, int], ...],
     seconds: float = 0.0,
-) -> Generator[Progress, None, SceneSurvey]:
+) -> Generator[Progress, None, SceneState]:
     yield Progress(0, 0, "laying out the site")
     began = time.perf_counter()
     layout = lay_out(reading.geometry, settings, reading.warnings)
     durations = {"read the scene": seconds, "lay out the site": time.perf_counter() - began}
-    return SceneSurvey(
-        layout, inputs_of(layout), watching, resources, catalogues, reading.warnings, durations=durations
-    )
+    return SceneState(layout, inputs_of(layout), watching, resources, catalogues, reading.warnings, durations=durations)
 
 
 def _grid_again(
-    surveying: Generator[Progress, None, SceneSurvey], record: PlacementRecord
-) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]]:
-    surveyed = yield from surveying
-    if not is_of(record, surveyed):
+    surveying: Generator[Progress, None, SceneState], record: PlacementRecord
+) -> Generator[Progress, None, tuple[SceneState, Survey]]:
+    state = yield from surveying
+    if not is_of(record, state):
         raise SeipError("the scene or its settings have changed since the placement: place again")
-    if surveyed.grid is None and not surveyed.resources.grid_file(surveyed.inputs["visibility"]).exists():
+    if state.survey is None and not state.resources.grid_file(state.inputs["visibility"]).exists():
         raise SeipError("the cache no longer holds the visibility of this placement: press Compute Visibility")
-    return (yield from with_visibility(surveyed))
+    return (yield from with_visibility(state))
 
 
-def _restored(surveying: Generator[Progress, None, SceneSurvey], text: str) -> Generator[Progress, None, SceneSurvey]:
+def _restored(surveying: Generator[Progress, None, SceneState], text: str) -> Generator[Progress, None, SceneState]:
     record = parsed_record(text)
-    surveyed, grid = yield from _grid_again(surveying, record)
-    if surveyed.record == text and surveyed.solution is not None:
-        return surveyed
+    state, survey = yield from _grid_again(surveying, record)
+    if state.record == text and state.solution is not None:
+        return state
     if record.objective.status == MOVED:
-        solution = yield from restored_by_hand(surveyed.layout, grid, record)
+        solution = yield from restored_by_hand(survey, record)
     else:
-        solution = restored_solution(surveyed.layout, grid, record)
-    return replace(surveyed, solution=solution, record=text)
+        solution = restored_solution(survey, record)
+    return replace(state, solution=solution, record=text)
 
 
 @bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
@@ -144,7 +141,7 @@ def _compare() -> None:
     """Compare each window's scene with its placement, one: there is one piece of work at a time."""
     for window in bpy.context.window_manager.windows:
         scene = window.scene
-        unknown = session.survey_of(scene) is None and scene.seip.result.record
+        unknown = session.state_of(scene) is None and scene.seip.result.record
         if session.running is None and unknown and not obstacle(scene):
             with (
                 bpy.context.temp_override(window=window),

@@ -31,18 +31,18 @@ def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -
 
 def show_candidate(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     """Put the 3D cursor at the candidate that was clicked on in the ranking."""
-    surveyed = session.survey_of(context.scene)
+    state = session.state_of(context.scene)
     pose = result.ranking[result.active_ranked].pose
-    if surveyed is not None and pose < len(surveyed.layout.site.candidates):
-        context.scene.cursor.location = Vector(surveyed.layout.site.candidates.xyz[pose])
+    if state is not None and pose < len(state.layout.site.candidates):
+        context.scene.cursor.location = Vector(state.layout.site.candidates.xyz[pose])
 
 
 def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> Iterator[str]:
     """Yield the names of positions that hold a text: those that were laid out, or else the poles."""
     scene = context.scene
-    surveyed = session.survey_of(scene)
-    if surveyed is not None:
-        names = surveyed.layout.site.candidates.position_name.tolist()
+    state = session.state_of(scene)
+    if state is not None:
+        names = state.layout.site.candidates.position_name.tolist()
     else:
         names = sorted(thing.name for thing in contract.members(scene)[contract.POLES])
     yield from (name for name in names if text.lower() in name.lower())

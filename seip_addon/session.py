@@ -27,9 +27,8 @@ from .core.storage.files import check_folder
 from .core.traffic import Trajectories
 from .core.traffic.source import TrafficFiles
 from .core.visibility.estimate import Estimate
-from .core.visibility.grid import VisibilityGrid
 from .core.visibility.visibility_model import VisibilityModel
-from .core.workflows.survey import Layout, SurveySettings
+from .core.workflows.survey import Layout, Survey, SurveySettings
 from .overlay import Overlay
 from .scene.changes import Watch
 
@@ -68,13 +67,13 @@ class Resources:
 
 
 @dataclass(frozen=True)
-class SceneSurvey:
-    """What is known of a scene: its layout, and, once they were computed, its visibility grid and its placement.
+class SceneState:
+    """What is known of a scene: its layout or survey, its placement, and what they were made from.
 
     Parameters
     ----------
-    layout : Layout
-        As the scene was when it was last read.
+    layout : Layout or Survey
+        As the scene was when it was last read; a survey as soon as its visibility grid was computed.
     inputs : mapping of str to str
         Digests of what a placement on that layout follows from; see `inputs_of`.
     watch : Watch
@@ -85,12 +84,10 @@ class SceneSurvey:
         The user's catalogue files and when each was last written.
     warnings : tuple of str
         Of the scene's reading.
-    grid : VisibilityGrid or None
-        Of that layout.
     estimate : Estimate or None
-        Of what the grid will take.
+        Of what the visibility grid will take.
     solution : Solution or None
-        Of that grid: the one that the scene's result tells of.
+        The one that the scene's result tells of.
     record : str
         The result that the solution was taken from.
     durations : mapping of str to float, seconds
@@ -103,11 +100,21 @@ class SceneSurvey:
     resources: Resources
     catalogues: tuple[tuple[Path, int], ...]
     warnings: tuple[str, ...] = ()
-    grid: VisibilityGrid | None = None
     estimate: Estimate | None = None
     solution: Solution | None = None
     record: str = ""
     durations: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def survey(self) -> Survey | None:
+        """The survey, or None where the visibility grid was not computed."""
+        return self.layout if isinstance(self.layout, Survey) else None
+
+    def placed(self) -> tuple[Survey, Solution]:
+        """Return the survey and the placement on it, for work that has made sure of them."""
+        if self.survey is None or self.solution is None:
+            raise RuntimeError("the work ended without a placement")
+        return self.survey, self.solution
 
     def timed(self, step: str, began: float) -> dict[str, float]:
         """Return the durations with that of a step that began at a reading of `time.perf_counter`."""
@@ -176,7 +183,7 @@ class FollowedSensors:
     """
 
     scene: int
-    survey: SceneSurvey
+    state: SceneState
     visibility: VisibilityModel
     sensors: dict[str, tuple[MountedSensor, Boolean]] = field(default_factory=dict)
     coverage: float = 0.0
@@ -237,7 +244,7 @@ class Session:
 
     Parameters
     ----------
-    surveys, checks, traffic, scans : dict
+    states, checks, traffic, scans : dict
         Of each scene.
     overlays : dict of int to dict of str to Overlay
         What is drawn in the views of each scene, by name.
@@ -251,7 +258,7 @@ class Session:
         One scene is followed at a time.
     """
 
-    surveys: dict[int, SceneSurvey] = field(default_factory=dict)
+    states: dict[int, SceneState] = field(default_factory=dict)
     checks: dict[int, CheckedScene] = field(default_factory=dict)
     traffic: dict[int, SceneTraffic] = field(default_factory=dict)
     scans: dict[int, LastScan] = field(default_factory=dict)
@@ -261,13 +268,13 @@ class Session:
     running: RunningWork | None = None
     following: FollowedSensors | None = None
 
-    def survey_of(self, scene: bpy.types.Scene) -> SceneSurvey | None:
+    def state_of(self, scene: bpy.types.Scene) -> SceneState | None:
         """Return what is known of a scene, or None."""
-        return self.surveys.get(scene.session_uid)
+        return self.states.get(scene.session_uid)
 
-    def keep_survey(self, scene: bpy.types.Scene, survey: SceneSurvey) -> None:
+    def keep_state(self, scene: bpy.types.Scene, state: SceneState) -> None:
         """Keep what work has found of a scene, in place of what was known: for the main thread, once it has ended."""
-        self.surveys[scene.session_uid] = survey
+        self.states[scene.session_uid] = state
 
     def scan_of(self, scene: bpy.types.Scene) -> LastScan | None:
         """Return the last scan of a scene, None where there is none."""
@@ -297,7 +304,7 @@ CLASSES: tuple[type, ...] = ()
 
 def forget() -> None:
     """Let go of what is known of the open file, and have work that is under way end."""
-    for kept in (session.surveys, session.checks, session.traffic, session.scans):
+    for kept in (session.states, session.checks, session.traffic, session.scans):
         kept.clear()
     if session.running is not None:
         session.running.stop = True

@@ -22,14 +22,11 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
-from seip_addon.core.lidar import LidarModel
-from seip_addon.core.placement import SolverLimits
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.scans import Frame
-from seip_addon.core.site.site import Site
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
-from seip_addon.core.visibility.grid import VisibilityGrid
+from seip_addon.core.workflows.survey import Survey
 
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
 from .breakdown import false_positives
@@ -221,9 +218,7 @@ def padded(some: Sequence[ModelConfiguration]) -> list[ModelConfiguration]:
     return [replace(model, name=f"{model.name}-padded", network=replace(model.network, padded=True)) for model in some]
 
 
-def place_all(
-    site: Site, models: Mapping[str, LidarModel], grid: VisibilityGrid, limits: SolverLimits
-) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
+def place_all(survey: Survey) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
     """Place 1, 2 and 4 sensors of each type where they cover most.
 
     Raises
@@ -231,13 +226,13 @@ def place_all(
     SeipError
         There are fewer positions than sensors, or a type sees nothing.
     """
-    visible = grid.visible
+    site, models, visible = survey.site, survey.models, survey.grid.visible
     cells = [Cell(sensor, None, count, 1.0) for sensor in models for count in COUNTS]
     placed: list[Case] = []
     for done, cell in enumerate(cells):
         progress = Progress(done, len(cells), f"place {cell.count} × {cell.sensor}")
         yield progress
-        steps = solve_cell(site, models, visible, cell, limits)
+        steps = solve_cell(site, models, visible, cell, survey.settings.limits)
         placed.append((yield from within(progress, steps)))
     yield Progress(len(cells), len(cells), "placed")
     return tuple(SensorConfiguration(case) for case in placed)

@@ -18,25 +18,24 @@ from ..core.placement.objective import Objective, Solution, check_objective
 from ..core.progress import Progress
 from ..core.results.placement_record import Provenance, versions
 from ..core.robustness.robust_study import RobustnessSettings
-from ..core.visibility.grid import VisibilityGrid
 from ..core.workflows.robust import check_robust_objective, place_robustly
-from ..core.workflows.survey import Layout, place, record_of
+from ..core.workflows.survey import Layout, Survey, place, record_of
 from ..core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs, runs_in
 from ..scene.write import write_result
-from ..session import SceneSurvey
+from ..session import SceneState
 from .base import ForReadyScene, LongWork, Outcome, attempt
 from .results import keep_result
 
-_Placing = Callable[[Layout, VisibilityGrid], Generator[Progress, None, Solution]]
+_Placing = Callable[[Survey], Generator[Progress, None, Solution]]
 
 
-class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Choose the sensors that cover most, or the cheapest that cover enough, and put them into the scene"""
 
     bl_idname = "seip.solve_placement"
     bl_label = "Place Sensors"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed, and state the objective."""
         asked = scene.seip.goal
         objective, robustness, traffic = asked.goal(), asked.robustness(), asked.traffic()
@@ -53,50 +52,45 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneSurvey], bpy.types.Op
         self._asked = {"pose_errors": asked.pose_errors}
         return _placed(surveying, objective, partial(place, objective=objective, pose_errors=asked.pose_errors))
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Put the sensors into the scene, and all that is needed to go on later into the file."""
-        if result.solution is None or result.grid is None:
-            raise RuntimeError("the work ended without a placement")
-        deployment = result.solution.deployment
+        survey, solution = result.placed()
+        deployment = solution.deployment
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        record = record_of(result.layout, result.grid, result.solution, provenance, self._asked)
-        write_result(scene, result.layout.site, deployment)
+        record = record_of(survey, solution, provenance, self._asked)
+        write_result(scene, survey.site, deployment)
         keep_result(scene, result, record)
         self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
 
 def _placed(
-    surveying: Generator[Progress, None, SceneSurvey], objective: Objective, placing: _Placing
-) -> Generator[Progress, None, SceneSurvey]:
+    surveying: Generator[Progress, None, SceneState], objective: Objective, placing: _Placing
+) -> Generator[Progress, None, SceneState]:
     return (yield from _placed_on((yield from surveying), objective, placing))
 
 
-def _placed_on(
-    surveyed: SceneSurvey, objective: Objective, placing: _Placing
-) -> Generator[Progress, None, SceneSurvey]:
-    check_objective(surveyed.layout.site, surveyed.layout.models, objective)
-    surveyed, grid = yield from scene_survey.with_visibility(surveyed)
+def _placed_on(state: SceneState, objective: Objective, placing: _Placing) -> Generator[Progress, None, SceneState]:
+    check_objective(state.layout.site, state.layout.models, objective)
+    state, survey = yield from scene_survey.with_visibility(state)
     began = time.perf_counter()
-    solution = yield from placing(surveyed.layout, grid)
-    return replace(surveyed, solution=solution, durations=surveyed.timed("placement", began))
+    solution = yield from placing(survey)
+    return replace(state, solution=solution, durations=state.timed("placement", began))
 
 
-def _robust(
-    layout: Layout, grid: VisibilityGrid, objective: Objective, settings: RobustnessSettings
-) -> Generator[Progress, None, Solution]:
-    return (yield from place_robustly(layout, grid, objective, settings)).solution
+def _robust(survey: Survey, objective: Objective, settings: RobustnessSettings) -> Generator[Progress, None, Solution]:
+    return (yield from place_robustly(survey, objective, settings)).solution
 
 
 def _placed_in_traffic(
-    surveying: Generator[Progress, None, SceneSurvey], objective: Objective, settings: TrafficSettings, folder: Path
-) -> Generator[Progress, None, SceneSurvey]:
-    surveyed = yield from surveying
-    runs = yield from _read_runs(folder, surveyed.layout)  # refuses before any ray is cast
+    surveying: Generator[Progress, None, SceneState], objective: Objective, settings: TrafficSettings, folder: Path
+) -> Generator[Progress, None, SceneState]:
+    state = yield from surveying
+    runs = yield from _read_runs(folder, state.layout)  # refuses before any ray is cast
 
-    def placing(layout: Layout, grid: VisibilityGrid) -> Generator[Progress, None, Solution]:
-        return (yield from place_in_traffic(layout, grid, objective, runs, settings)).solution
+    def placing(survey: Survey) -> Generator[Progress, None, Solution]:
+        return (yield from place_in_traffic(survey, objective, runs, settings)).solution
 
-    return (yield from _placed_on(surveyed, objective, placing))
+    return (yield from _placed_on(state, objective, placing))
 
 
 def _read_runs(folder: Path, layout: Layout) -> Generator[Progress, None, TrafficRuns]:

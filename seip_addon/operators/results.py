@@ -14,24 +14,23 @@ from mathutils import Vector
 from .. import live_coverage, preferences, scene_status, scene_survey, selection
 from ..core.errors import SeipError
 from ..core.geometry.orientation import describe_tilt
-from ..core.placement.objective import Objective, Solution, target_weights
+from ..core.placement.objective import Objective, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.results.placement_record import PlacementRecord, Provenance, parsed_record, versions
 from ..core.results.ranking import Ranked, rank_added, rank_alone
 from ..core.scans.sensor import MountedSensor
 from ..core.storage.files import check_folder, digest
-from ..core.visibility.grid import VisibilityGrid
 from ..core.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
-from ..core.workflows.survey import record_of
+from ..core.workflows.survey import Survey, record_of
 from ..scene.blend_file import save_blend
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
 from ..scene.write import coverage_of, recolour, show_seen_by, take_over
 from ..sensor_edits import position_names, sensor_edits
-from ..session import SceneSurvey, session
+from ..session import SceneState, session
 from .base import LongWork, Outcome, attempt, started
 
 MOST_RANKED = 50
@@ -108,21 +107,21 @@ def _middle_of_road(scene: bpy.types.Scene) -> Vector:
     return sum(corners, Vector()) / len(corners) if corners else Vector()
 
 
-class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ranked]]], bpy.types.Operator):
+class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneState, list[Ranked]]], bpy.types.Operator):
     """List the candidates that are worth most, alone or in addition to the placement"""
 
     bl_idname = "seip.rank_candidates"
     bl_label = "Rank Candidates"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, list[Ranked]]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, list[Ranked]]]:
         """Return the job that restores the placement."""
         return _ranked(scene_survey.with_placement(scene), scene.seip.result.order)
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, list[Ranked]]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, list[Ranked]]) -> None:
         """Fill the list."""
-        surveyed, lines = result
-        session.keep_survey(scene, surveyed)
-        candidates = surveyed.layout.site.candidates
+        state, lines = result
+        session.keep_state(scene, state)
+        candidates = state.layout.site.candidates
         ranking = scene.seip.result.ranking
         ranking.clear()
         for one in lines:
@@ -134,22 +133,16 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneSurvey, list[Ran
 
 
 def _ranked(
-    finding: Generator[Progress, None, SceneSurvey], order: str
-) -> Generator[Progress, None, tuple[SceneSurvey, list[Ranked]]]:
-    surveyed = yield from finding
-    solution, grid = _solution_and_grid(surveyed)
-    site, visible = surveyed.layout.site, grid.visible
+    finding: Generator[Progress, None, SceneState], order: str
+) -> Generator[Progress, None, tuple[SceneState, list[Ranked]]]:
+    state = yield from finding
+    survey, solution = state.placed()
+    site, visible = survey.site, survey.grid.visible
     weight = target_weights(site, solution.objective)
     if order == "ALONE":
-        return surveyed, rank_alone(visible, weight, MOST_RANKED)
+        return state, rank_alone(visible, weight, MOST_RANKED)
     free = ~np.isin(site.candidates.position_of, site.candidates.position_of[solution.placement.chosen])
-    return surveyed, rank_added(visible, weight, solution.deployment.seen_by > 0, free, MOST_RANKED)
-
-
-def _solution_and_grid(surveyed: SceneSurvey) -> tuple[Solution, VisibilityGrid]:
-    if surveyed.solution is None or surveyed.grid is None:
-        raise RuntimeError("the work ended without a placement")
-    return surveyed.solution, surveyed.grid
+    return state, rank_added(visible, weight, solution.deployment.seen_by > 0, free, MOST_RANKED)
 
 
 class SEIP_OT_keep_placement(ForPlacement, bpy.types.Operator):
@@ -246,7 +239,7 @@ class SEIP_OT_show_comparison(ForPlacement, bpy.types.Operator):
         self.report({"INFO"}, f"over {kept.name}: gained {gained:.2%}, lost {lost:.2%} of the targets")
 
 
-class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, VisibilityModel]], bpy.types.Operator):
+class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneState, VisibilityModel]], bpy.types.Operator):
     """Show the coverage change while sensors are moved or turned by hand; press again to end it"""
 
     bl_idname = "seip.follow_sensors"
@@ -264,33 +257,33 @@ class SEIP_OT_follow_sensors(ForPlacement, LongWork[tuple[SceneSurvey, Visibilit
             return {"FINISHED"}
         return super().execute(context)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityModel]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, VisibilityModel]]:
         """Return the job that restores the placement."""
         return _set_up(scene_survey.with_placement(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, VisibilityModel]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, VisibilityModel]) -> None:
         """Begin to follow."""
-        surveyed, model = result
-        session.keep_survey(scene, surveyed)
-        live_coverage.start(scene, surveyed, model)
+        state, model = result
+        session.keep_state(scene, state)
+        live_coverage.start(scene, state, model)
 
 
 def _set_up(
-    finding: Generator[Progress, None, SceneSurvey],
-) -> Generator[Progress, None, tuple[SceneSurvey, VisibilityModel]]:
-    surveyed = yield from finding
-    settings = surveyed.layout.settings
+    finding: Generator[Progress, None, SceneState],
+) -> Generator[Progress, None, tuple[SceneState, VisibilityModel]]:
+    state = yield from finding
+    settings = state.layout.settings
     yield Progress(0, 0, "getting ready to cast")
-    return surveyed, visibility_model(surveyed.layout.site, settings.visibility, settings.engine)
+    return state, visibility_model(state.layout.site, settings.visibility, settings.engine)
 
 
-class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneState], bpy.types.Operator):
     """Evaluate the sensors where they are now, moved, deleted and added by hand, and make them the placement"""
 
     bl_idname = "seip.evaluate_sensors"
     bl_label = "Evaluate Moved Sensors"
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read where the sensors hang."""
         mounted = read_sensors(scene, preferences.catalogue(), hidden=True)
         return _evaluated(
@@ -300,39 +293,39 @@ class SEIP_OT_evaluate_sensors(ForPlacement, LongWork[SceneSurvey], bpy.types.Op
             position_names(scene),
         )
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Make them the placement, where they hang."""
-        solution, grid = _solution_and_grid(result)
+        survey, solution = result.placed()
         live_coverage.stop()
-        take_over(scene, result.layout.site, solution.deployment, labelled_sensors(scene, hidden=True))
+        take_over(scene, survey.site, solution.deployment, labelled_sensors(scene, hidden=True))
         provenance = Provenance(datetime.now(UTC), result.durations, versions(blender=bpy.app.version_string))
-        keep_result(scene, result, record_of(result.layout, grid, solution, provenance, {}))
+        keep_result(scene, result, record_of(survey, solution, provenance, {}))
         self.report({"INFO"}, f"coverage {solution.deployment.coverage:.2%} where the sensors hang")
 
 
 def _evaluated(
-    finding: Generator[Progress, None, tuple[SceneSurvey, VisibilityGrid]],
+    finding: Generator[Progress, None, tuple[SceneState, Survey]],
     objective: Objective,
     mounted: Sequence[MountedSensor],
     places: Mapping[str, str],
-) -> Generator[Progress, None, SceneSurvey]:
-    surveyed, grid = yield from finding
-    solution = yield from evaluate_moved_sensors(surveyed.layout, grid, objective, mounted, places)
-    return replace(surveyed, solution=solution)
+) -> Generator[Progress, None, SceneState]:
+    state, survey = yield from finding
+    solution = yield from evaluate_moved_sensors(survey, objective, mounted, places)
+    return replace(state, solution=solution)
 
 
-def keep_result(scene: bpy.types.Scene, surveyed: SceneSurvey, record: PlacementRecord) -> None:
+def keep_result(scene: bpy.types.Scene, state: SceneState, record: PlacementRecord) -> None:
     """Have the scene keep a placement that stands in it, all that is needed to go on later included."""
-    solution, _ = _solution_and_grid(surveyed)
+    survey, solution = state.placed()
     kept = scene.seip.result
     kept.record = record.text()
-    kept.targets = digest(surveyed.layout.site.targets.xyz)
+    kept.targets = digest(survey.site.targets.xyz)
     kept.seen = packed_counts(solution.deployment.seen_by)
     kept.sensors.clear()
     for sensor in solution.deployment.sensors:
         kept.sensors.add().name = sensor.label
     kept.ranking.clear()
-    session.keep_survey(scene, replace(surveyed, record=kept.record))
+    session.keep_state(scene, replace(state, record=kept.record))
 
 
 def not_evaluated(scene: bpy.types.Scene) -> str:
@@ -341,7 +334,7 @@ def not_evaluated(scene: bpy.types.Scene) -> str:
     return f"{sentence} Press {SEIP_OT_evaluate_sensors.bl_label}, or undo." if sentence else ""
 
 
-class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_export_result(ForPlacement, LongWork[SceneState], bpy.types.Operator):
     """Write tables, pictures and the scene with its sensors to the folder, in place of earlier ones"""
 
     bl_idname = "seip.export_result"
@@ -358,19 +351,19 @@ class SEIP_OT_export_result(ForPlacement, LongWork[SceneSurvey], bpy.types.Opera
             cls.poll_message_set(sentence)
         return not sentence
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """See that the folder can be written, save the scene as it is, and find the placement again."""
         self._folder = Path(bpy.path.abspath(scene.seip.result.folder))
         check_folder(self._folder)
         return started(_exported(self._folder, scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Say where the files are."""
-        session.keep_survey(scene, result)
+        session.keep_state(scene, result)
         self.report({"INFO"}, f"written to {self._folder}")
 
 
-def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     """Write a result: the scene before the first report, which is the part that needs Blender's data."""
     render, name = scene.seip.result.render, scene.name
     finding = scene_survey.with_placement(scene)
@@ -379,15 +372,15 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
     with result_files(folder) as part:
         save_blend(part["placed.blend"])
         yield Progress(0, 0, "reading the scene")
-        surveyed = yield from finding
-        solution, grid = _solution_and_grid(surveyed)
-        record = parsed_record(surveyed.record)
+        state = yield from finding
+        survey, solution = state.placed()
+        record = parsed_record(state.record)
         record = replace(record, settings={**record.settings, "render": render})
-        layout = surveyed.layout
-        yield from write_tables(part, layout.geometry, layout.site, solution, record, grid.visible, layout.models)
+        site, visible = survey.site, survey.grid.visible
+        yield from write_tables(part, survey.geometry, site, solution, record, visible, survey.models)
         if render:
-            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, layout.site, solution.deployment)
-    return surveyed
+            yield from render_elsewhere(part["view.png"], part["placed.blend"], name, site, solution.deployment)
+    return state
 
 
 CLASSES = (

@@ -28,7 +28,7 @@ from ..scene import contract
 from ..scene.read import read_scene
 from ..scene.sensors import read_sensors
 from ..scene.traffic import animate, clear_traffic, read_traffic
-from ..session import LastScan, SceneSurvey, SceneTraffic, session
+from ..session import LastScan, SceneState, SceneTraffic, session
 from .base import LongWork, Outcome, Result
 from .results import no_placement, not_evaluated
 
@@ -134,7 +134,7 @@ class SEIP_OT_clear_traffic(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operator):
+class SEIP_OT_try_in_traffic(LongWork[tuple[SceneState, str]], bpy.types.Operator):
     """Find what the placement sees of the road with the loaded traffic in the way, on average over time"""
 
     bl_idname = "seip.try_in_traffic"
@@ -148,36 +148,36 @@ class SEIP_OT_try_in_traffic(LongWork[tuple[SceneSurvey, str]], bpy.types.Operat
             cls.poll_message_set(reason)
         return not reason
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneSurvey, str]]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[SceneState, str]]:
         """Find the placement again, and the traffic."""
         return _tried(scene_survey.with_placement(scene), session.traffic[scene.session_uid].trajectories)
 
-    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneSurvey, str]) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: tuple[SceneState, str]) -> None:
         """Note it with the placement."""
-        surveyed, sentence = result
+        state, sentence = result
         kept = scene.seip.result
         record = parsed_record(kept.record)
         notes = (*(note for note in record.notes if not note.startswith(IN_TRAFFIC)), sentence)
-        solution = surveyed.solution
+        solution = state.solution
         if solution is not None:
             solution = replace(solution, placement=replace(solution.placement, notes=notes))
         kept.record = replace(record, notes=notes).text()
-        session.keep_survey(scene, replace(surveyed, solution=solution, record=kept.record))
+        session.keep_state(scene, replace(state, solution=solution, record=kept.record))
         self.report({"INFO"}, sentence)
 
 
 def _tried(
-    finding: Generator[Progress, None, SceneSurvey], traffic: Trajectories
-) -> Generator[Progress, None, tuple[SceneSurvey, str]]:
-    surveyed = yield from finding
-    if surveyed.solution is None:
+    finding: Generator[Progress, None, SceneState], traffic: Trajectories
+) -> Generator[Progress, None, tuple[SceneState, str]]:
+    state = yield from finding
+    if state.solution is None:
         raise RuntimeError("the work ended without a placement")
-    layout, chosen = surveyed.layout, surveyed.solution.placement.chosen
+    layout, chosen = state.layout, state.solution.placement.chosen
     check_runs([traffic], layout.site.region)
     instants = spread_instants([traffic], INSTANTS, seed=0)
-    weight = target_weights(layout.site, surveyed.solution.objective)
+    weight = target_weights(layout.site, state.solution.objective)
     sentence = yield from traffic_message(surroundings(layout), chosen, weight, instants)
-    return surveyed, sentence
+    return state, sentence
 
 
 class SEIP_OT_scan_frame(_Scanning[LastScan], bpy.types.Operator):

@@ -12,7 +12,6 @@ import bpy
 
 from .. import scene_survey
 from ..core.errors import SeipError
-from ..core.placement.objective import Solution
 from ..core.progress import Progress
 from ..core.results.placement_record import relevant_warnings
 from ..core.visibility.sight_lines import pose_at, sight_lines
@@ -20,7 +19,7 @@ from ..scene import contract
 from ..scene.blend_file import save_blend
 from ..scene.sensors import placed_sensors, pose_of
 from ..scene.write import colour_coverage, coverage_of
-from ..session import SceneSurvey, session
+from ..session import SceneState, session
 from ..viewport import coverage, overlays
 from ..viewport.sight_lines import NAME as SIGHT
 from ..viewport.sight_lines import sight_overlay
@@ -115,7 +114,7 @@ def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple
     return _items
 
 
-class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Operator):
     """Draw lines from a sensor to the targets that it sees, and dark squares on those in its range that it does not"""
 
     bl_idname = "seip.show_sight_lines"
@@ -124,22 +123,22 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneSurvey], bpy.types.Op
 
     sensor: bpy.props.EnumProperty(name="Sensor", description="From which the lines start", items=_sensors)
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Return the job that restores the placement."""
         return scene_survey.with_placement(scene)
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Draw them."""
-        session.keep_survey(scene, result)
+        session.keep_state(scene, result)
         thing = placed_sensors(scene).get(self.sensor)
-        if result.grid is None or thing is None:
+        survey, _ = result.placed()
+        if thing is None:
             raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
         key = str(thing.get(contract.SENSOR))
-        site = result.layout.site
-        pose = pose_at(site.candidates, key, *pose_of(thing))
+        pose = pose_at(survey.site.candidates, key, *pose_of(thing))
         if pose is None:
             raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
-        sight = sight_lines(site, pose, result.layout.models[key], result.grid.sees(pose))
+        sight = sight_lines(survey.site, pose, survey.models[key], survey.grid.sees(pose))
         overlays.show(scene, SIGHT, sight_overlay(sight, self.sensor))
 
 
@@ -155,7 +154,7 @@ class SEIP_OT_hide_sight_lines(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_save_picture(ForPlacement, LongWork[SceneState], bpy.types.Operator):
     """Write a view of the placement with its legend, and the plan beside it, as one PNG"""
 
     bl_idname = "seip.save_picture"
@@ -172,15 +171,15 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operat
         """Return whether the operator is enabled; otherwise the tooltip says why not."""
         return super().poll(context) and _can(cls, not_evaluated(context.scene))
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Find the placement again, and render it where that is asked for."""
         self._path = _free(_named(scene.seip.view.picture))
         self._is_view = scene.seip.view.picture_of == "VIEW"
         return scene_survey.with_placement(scene) if self._is_view else started(_rendered_sheet(self._path, scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Take the picture of a viewport."""
-        session.keep_survey(scene, result)
+        session.keep_state(scene, result)
         if self._is_view:
             area = getattr(self, "_area", None) or bpy.context.area
             if bpy.app.background or area not in _viewports():
@@ -189,16 +188,16 @@ class SEIP_OT_save_picture(ForPlacement, LongWork[SceneSurvey], bpy.types.Operat
         self.report({"INFO"}, f"written {self._path}")
 
 
-def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, surveyed: SceneSurvey) -> None:
+def save_viewport_sheet(path: Path, scene: bpy.types.Scene, area: bpy.types.Area, state: SceneState) -> None:
     """Write what a viewport shows, and the plan beside it."""
     from PIL import Image  # noqa: PLC0415  # pictures take half a second to come, which nobody waits for at start
 
     from ..viewport.picture import view_pixels  # noqa: PLC0415  # as above
 
-    _save_sheet(path, surveyed, Image.fromarray(view_pixels(scene, area)))
+    _save_sheet(path, state, Image.fromarray(view_pixels(scene, area)))
 
 
-def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
     """Write the rendered view that batch commands make, and the plan beside it; the scene is saved before the rest."""
     from PIL import Image  # noqa: PLC0415  # as above
 
@@ -209,33 +208,28 @@ def _rendered_sheet(path: Path, scene: bpy.types.Scene) -> Generator[Progress, N
         blend, view = (Path(folder) / file for file in ("scene.blend", "view.png"))
         save_blend(blend)
         yield Progress(0, 0, "reading the scene")
-        surveyed = yield from finding
-        yield from render_elsewhere(view, blend, name, surveyed.layout.site, _solution(surveyed).deployment)
+        state = yield from finding
+        survey, solution = state.placed()
+        yield from render_elsewhere(view, blend, name, survey.site, solution.deployment)
         with Image.open(view) as picture:
-            _save_sheet(path, surveyed, picture)
-    return surveyed
+            _save_sheet(path, state, picture)
+    return state
 
 
-def _save_sheet(path: Path, surveyed: SceneSurvey, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
+def _save_sheet(path: Path, state: SceneState, view: Any) -> None:  # noqa: ANN401  # PIL's image, not loaded yet
     from PIL import Image  # noqa: PLC0415  # as above
 
     from ..core.pictures.plan_view import save_plan_view  # noqa: PLC0415  # as above
     from ..core.pictures.sheet import save_sheet  # noqa: PLC0415  # as above
 
-    layout, solution = surveyed.layout, _solution(surveyed)
+    survey, solution = state.placed()
     with TemporaryDirectory(prefix="seip-") as folder:
         drawn = Path(folder) / "plan.png"
         chosen = [sensor.model.key for sensor in solution.deployment.sensors]
-        notes = [*solution.caption, *relevant_warnings(layout.warnings, layout.models, chosen)]
-        save_plan_view(drawn, layout.geometry, layout.site, solution.deployment, notes)
+        notes = [*solution.caption, *relevant_warnings(survey.warnings, survey.models, chosen)]
+        save_plan_view(drawn, survey.geometry, survey.site, solution.deployment, notes)
         with Image.open(drawn) as picture:
             save_sheet(path, view, picture)
-
-
-def _solution(surveyed: SceneSurvey) -> Solution:
-    if surveyed.solution is None:
-        raise RuntimeError("a placement was found without its solution")
-    return surveyed.solution
 
 
 def _viewports() -> list[bpy.types.Area]:

@@ -10,72 +10,72 @@ import bpy
 from .. import scene_survey
 from ..core.progress import Progress
 from ..core.workflows.survey import estimate
-from ..session import SceneSurvey, session
+from ..session import SceneState, session
 from .base import ForReadyScene, LongWork
 
 
-class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_compute_visibility(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Find out which candidate pose sees which target on the road"""
 
     bl_idname = "seip.compute_visibility"
     bl_label = "Compute Visibility"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed."""
         return _seen(scene_survey.survey(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Hold the grid."""
-        session.keep_survey(scene, result)
+        session.keep_state(scene, result)
         site = result.layout.site
         self.report(
             {"INFO"}, f"visibility of {len(site.targets):,} targets from {len(site.candidates):,} poses is known"
         )
 
 
-class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_estimate_visibility(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Estimate how long visibility will take and how much memory, by beginning with it for about a second"""
 
     bl_idname = "seip.estimate_visibility"
     bl_label = "Estimate"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed."""
         return _estimated(scene_survey.survey(scene))
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Hold the estimate."""
-        session.keep_survey(scene, result)
+        session.keep_state(scene, result)
 
 
-class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneSurvey], bpy.types.Operator):
+class SEIP_OT_compare_scene(ForReadyScene, LongWork[SceneState], bpy.types.Operator):
     """Find out whether the placement is of the scene as it is now"""
 
     bl_idname = "seip.compare_scene"
     bl_label = "Compare with Scene"
     bl_options = {"REGISTER"}  # nothing in the file changes
 
-    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneSurvey]:
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, SceneState]:
         """Read the scene where it has changed."""
         return scene_survey.survey(scene)
 
-    def conclude(self, scene: bpy.types.Scene, result: SceneSurvey) -> None:
+    def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Hold what was read: the panel compares."""
-        session.keep_survey(scene, result)
+        session.keep_state(scene, result)
 
 
-def _seen(surveying: Generator[Progress, None, SceneSurvey]) -> Generator[Progress, None, SceneSurvey]:
-    surveyed = yield from surveying
-    surveyed, _ = yield from scene_survey.with_visibility(surveyed)
-    return surveyed
+def _seen(surveying: Generator[Progress, None, SceneState]) -> Generator[Progress, None, SceneState]:
+    state = yield from surveying
+    state, _ = yield from scene_survey.with_visibility(state)
+    return state
 
 
-def _estimated(surveying: Generator[Progress, None, SceneSurvey]) -> Generator[Progress, None, SceneSurvey]:
-    surveyed = yield from surveying
-    found = yield from estimate(surveyed.layout, surveyed.resources.cores)
-    return replace(surveyed, estimate=found)
+def _estimated(surveying: Generator[Progress, None, SceneState]) -> Generator[Progress, None, SceneState]:
+    state = yield from surveying
+    found = yield from estimate(state.layout, state.resources.cores)
+    return replace(state, estimate=found)
 
 
 CLASSES = (SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility, SEIP_OT_compare_scene)

@@ -58,7 +58,7 @@ def _draw_state(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if obstacle:
         draw_sentence(layout, obstacle, icon="ERROR")
         return
-    known = session.survey_of(scene)
+    known = session.state_of(scene)
     if known is None:
         return
     doubt = scene_status.stale_survey(scene)
@@ -68,7 +68,7 @@ def _draw_state(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     site = known.layout.site
     column = layout.column(align=True)
     draw_sentence(column, f"{len(site.targets):,} targets, {len(site.candidates.position):,} positions")
-    if known.grid is not None:
+    if known.survey is not None:
         draw_sentence(column, f"Known from {len(site.candidates):,} poses", icon="CHECKMARK")
     elif known.estimate is not None:
         _draw_estimate(column, known.estimate)

@@ -124,7 +124,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert comparable(load_placement_record(out / "placement.json")) == comparable(written)
     again = list(csv.DictReader((out / "candidates.csv").read_text(encoding="utf-8").splitlines()))
     assert again == rows
-    assert session.survey_of(scene).solution.certificate == MOVED_MESSAGE
+    assert session.state_of(scene).solution.certificate == MOVED_MESSAGE
 
 
 def test_an_added_sensor_counts_and_one_below_the_ground_has_its_sentence(placed):

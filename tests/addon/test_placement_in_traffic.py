@@ -39,7 +39,7 @@ def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coa
     goal.layer, goal.weights_from_traffic = "height", True
     goal.pose_errors = True  # left from another objective, and not shown for this one
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
-    certificate, purpose = session.survey_of(coarse).solution.caption
+    certificate, purpose = session.state_of(coarse).solution.caption
     assert (certificate[:6], purpose[:17]) == ("Proven", "chosen to see the")
     path = tmp_path / "placed.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -71,7 +71,7 @@ def test_runs_are_read_in_work_that_can_be_stopped(coarse):
     work = SEIP_OT_solve_placement.prepare(SimpleNamespace(), coarse)
     assert any(progress.what == "reading runs of traffic" for progress in work)
     work.close()
-    assert session.survey_of(coarse) is None
+    assert session.state_of(coarse) is None
     assert not coarse.seip.result.record
 
 

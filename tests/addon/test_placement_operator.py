@@ -32,7 +32,7 @@ def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scen
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     junction.seip.result.folder = str(tmp_path / "panel")
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    key = session.survey_of(junction).grid.key
+    key = session.state_of(junction).survey.grid.key
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path / "batch")])
     panel, batch = (load_placement_record(tmp_path / name / "placement.json") for name in ("panel", "batch"))
     assert comparable(panel) == comparable(batch)
@@ -67,13 +67,13 @@ def test_work_that_is_stopped_at_its_end_leaves_no_trace(junction):
     bpy.ops.seip.solve_placement()
     junction.seip.goal.count = 3
     junction.seip.survey.time_limit = 30.0
-    before = session.survey_of(junction)
+    before = session.state_of(junction)
     seen = dict(vars(before))
     placed = finish(work_of("SEIP_OT_solve_placement", junction))
     assert len(placed.solution.deployment.sensors) == 3
     for name in ("compute_visibility", "estimate_visibility", "rank_candidates", "follow_sensors", "save_picture"):
         finish(work_of(f"SEIP_OT_{name}", junction))
-        assert session.survey_of(junction) is before
+        assert session.state_of(junction) is before
         assert vars(before) == seen
 
 
@@ -102,7 +102,7 @@ def test_a_saved_placement_goes_on_without_computing(junction, tmp_path, monkeyp
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    assert session.survey_of(scene) is None
+    assert session.state_of(scene) is None
     assert scene.seip.result.record == before
     for forbidden in ("compute_visibility", "optimise"):
         monkeypatch.setattr(f"seip_addon.core.visibility.store.{forbidden}", None, raising=False)
@@ -139,7 +139,7 @@ def test_undo_brings_the_earlier_placement_back_and_redo_the_new(junction):
     assert labels(scene) == ["S1", "S2"]
     assert len(json.loads(scene.seip.result.record)["sensors"]) == 2
     bpy.ops.seip.rank_candidates()
-    assert len(session.survey_of(scene).solution.deployment.sensors) == 2
+    assert len(session.state_of(scene).solution.deployment.sensors) == 2
     bpy.ops.ed.redo()
     assert labels(bpy.context.scene) == ["S1", "S2", "S3"]
 

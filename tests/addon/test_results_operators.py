@@ -27,8 +27,8 @@ def shown(scene: bpy.types.Scene) -> np.ndarray:
 
 def test_candidates_are_ranked_as_a_slow_loop_does(placed):
     bpy.ops.seip.rank_candidates()
-    known = session.survey_of(placed)
-    visible, site = known.grid.visible, known.layout.site
+    known = session.state_of(placed)
+    visible, site = known.survey.grid.visible, known.survey.site
     chosen = [sensor.pose for sensor in known.solution.deployment.sensors]
     taken = {int(site.candidates.position_of[pose]) for pose in chosen}
     seen = visible[chosen].any(axis=0)
@@ -159,7 +159,7 @@ def test_a_scene_that_is_deleted_during_the_work_has_its_sentence(placed):
 def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them(placed):
     placed.seip.survey.tilts = "12"
     bpy.ops.seip.solve_placement()
-    known = session.survey_of(placed)
+    known = session.state_of(placed)
     assert {sensor.tilt for sensor in known.solution.deployment.sensors} == {np.radians(12)}
     bpy.ops.seip.rank_candidates()
     assert all("8 m, tilted 12° " in line.name for line in placed.seip.result.ranking)

@@ -7,18 +7,18 @@ import pytest
 
 from seip_addon import scene_status, selection
 from seip_addon.sensor_edits import sensor_edits
-from seip_addon.session import SceneSurvey, session
+from seip_addon.session import SceneState, session
 
 
 @pytest.fixture
 def known(junction):
     bpy.ops.seip.compute_visibility()
-    return session.survey_of(junction)
+    return session.state_of(junction)
 
 
-def read_again(known: SceneSurvey) -> bool:
+def read_again(known: SceneState) -> bool:
     bpy.ops.seip.compute_visibility()
-    return session.survey_of(bpy.context.scene).layout.geometry is not known.layout.geometry
+    return session.state_of(bpy.context.scene).layout.geometry is not known.layout.geometry
 
 
 def building() -> bpy.types.Object:
@@ -73,7 +73,7 @@ def test_a_change_that_is_undone_is_noticed(known):
     reshape()
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.seip.compute_visibility()
-    reshaped = session.survey_of(bpy.context.scene)
+    reshaped = session.state_of(bpy.context.scene)
     bpy.ops.ed.undo()
     assert read_again(reshaped)
 
@@ -102,7 +102,7 @@ def test_other_settings_lay_out_anew_from_the_same_reading(known):
     bpy.context.scene.seip.survey.grid = 5.0
     assert scene_status.stale_survey(bpy.context.scene) == "The settings have changed since it was computed."
     assert not read_again(known)
-    assert session.survey_of(bpy.context.scene).layout.site.targets.spacing == 5.0
+    assert session.state_of(bpy.context.scene).layout.site.targets.spacing == 5.0
 
 
 def test_a_slip_in_the_settings_is_said_by_the_panel(known):

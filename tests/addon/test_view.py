@@ -37,16 +37,16 @@ def test_coverage_is_coloured_with_a_legend(placed, aspect):
 
 
 def test_sight_lines_are_the_row_of_the_grid(placed):
-    held = session.survey_of(placed)
+    held = session.state_of(placed)
     sensor = held.solution.deployment.sensors[1]
     assert bpy.ops.seip.show_sight_lines(sensor=sensor.label) == {"FINISHED"}
     overlay = overlays.find(placed, SIGHT)
     faces, lines = overlay.layers
-    row = held.grid.visible[sensor.pose]
+    row = held.survey.grid.visible[sensor.pose]
     assert len(lines.positions) == 2 * row.sum()
     assert np.allclose(lines.positions[::2], sensor.xyz, atol=1e-3)
-    assert np.allclose(lines.positions[1::2, :2], held.layout.site.targets.xyz[row, :2], atol=1e-3)
-    distance = np.linalg.norm(held.layout.site.targets.xyz - sensor.xyz, axis=1)
+    assert np.allclose(lines.positions[1::2, :2], held.survey.site.targets.xyz[row, :2], atol=1e-3)
+    distance = np.linalg.norm(held.survey.site.targets.xyz - sensor.xyz, axis=1)
     assert len(faces.positions) == 6 * (~row & (distance <= sensor.model.max_range)).sum()
     assert overlay.about == sensor.label
 

@@ -46,11 +46,11 @@ def test_a_linked_scene_is_not_written_into(linked, button):
 
 def test_an_object_in_edit_mode_counts_as_it_is_shown_there(junction):
     bpy.ops.seip.compute_visibility()
-    key = session.survey_of(junction).grid.key
+    key = session.state_of(junction).survey.grid.key
     bpy.context.view_layer.objects.active = bpy.data.objects["building 1"]
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.seip.compute_visibility()
-    assert session.survey_of(junction).grid.key == key
+    assert session.state_of(junction).survey.grid.key == key
 
 
 @pytest.mark.parametrize(
@@ -216,5 +216,5 @@ def test_work_asks_blender_for_nothing_once_it_is_under_way(junction, monkeypatc
     seeing = scene_survey.with_visibility(finish(scene_survey.survey(junction)))
     for name in ("cache_folder", "cores", "own"):
         monkeypatch.setattr(preferences, name, asked)
-    _, grid = finish(seeing)
-    assert grid.visible.any()
+    _, survey = finish(seeing)
+    assert survey.grid.visible.any()

@@ -58,7 +58,7 @@ def test_what_is_typed_reaches_its_setting_or_is_refused(typed, kind, changed):
 def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     parser = new_parser("place", "Place sensors.")
-    add_options(parser)
+    add_options(parser, in_full=True)
     lines = parser.format_help().splitlines()
     assert lines[0] == "usage: place [scene] -o OUTPUT [options]"
     assert "  -o, --output OUTPUT         folder for the results" in lines
@@ -66,6 +66,15 @@ def test_help_has_a_line_for_each_option_and_names_its_default(monkeypatch):
     (assumed,) = (line for line in lines if "--assumed-poles" in line)
     assert "default" not in assumed
     assert len(lines) <= 40
+
+
+def test_help_names_the_options_of_a_survey_where_another_command_explains_them(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    parser = new_parser("robust", "Place sensors.")
+    add_options(parser)
+    text = parser.format_help()
+    assert "  --sensor --catalogue --heights --tilts --assumed-poles (see: seip place --help)\n" in text
+    assert "types to choose from" not in text
 
 
 def test_weights_are_the_scene_s_or_one_for_all():

@@ -173,7 +173,7 @@ def _checks_grow_old(window: Window) -> Steps:
 
 def _poles_have_feet(window: Window) -> Steps:
     yield from _press(window, "seip.compute_visibility(")
-    candidates = session.survey_of(_scene()).layout.site.candidates
+    candidates = session.state_of(_scene()).layout.site.candidates
     foot = next(
         place for place, on_pole in zip(candidates.position.tolist(), candidates.on_pole, strict=True) if not on_pole
     )
@@ -184,7 +184,7 @@ def _poles_have_feet(window: Window) -> Steps:
     yield from _press(window, "seip.check_site(")
     assert any("'Cylinder' is not at the foot" in problem.text for problem in _scene().seip.site.problems)
     yield from _press(window, "seip.compute_visibility(")
-    candidates = session.survey_of(_scene()).layout.site.candidates
+    candidates = session.state_of(_scene()).layout.site.candidates
     names = candidates.position_name[candidates.position_of].tolist()
     heights = {z for name, z in zip(names, candidates.xyz[:, 2].tolist(), strict=True) if name == "Cylinder"}
     assert {round(z - foot[2], 3) for z in heights} == {5.0}, heights

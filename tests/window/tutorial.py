@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bpy
 from bl_ext.user_default.seip.seip_addon import preferences, scene_status
 from bl_ext.user_default.seip.seip_addon.panels import run_button
-from bl_ext.user_default.seip.seip_addon.session import SceneSurvey, session
+from bl_ext.user_default.seip.seip_addon.session import SceneState, session
 from driver import Steps, Window, play
 
 TIMES: list[str] = []
@@ -88,11 +88,11 @@ def _compute(window: Window) -> Steps:
     yield from window.until(lambda: session.running is not None, 10)
     bpy.ops.seip.stop()
     yield from window.until(lambda: session.running is None, 0.5)
-    assert _known() is None or _known().grid is None, "the run that was stopped went on"
+    assert _known() is None or _known().survey is None, "the run that was stopped went on"
     yield from window.click("seip.estimate_visibility(")
     yield from window.until(lambda: session.running is None and _known() and _known().estimate, 60)
     yield from window.click("seip.compute_visibility(")
-    yield from window.until(lambda: session.running is None and _known().grid is not None, 120)
+    yield from window.until(lambda: session.running is None and _known().survey is not None, 120)
     yield from window.find("seip.compute_visibility(")
     yield from window.picture("4-visibility")
 
@@ -171,8 +171,8 @@ def _scene() -> bpy.types.Scene:
     return bpy.context.window_manager.windows[0].scene
 
 
-def _known() -> SceneSurvey | None:
-    return session.survey_of(_scene())
+def _known() -> SceneState | None:
+    return session.state_of(_scene())
 
 
 def _empties() -> list[bpy.types.Object]:

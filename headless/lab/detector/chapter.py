@@ -22,7 +22,7 @@ import bpy
 
 from seip_addon.core.progress import Progress
 from seip_addon.core.scans import ScanSettings, static_scene
-from seip_addon.core.workflows.survey import Layout, lay_out, see
+from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
 from seip_addon.scene.read import read_scene
 
 TRAINING_INTERVAL = 2.5  # seconds between frames to learn from
@@ -32,7 +32,7 @@ TEST_STRIDE = 2
 
 
 def detector_limits(
-    surveyed: survey.Survey,
+    surveyed: Survey,
     scene: Path | None,
     others: Sequence[Path],
     folder: Path,
@@ -63,13 +63,13 @@ def detector_limits(
     -------
     LimitsStudy
     """
-    layout, network = surveyed.layout, NetworkSettings()
-    origin = layout.geometry.origin
+    network = NetworkSettings()
+    origin = surveyed.geometry.origin
     traffic = case_study.read_traffic(survey.runs_beside(scene), origin, TRAINING_INTERVAL)
-    configurations = yield from _placed(surveyed)
-    simulator = _studio(layout)
+    configurations = yield from case_study.place_all(surveyed)
+    simulator = _studio(surveyed)
     asked = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
-    trained = yield from _trained(asked, simulator, configurations, traffic, layout, folder)
+    trained = yield from _trained(asked, simulator, configurations, traffic, surveyed, folder)
     candidates = asked.candidates([one.detector for one in trained])
 
     main = _most(configurations)
@@ -105,31 +105,19 @@ def _trained(
 
 
 def _on_other_scene(
-    scene: Path, surveyed: survey.Survey, main: SensorConfiguration, tested: Sequence[EvaluatedDetector], folder: Path
+    scene: Path, surveyed: Survey, main: SensorConfiguration, tested: Sequence[EvaluatedDetector], folder: Path
 ) -> Generator[Progress, None, OtherSite]:
     """Place as many sensors of the same type there, and bring the detectors."""
-    settings = surveyed.layout.settings
+    settings = surveyed.settings
     runtime.open_scene(scene)
     reading = read_scene(bpy.context.scene)
     candidates = replace(settings.candidates, sensors=(main.case.sensor,))
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
-    grid = yield from see(layout, folder / f"visibility_{scene.stem}.npz")
-    there = yield from _placed(survey.Survey(layout, grid, surveyed.stopwatch))
+    there = yield from case_study.place_all((yield from see(layout, folder / f"visibility_{scene.stem}.npz")))
     runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TRAINING_INTERVAL)
     pillars = grid_of(layout.geometry, tested[0].detector.grid.pillar)
     moved = tuple(EvaluatedDetector(one.name, on_grid(one.detector, pillars)) for one in tested)
     return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
-
-
-def _placed(surveyed: survey.Survey) -> Generator[Progress, None, tuple[SensorConfiguration, ...]]:
-    layout = surveyed.layout
-    settings = layout.settings
-    return case_study.place_all(
-        layout.site,
-        layout.models,
-        surveyed.grid,
-        settings.limits,
-    )
 
 
 def _studio(layout: Layout) -> Simulator:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from headless import survey
 from headless.charts import robust as robust_charts
 from headless.charts import traffic as traffic_charts
 
@@ -22,7 +21,7 @@ from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_s
 from seip_addon.core.robustness.traffic_instants import spread_instants
 from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study
 from seip_addon.core.traffic import Trajectories
-from seip_addon.core.workflows.survey import surroundings
+from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic import split_runs
 
 from . import charts as limits_charts
@@ -68,7 +67,7 @@ class StabilityScope:
 
 @dataclass(frozen=True, eq=False)
 class StudiedScene:
-    """A scene, laid out and seen.
+    """A scene to study, with its traffic and the folders of the studies.
 
     Parameters
     ----------
@@ -82,7 +81,7 @@ class StudiedScene:
         Folders of what a rerun goes on from, and of the charts.
     """
 
-    surveyed: survey.Survey
+    survey: Survey
     runs: list[Trajectories]
     path: Path | None
     others: Sequence[Path]
@@ -93,12 +92,12 @@ class StudiedScene:
     @property
     def name(self) -> str:
         """The scene's name, for titles."""
-        return self.surveyed.layout.site.name
+        return self.survey.site.name
 
     @property
     def sensor(self) -> str:
         """The middle one of the sensor types: neither its best nor its worst coverage is trivial."""
-        sensors = list(self.surveyed.layout.models)
+        sensors = list(self.survey.models)
         return sensors[len(sensors) // 2]
 
     @property
@@ -108,11 +107,9 @@ class StudiedScene:
 
     def problem(self, sensor: str) -> PlacementProblem:
         """Return the placement of the usual number of sensors of one type."""
-        layout = self.surveyed.layout
-        problem = placement_problem(
-            layout.site, self.surveyed.grid.visible, layout.models, Objective(count=DEFAULT_COUNT)
-        )
-        return replace(problem, forbidden=problem.forbidden | (layout.site.candidates.sensor != sensor))
+        site = self.survey.site
+        problem = placement_problem(site, self.survey.grid.visible, self.survey.models, Objective(count=DEFAULT_COUNT))
+        return replace(problem, forbidden=problem.forbidden | (site.candidates.sensor != sensor))
 
 
 Work = Callable[[StudiedScene], Generator[Progress, None, Chapter]]
@@ -133,9 +130,9 @@ def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
 
 def criterion(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Vary δ, grid spacings and beam azimuth."""
-    layout = scene.surveyed.layout
-    delta = layout.settings.visibility.delta
-    study = yield from criterion_study(layout.geometry, layout.settings, DEFAULT_COUNT, draws=scene.scope.grids)
+    survey = scene.survey
+    delta = survey.settings.visibility.delta
+    study = yield from criterion_study(survey.geometry, survey.settings, DEFAULT_COUNT, draws=scene.scope.grids)
     limits_charts.save_ring_border_chart(scene.charts / "ring_borders.png", study, delta, f"{scene.name}: rings and δ")
     limits_charts.save_border_check_chart(scene.charts / "beyond_border.png", study, f"{scene.name}: beyond the border")
     limits_charts.save_delta_chart(scene.charts / "delta.png", study, delta, f"{scene.name}: coverage against δ")
@@ -167,9 +164,9 @@ def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Find the limits of the solvers, and the size of the near-optimal set."""
     study = yield from solver_study(scene.scope.instances)
     tops: list[tuple[str, NearOptimalSet]] = []
-    for sensor in scene.surveyed.layout.models:
+    for sensor in scene.survey.models:
         problem = scene.problem(sensor)
-        best = yield from solve(problem, SolverLimits(scene.surveyed.layout.settings.solver))
+        best = yield from solve(problem, SolverLimits(scene.survey.settings.solver))
         top = yield from near_optimal_set(problem, best.chosen)
         if top is not None:
             tops.append((f"{DEFAULT_COUNT} × {sensor}", top))
@@ -187,12 +184,12 @@ def solvers(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a placement under pose errors."""
-    layout, around = scene.surveyed.layout, surroundings(scene.surveyed.layout)
+    survey, around = scene.survey, surroundings(scene.survey)
     study = yield from robust_study(
-        around, scene.problem(scene.sensor), scene.scope.robust, limits=layout.settings.limits
+        around, scene.problem(scene.sensor), scene.scope.robust, limits=survey.settings.limits
     )
     chosen = study.nominal[0].placement.chosen
-    deployment = deploy(layout.site, layout.models, scene.surveyed.grid.visible, chosen)
+    deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
     under_errors = yield from pose_study(around, deployment, scene.scope.poses)
     robust_charts.save_spread_chart(scene.charts / "spread.png", study, f"{scene.placed} under pose errors")
     robust_charts.save_loss_chart(scene.charts / "blame.png", under_errors, f"{scene.placed}: what costs coverage")
@@ -214,8 +211,8 @@ def poses(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements under sensor failures and multi-cover."""
-    around, problem = surroundings(scene.surveyed.layout), scene.problem(scene.sensor)
-    study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.surveyed.layout.settings.limits)
+    around, problem = surroundings(scene.survey), scene.problem(scene.sensor)
+    study = yield from robust_study(around, problem, scene.scope.robust, RISKS, scene.survey.settings.limits)
     robust_charts.save_spread_chart(scene.charts / "failures.png", study, f"{scene.placed}: failures")
     caption = "Distribution over unseen draws of what is left: placements for failures beside the nominal optimum"
     return Chapter(f"Failures: {scene.placed}", robust_rows(study), (Chart("failures.png", caption),))
@@ -223,8 +220,8 @@ def failures(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study placements in traffic."""
-    layout = scene.surveyed.layout
-    around, problem, settings = surroundings(layout), scene.problem(scene.sensor), layout.settings
+    survey = scene.survey
+    around, problem, settings = surroundings(survey), scene.problem(scene.sensor), survey.settings
     runs_to_choose, runs_to_evaluate = split_runs(scene.runs)
     to_choose, to_evaluate = scene.scope.instants
     scenarios = yield from traffic_scenarios(around, problem, spread_instants(runs_to_choose, to_choose, seed=0))
@@ -238,10 +235,10 @@ def traffic(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     )
     study = yield from steps
     chosen = study.traffic.placement.chosen
-    deployment = deploy(layout.site, layout.models, scene.surveyed.grid.visible, chosen)
+    deployment = deploy(survey.site, survey.models, survey.grid.visible, chosen)
     title = f"{scene.placed} in traffic"
     traffic_charts.save_time_map(
-        scene.charts / "time_seen.png", layout.geometry, layout.site, deployment, study.traffic, title
+        scene.charts / "time_seen.png", survey.geometry, survey.site, deployment, study.traffic, title
     )
     traffic_charts.save_traffic_chart(scene.charts / "promise.png", [(scene.placed, study)], title)
     return Chapter(
@@ -260,7 +257,7 @@ def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     from headless.lab.detector import rows as limit_rows  # noqa: PLC0415 -- as above
     from headless.lab.detector.chapter import detector_limits  # noqa: PLC0415 -- as above
 
-    study = yield from detector_limits(scene.surveyed, scene.path, scene.others, scene.work, **scene.scope.detector)
+    study = yield from detector_limits(scene.survey, scene.path, scene.others, scene.work, **scene.scope.detector)
     limit_charts.save_limits_chart(scene.charts / "detector.png", study)
     charts = [Chart("detector.png", "Average precision against the size of each disturbance, with 95 % intervals")]
     if study.transfers:
@@ -271,7 +268,7 @@ def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 
 def introduction(scene: StudiedScene) -> str:
     """Return the introduction of the page."""
-    site = scene.surveyed.layout.site
+    site = scene.survey.site
     return (
         "Where each method begins to fail, how that was found, and what the tool does about it. Written by "
         f"`python -m headless.stability`: {site.name}, {len(site.targets):,} targets, {len(site.candidates):,} poses. "

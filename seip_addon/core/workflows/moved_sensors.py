@@ -20,18 +20,16 @@ from ..results.headings import degrees, tilt_degrees
 from ..results.placement_record import PlacementRecord
 from ..scans.sensor import MountedSensor
 from ..site.scene_geometry import joined
-from ..visibility.grid import VisibilityGrid
 from ..visibility.sight_lines import pose_at
 from ..visibility.visibility_model import VisibilityModel, visibility_model
-from .survey import Layout
+from .survey import Layout, Survey
 
 BY_HAND = "by hand"
 """Name of a place that is no position of the site."""
 
 
 def evaluate_moved_sensors(
-    layout: Layout,
-    grid: VisibilityGrid,
+    survey: Survey,
     objective: Objective,
     mounted: Sequence[MountedSensor],
     places: Mapping[str, str],
@@ -40,8 +38,6 @@ def evaluate_moved_sensors(
 
     Parameters
     ----------
-    grid : VisibilityGrid
-        Of the layout.
     objective : Objective
         That the placement answered which they were moved from: its weights, and whether a price was sought.
     mounted : sequence of MountedSensor
@@ -63,7 +59,7 @@ def evaluate_moved_sensors(
     SeipError
         A sensor hangs below the ground.
     """
-    site, models = layout.site, layout.models
+    site, models = survey.site, survey.models
     visibility: VisibilityModel | None = None
     sensors: list[Sensor] = []
     rows: list[Boolean] = []
@@ -72,11 +68,11 @@ def evaluate_moved_sensors(
         pose = pose_at(site.candidates, one.model.key, one.xyz, one.orientation)
         if pose is not None:
             sensors.append(sensor_at(site, models, one.label, pose))
-            rows.append(grid.visible[pose])
+            rows.append(survey.grid.visible[pose])
             continue
         if visibility is None:
-            visibility = visibility_model(site, layout.settings.visibility, layout.settings.engine)
-        sensor = _elsewhere(layout, one, places.get(one.label, BY_HAND))
+            visibility = visibility_model(site, survey.settings.visibility, survey.settings.engine)
+        sensor = _elsewhere(survey, one, places.get(one.label, BY_HAND))
         sensors.append(sensor)
         rows.append(visibility.see(sensor.model, sensor.xyz, sensor.orientation))
     seen = np.array(rows, dtype=bool).reshape(len(rows), len(site.targets))
@@ -96,15 +92,13 @@ def evaluate_moved_sensors(
     return Solution(objective, placement, None, deployment)
 
 
-def restored_by_hand(
-    layout: Layout, grid: VisibilityGrid, record: PlacementRecord
-) -> Generator[Progress, None, Solution]:
-    """Evaluate the sensors of a record again, on the layout and with the grid that it was made with."""
+def restored_by_hand(survey: Survey, record: PlacementRecord) -> Generator[Progress, None, Solution]:
+    """Evaluate the sensors of a record again, on the survey that it was made on."""
     sensors = record.sensors
-    models = find_models(load_catalogue(layout.settings.catalogue), sorted({one.sensor for one in sensors}))
+    models = find_models(load_catalogue(survey.settings.catalogue), sorted({one.sensor for one in sensors}))
     mounted = [MountedSensor(one.id, models[one.sensor], np.array(one.local_m), one.orientation) for one in sensors]
     places = {one.id: one.position for one in sensors}
-    return (yield from evaluate_moved_sensors(layout, grid, record.asked.goal, mounted, places))
+    return (yield from evaluate_moved_sensors(survey, record.asked.goal, mounted, places))
 
 
 def _elsewhere(layout: Layout, one: MountedSensor, place: str) -> Sensor:

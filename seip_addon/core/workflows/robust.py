@@ -12,8 +12,7 @@ from ..progress import Progress
 from ..robustness.pose_study import PoseStudy, PoseStudySettings, pose_study, pose_warnings
 from ..robustness.risk import Risk
 from ..robustness.robust_study import RobustnessSettings, RobustStudy, robust_study
-from ..visibility.grid import VisibilityGrid
-from .survey import Layout, surroundings
+from .survey import Survey, surroundings
 
 DRAWS_OF_KIND = 100
 """Draws with one kind of error alone, at most."""
@@ -50,14 +49,12 @@ def check_robust_objective(objective: Objective, risk: Risk | None = None) -> No
 
 
 def place_robustly(
-    layout: Layout, grid: VisibilityGrid, objective: Objective, settings: RobustnessSettings
+    survey: Survey, objective: Objective, settings: RobustnessSettings
 ) -> Generator[Progress, None, RobustSolution]:
     """Optimise a placement for pose errors, failures or multiple looks, and study the result.
 
     Parameters
     ----------
-    grid : VisibilityGrid
-        Of the poses as planned.
     objective : Objective
         Of most coverage.
 
@@ -67,11 +64,11 @@ def place_robustly(
         As for `check_robust_objective`, `placement_problem` and `solve_robust`.
     """
     check_robust_objective(objective, settings.risk)
-    site, models, around = layout.site, layout.models, surroundings(layout)
-    problem = placement_problem(site, grid.visible, models, objective)
-    study = yield from robust_study(around, problem, settings, [settings.risk], layout.settings.limits)
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    around, problem = surroundings(survey), placement_problem(site, visible, models, objective)
+    study = yield from robust_study(around, problem, settings, [settings.risk], survey.settings.limits)
     (chosen,) = study.robust
-    deployment = deploy(site, models, grid.visible, chosen.placement.chosen)
+    deployment = deploy(site, models, visible, chosen.placement.chosen)
     tried = PoseStudySettings(settings.errors, settings.draws, min(DRAWS_OF_KIND, settings.draws), settings.seed + 1)
     under_errors = yield from pose_study(around, deployment, tried)
     note = f"{CHOSEN_FOR}for {chosen.name} over {settings.scenarios} scenarios: objective, bound and gap are of that"

@@ -167,6 +167,13 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     return Layout(geometry, site, models, settings, (*warnings, *limits))
 
 
+@dataclass(frozen=True, eq=False)
+class Survey(Layout):
+    """A layout with its visibility grid."""
+
+    grid: VisibilityGrid
+
+
 def grid_key(layout: Layout) -> str:
     """Return the key of the visibility grid of a survey: what it is kept under."""
     settings = layout.settings
@@ -189,7 +196,7 @@ def inputs_of(layout: Layout) -> dict[str, str]:
 
 def see(
     layout: Layout, path: Path, scheduler: str | None = None, threads: int | None = None
-) -> Generator[Progress, None, VisibilityGrid]:
+) -> Generator[Progress, None, Survey]:
     """Find which pose sees which target, or read it from a file where an earlier survey found the same.
 
     Parameters
@@ -202,7 +209,15 @@ def see(
         How many cast at once at most.
     """
     settings = layout.settings
-    return stored_visibility(path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads)
+    grid = yield from stored_visibility(
+        path, layout.site, layout.models, settings.visibility, settings.engine, scheduler, threads
+    )
+    return with_grid(layout, grid)
+
+
+def with_grid(layout: Layout, grid: VisibilityGrid) -> Survey:
+    """Return the survey of a layout whose visibility grid is known."""
+    return Survey(**{**vars(layout), "grid": grid})
 
 
 def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, None, Estimate]:
@@ -211,23 +226,21 @@ def estimate(layout: Layout, threads: int | None = None) -> Generator[Progress, 
     return estimate_visibility(layout.site, layout.models, settings.visibility, settings.engine, threads)
 
 
-def place(
-    layout: Layout, grid: VisibilityGrid, objective: Objective, *, pose_errors: bool = False
-) -> Generator[Progress, None, Solution]:
+def place(survey: Survey, objective: Objective, *, pose_errors: bool = False) -> Generator[Progress, None, Solution]:
     """Optimise a placement on a survey, and note how far it can be trusted.
 
     The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say
     what it loses where its sensors do not hang quite as planned (`pose_message`): rays are cast for that alone.
     """
-    site, models, settings = layout.site, layout.models, layout.settings
-    solution = yield from optimise(site, grid.visible, models, objective, settings.limits)
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
     notes = [*solution.placement.notes]
     if solution.placement.status == "optimal" and not objective.cheapest:
-        problem = placement_problem(site, grid.visible, models, objective)
+        problem = placement_problem(site, visible, models, objective)
         top = yield from near_optimal_set(problem, solution.placement.chosen)
         notes += [] if top is None else [top.message]
     if pose_errors and solution.deployment.sensors:
-        study = yield from pose_study(surroundings(layout), solution.deployment, POSES_TRIED)
+        study = yield from pose_study(surroundings(survey), solution.deployment, POSES_TRIED)
         notes.append(pose_message(study))
     return replace(solution, placement=replace(solution.placement, notes=tuple(notes)))
 
@@ -239,7 +252,7 @@ def surroundings(layout: Layout) -> Surroundings:
 
 
 def record_of(
-    layout: Layout, grid: VisibilityGrid, solution: Solution, provenance: Provenance, asked: Mapping[str, object]
+    survey: Survey, solution: Solution, provenance: Provenance, asked: Mapping[str, object]
 ) -> PlacementRecord:
     """Return what ``placement.json`` holds of a solution.
 
@@ -251,24 +264,22 @@ def record_of(
     """
     objective = {"goal": asdict(solution.objective), "pose_errors": False, "render": False}
     return placement_record(
-        layout.site,
+        survey.site,
         solution,
         provenance,
-        settings={**layout.settings.as_record(), **objective, **asked},
-        inputs=inputs_of(layout) | {"visibility": grid.key},
-        warnings=layout.warnings,
+        settings={**survey.settings.as_record(), **objective, **asked},
+        inputs=inputs_of(survey) | {"visibility": survey.grid.key},
+        warnings=survey.warnings,
     )
 
 
-def restored_solution(layout: Layout, grid: VisibilityGrid, record: PlacementRecord) -> Solution:
+def restored_solution(survey: Survey, record: PlacementRecord) -> Solution:
     """Return the solution that a record of `record_of` tells of, without asking a solver again.
 
     Parameters
     ----------
-    layout : Layout
+    survey : Survey
         That it was made on.
-    grid : VisibilityGrid
-        That it was made from.
     record : PlacementRecord
         The greedy answer that it may hold is left out.
 
@@ -277,7 +288,8 @@ def restored_solution(layout: Layout, grid: VisibilityGrid, record: PlacementRec
     SeipError
         The record is of another grid, or names a pose that is none of its candidates.
     """
-    poses = range(len(layout.site.candidates))
+    site, grid = survey.site, survey.grid
+    poses = range(len(site.candidates))
     if record.inputs.get("visibility") != grid.key or not all(sensor.pose in poses for sensor in record.sensors):
         raise SeipError("the placement was made for another state of the scene or its settings: place again")
     objective, found = record.asked.goal, record.objective
@@ -290,8 +302,8 @@ def restored_solution(layout: Layout, grid: VisibilityGrid, record: PlacementRec
         status=found.status,
         solver=found.solver,
         seconds=record.times.durations_s.get("placement", 0.0),
-        covered=float(target_weights(layout.site, objective)[grid.times_seen(chosen) > 0].sum()),
+        covered=float(target_weights(site, objective)[grid.times_seen(chosen) > 0].sum()),
         price=record.price_usd,
         notes=record.notes,
     )
-    return Solution(objective, placement, None, deploy(layout.site, layout.models, grid.visible, chosen))
+    return Solution(objective, placement, None, deploy(site, survey.models, grid.visible, chosen))

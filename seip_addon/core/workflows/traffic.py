@@ -21,9 +21,8 @@ from ..settings import setting
 from ..site.site import Site
 from ..traffic import Trajectories
 from ..traffic.run_overlap import require_independent, vehicle_positions
-from ..visibility.grid import VisibilityGrid
 from .robust import check_robust_objective
-from .survey import Layout, surroundings
+from .survey import Layout, Survey, surroundings
 
 _Run = TypeVar("_Run")
 
@@ -152,14 +151,12 @@ def independent_runs(runs: Mapping[str, Trajectories], site: Site) -> TrafficRun
 
 
 def place_in_traffic(
-    layout: Layout, grid: VisibilityGrid, objective: Objective, runs: TrafficRuns, settings: TrafficSettings
+    survey: Survey, objective: Objective, runs: TrafficRuns, settings: TrafficSettings
 ) -> Generator[Progress, None, TrafficSolution]:
     """Optimise a placement for traffic, whose vehicles block the view, and evaluate it on other runs.
 
     Parameters
     ----------
-    grid : VisibilityGrid
-        Of the empty road.
     objective : Objective
         Of most coverage.
 
@@ -169,15 +166,16 @@ def place_in_traffic(
         As for `check_robust_objective`, `placement_problem` and `spread_instants`.
     """
     check_robust_objective(objective)
-    problem = placement_problem(layout.site, grid.visible, layout.models, objective)
+    site, models, visible = survey.site, survey.models, survey.grid.visible
+    problem = placement_problem(site, visible, models, objective)
     if settings.weights_from_traffic:
-        seconds = yield from road_user_seconds(layout.site.targets, runs.optimisation)
+        seconds = yield from road_user_seconds(site.targets, runs.optimisation)
         problem = replace(problem, weights=problem.weights * seconds)
-    around = surroundings(layout)
+    around = surroundings(survey)
     chosen_at = spread_instants(runs.optimisation, settings.instants, settings.seed)
     scenarios = yield from traffic_scenarios(around, problem, chosen_at, settings.layer)
     evaluation = spread_instants(runs.evaluation, settings.evaluation_instants, settings.seed + 1)
-    study = yield from traffic_study(around, problem, scenarios, evaluation, layout.settings.limits)
+    study = yield from traffic_study(around, problem, scenarios, evaluation, survey.settings.limits)
     placement = study.traffic.placement
     note = (
         f"{CHOSEN_FOR}to see the {LAYER_NAMES[study.layer]} in traffic, on average over {study.chosen_at} instants: "
@@ -185,8 +183,8 @@ def place_in_traffic(
     )
     weighed = ("targets weigh as many seconds as road users are there",) if settings.weights_from_traffic else ()
     notes = (note, *weighed, *placement.notes, *traffic_messages(study), *traffic_warnings(study))
-    deployment = deploy(layout.site, layout.models, grid.visible, placement.chosen)
-    solution = Solution(with_count(objective, layout.site), replace(placement, notes=notes), None, deployment)
+    deployment = deploy(site, models, visible, placement.chosen)
+    solution = Solution(with_count(objective, site), replace(placement, notes=notes), None, deployment)
     return TrafficSolution(solution, study)
 
 
