@@ -37,7 +37,7 @@ def main(archive: str, scene: str) -> None:
     seip.survey.heights, seip.survey.grid, seip.survey.spacing, seip.goal.count = "8", 4.0, 12.0, 2
     if bpy.ops.seip.solve_placement() != {"FINISHED"}:
         sys.exit("no sensors were placed")
-    empties = [thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY"]
+    empties = [obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.type == "EMPTY"]
     bpy.ops.preferences.addon_disable(module=KEY)
     left = {what: names - before[what] for what, names in traces().items() if names - before[what]}
     if len(empties) != 2 or left:

@@ -14,8 +14,8 @@ from .session import session
 def sensor_empties(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     """Return the sensors that stand in a scene, by label."""
     collection = contract.find(scene, contract.SENSORS)
-    things = [] if collection is None else collection.all_objects
-    return {str(thing[contract.LABEL]): thing for thing in things if contract.LABEL in thing}
+    objects = [] if collection is None else collection.all_objects
+    return {str(obj[contract.LABEL]): obj for obj in objects if contract.LABEL in obj}
 
 
 def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -23,8 +23,8 @@ def select_sensor(result: bpy.types.PropertyGroup, context: bpy.types.Context) -
     empty = sensor_empties(context.scene).get(result.sensors[result.active_sensor].name)
     if empty is None or empty.name not in context.view_layer.objects:
         return
-    for thing in context.selected_objects:
-        thing.select_set(state=False)
+    for obj in context.selected_objects:
+        obj.select_set(state=False)
     empty.select_set(state=True)
     context.view_layer.objects.active = empty
 
@@ -44,16 +44,16 @@ def search_positions(_goal: bpy.types.PropertyGroup, context: bpy.types.Context,
     if state is not None:
         names = state.layout.site.candidates.position_name.tolist()
     else:
-        names = sorted(thing.name for thing in contract.members(scene)[contract.POLES])
+        names = sorted(obj.name for obj in contract.members(scene)[contract.POLES])
     yield from (name for name in names if text.lower() in name.lower())
 
 
-def position_of(scene: bpy.types.Scene, thing: bpy.types.Object | None) -> str:
+def position_of(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> str:
     """Return the name of the position that an object stands for: a sensor's, or a pole's own; empty if for none."""
-    while thing is not None:
-        if contract.POSITION in thing:
-            return str(thing[contract.POSITION])
-        if thing in contract.members(scene)[contract.POLES]:
-            return str(thing.name)
-        thing = thing.parent
+    while obj is not None:
+        if contract.POSITION in obj:
+            return str(obj[contract.POSITION])
+        if obj in contract.members(scene)[contract.POLES]:
+            return str(obj.name)
+        obj = obj.parent
     return ""

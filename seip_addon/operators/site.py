@@ -261,8 +261,8 @@ class SEIP_OT_add_area(bpy.types.Operator):
         middle = context.scene.cursor.location.copy()
         if self.place == "VIEW" and context.region_data is not None:
             middle.xy = context.region_data.view_location.xy
-        thing = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
-        _select_alone(context, thing)
+        obj = roles.add_area(context.scene, Role[self.role], tuple(middle), tuple(self.size), self.turn, self.corners)
+        _select_alone(context, obj)
         return {"FINISHED"}
 
 
@@ -295,7 +295,7 @@ class SEIP_OT_check_site(LongWork[SiteCheck], bpy.types.Operator):
         site.problems.clear()
         for problem in result.problems:
             listed = site.problems.add()
-            listed.name, listed.text, listed.is_error = problem.thing, problem.text, problem.severity == "ERROR"
+            listed.name, listed.text, listed.is_error = problem.obj, problem.text, problem.severity == "ERROR"
         self.report({"INFO"}, in_short(result.problems))
 
 
@@ -331,8 +331,8 @@ class SEIP_OT_show_problem(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Select it alone, and frame it."""
         site = context.scene.seip.site
-        thing = context.view_layer.objects[site.problems[site.active_problem].name]
-        _select_alone(context, thing)
+        obj = context.view_layer.objects[site.problems[site.active_problem].name]
+        _select_alone(context, obj)
         _frame_selected(context)
         return {"FINISHED"}
 
@@ -345,19 +345,19 @@ def nothing_to_show(context: bpy.types.Context) -> str:
     name = site.problems[site.active_problem].name
     if not name:
         return "This concerns the whole scene"
-    thing = context.view_layer.objects.get(name)
-    if thing is None:
+    obj = context.view_layer.objects.get(name)
+    if obj is None:
         return "The object is not in this view layer"
-    if not thing.visible_get():
+    if not obj.visible_get():
         return "The object is hidden: show it first"
     return "" if context.mode == "OBJECT" else "Leave Edit Mode first"
 
 
-def _select_alone(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+def _select_alone(context: bpy.types.Context, obj: bpy.types.Object) -> None:
     for other in context.selected_objects:
         other.select_set(state=False)
-    thing.select_set(state=True)
-    context.view_layer.objects.active = thing
+    obj.select_set(state=True)
+    context.view_layer.objects.active = obj
 
 
 def _frame_selected(context: bpy.types.Context) -> None:

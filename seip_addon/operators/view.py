@@ -108,9 +108,7 @@ _items: list[tuple[str, str, str]] = []
 
 def _sensors(_operator: object, context: bpy.types.Context | None) -> list[tuple[str, str, str]]:
     there = placed_sensors(context.scene) if context else {}
-    _items[:] = [(label, label, thing.name) for label, thing in there.items()] or [
-        ("NONE", "None", "Place sensors first")
-    ]
+    _items[:] = [(label, label, obj.name) for label, obj in there.items()] or [("NONE", "None", "Place sensors first")]
     return _items
 
 
@@ -130,12 +128,12 @@ class SEIP_OT_show_sight_lines(ForPlacement, LongWork[SceneState], bpy.types.Ope
     def conclude(self, scene: bpy.types.Scene, result: SceneState) -> None:
         """Draw them."""
         session.keep_state(scene, result)
-        thing = placed_sensors(scene).get(self.sensor)
+        obj = placed_sensors(scene).get(self.sensor)
         survey, _ = result.placed()
-        if thing is None:
+        if obj is None:
             raise SeipError(f"there is no sensor {self.sensor!r} in the scene: undo, or place again")
-        key = str(thing.get(contract.SENSOR))
-        pose = pose_at(survey.site.candidates, key, *pose_of(thing))
+        key = str(obj.get(contract.SENSOR))
+        pose = pose_at(survey.site.candidates, key, *pose_of(obj))
         if pose is None:
             raise SeipError(f"{self.sensor} hangs at no candidate pose: put it back, or place again")
         sight = sight_lines(survey.site, pose, survey.models[key], survey.grid.sees(pose))

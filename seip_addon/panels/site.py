@@ -97,17 +97,17 @@ class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
             _draw_object(layout, context.scene, context.object)
 
 
-def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
-    assigned = roles.roles_of(scene, thing)
+def _draw_object(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    assigned = roles.roles_of(scene, obj)
     box = layout.box()
-    box.label(text=thing.name, icon="OBJECT_DATA")
+    box.label(text=obj.name, icon="OBJECT_DATA")
     draw_sentence(box, ", ".join(role.value for role in assigned).capitalize() or "No role")
     column = settings_column(box)
-    column.enabled = thing.is_editable
+    column.enabled = obj.is_editable
     if Role.WEIGHTED_REGIONS in assigned:
-        column.prop(thing, "seip_region_weight")
+        column.prop(obj, "seip_region_weight")
     if Role.POLES in assigned:
-        column.prop(thing, "seip_pole_rule")
+        column.prop(obj, "seip_pole_rule")
 
 
 class SEIP_UL_problems(RowList, bpy.types.UIList):

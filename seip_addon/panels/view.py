@@ -44,10 +44,10 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         head.label(text="Coverage")
         shown = overlays.find(context.scene, coverage.NAME) is not None
         head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
-        thing = coverage_of(context.scene)
+        obj = coverage_of(context.scene)
         row = column.row(align=True)
         for aspect in ASPECTS:
-            now = thing is not None and thing.get(ASPECT) == aspect
+            now = obj is not None and obj.get(ASPECT) == aspect
             button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=aspect.capitalize(), depress=now)
             button.aspect = aspect
         why_not = why_no_coverage(context.scene)

@@ -96,29 +96,29 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         return str(self.junction if found is None else found.id)
 
 
-def _region_weight(thing: bpy.types.Object) -> float:
-    value = thing.get(contract.WEIGHT, DEFAULT_WEIGHT)
+def _region_weight(obj: bpy.types.Object) -> float:
+    value = obj.get(contract.WEIGHT, DEFAULT_WEIGHT)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return float(value) if is_number else DEFAULT_WEIGHT  # the check says what is wrong with it
 
 
-def _set_region_weight(thing: bpy.types.Object, value: float) -> None:
-    thing[contract.WEIGHT] = as_typed(value)
+def _set_region_weight(obj: bpy.types.Object, value: float) -> None:
+    obj[contract.WEIGHT] = as_typed(value)
 
 
 _POLE_RULES = ("", contract.MANDATORY, contract.FORBIDDEN)
 
 
-def _pole_rule(thing: bpy.types.Object) -> int:
-    return next((number for number, mark in enumerate(_POLE_RULES) if mark and thing.get(mark)), 0)
+def _pole_rule(obj: bpy.types.Object) -> int:
+    return next((number for number, mark in enumerate(_POLE_RULES) if mark and obj.get(mark)), 0)
 
 
-def _set_pole_rule(thing: bpy.types.Object, value: int) -> None:
+def _set_pole_rule(obj: bpy.types.Object, value: int) -> None:
     for number, mark in enumerate(_POLE_RULES[1:], start=1):
         if number == value:
-            thing[mark] = True
-        elif mark in thing:
-            del thing[mark]
+            obj[mark] = True
+        elif mark in obj:
+            del obj[mark]
 
 
 CLASSES = (SEIP_PG_junction, SEIP_PG_count, SEIP_PG_problem, SEIP_PG_site)

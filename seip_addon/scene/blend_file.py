@@ -11,7 +11,7 @@ from ..core.storage.files import whole_file
 from .interrupts import held_interrupts
 
 CLIP_START, CLIP_END = 0.5, 5000.0
-"""Metres before the eye between which a 3D view shows things: a site, without flicker of what lies close together."""
+"""Metres before the eye between which a 3D view shows objects: a site, without flicker of what lies close together."""
 
 
 def new_file() -> bpy.types.Scene:

@@ -87,16 +87,16 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     shape = digest(solid.vertices, repr(solid.faces), repr(solid.materials))
     if shape not in meshes:
         meshes[shape] = mesh_of(part.name, solid)
-    thing = bpy.data.objects.new(part.name, meshes[shape])
-    thing.location = part.foot
-    thing.rotation_euler = (0.0, 0.0, part.yaw)
+    obj = bpy.data.objects.new(part.name, meshes[shape])
+    obj.location = part.foot
+    obj.rotation_euler = (0.0, 0.0, part.yaw)
     if part.weight is not None:
-        thing[contract.WEIGHT] = part.weight
+        obj[contract.WEIGHT] = part.weight
     if part.source:
-        thing[contract.SOURCE] = part.source
-    thing.hide_render = AREA_OVERLAYS.keys() >= set(part.roles)  # the viewport shows what only means an area
+        obj[contract.SOURCE] = part.source
+    obj.hide_render = AREA_OVERLAYS.keys() >= set(part.roles)  # the viewport shows what only means an area
     for role in part.roles:
-        contract.find_or_make(scene, COLLECTIONS[role]).objects.link(thing)
+        contract.find_or_make(scene, COLLECTIONS[role]).objects.link(obj)
 
 
 def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
@@ -105,15 +105,15 @@ def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:
     camera = bpy.data.cameras.new("Overview")
     camera.lens = LENS
     camera.clip_start, camera.clip_end = CLIP_START, CLIP_END
-    thing = bpy.data.objects.new("Overview", camera)
-    thing.rotation_euler = (math.pi / 2 - CAMERA_ELEVATION, 0.0, CAMERA_AZIMUTH + math.pi / 2)
-    contract.find_or_make(scene, VIEW).objects.link(thing)
-    scene.camera = thing
+    obj = bpy.data.objects.new("Overview", camera)
+    obj.rotation_euler = (math.pi / 2 - CAMERA_ELEVATION, 0.0, CAMERA_AZIMUTH + math.pi / 2)
+    contract.find_or_make(scene, VIEW).objects.link(obj)
+    scene.camera = obj
     layer = scene.view_layers[0]
     layer.update()
     outline = shapely.get_coordinates(model.region.convex_hull.buffer(FRAME))
     corners = np.column_stack([outline, np.zeros(len(outline))])
-    thing.location, _ = thing.camera_fit_coords(layer.depsgraph, corners.ravel().tolist())
+    obj.location, _ = obj.camera_fit_coords(layer.depsgraph, corners.ravel().tolist())
     scene.view_settings.view_transform = "Standard"
     shading = scene.display.shading
     shading.light, shading.color_type = "STUDIO", "MATERIAL"

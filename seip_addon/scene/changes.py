@@ -52,7 +52,7 @@ def watch(scene: bpy.types.Scene) -> Watch:
     """Begin to watch a scene, for as long as somebody holds the watch."""
     scene.view_layers[0].update()
     sources = _sources(scene)
-    new = Watch(scene.session_uid, frozenset(thing.session_uid for thing in sources), _fingerprint(sources, scene))
+    new = Watch(scene.session_uid, frozenset(obj.session_uid for obj in sources), _fingerprint(sources, scene))
     _watches.add(new)
     return new
 
@@ -76,10 +76,10 @@ def _sources(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     found: set[bpy.types.Object] = set()
     waiting = set().union(*contract.members(scene).values())
     while waiting:
-        thing = waiting.pop()
-        found.add(thing)
-        if thing.instance_type == "COLLECTION" and thing.instance_collection is not None:
-            waiting |= set(thing.instance_collection.all_objects) - found
+        obj = waiting.pop()
+        found.add(obj)
+        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None:
+            waiting |= set(obj.instance_collection.all_objects) - found
     return found
 
 
@@ -87,21 +87,21 @@ def _fingerprint(sources: Iterable[bpy.types.Object], scene: bpy.types.Scene) ->
     layer = scene.view_layers[0]
     roles = contract.members(scene)
     lines = sorted(
-        repr((_traits(thing, layer), [n for n, things in roles.items() if thing in things])) for thing in sources
+        repr((_traits(obj, layer), [n for n, objects in roles.items() if obj in objects])) for obj in sources
     )
     return digest(repr(scene.get(contract.ORIGIN)), repr(scene.get(contract.TITLE, scene.name)), *lines)
 
 
-def _traits(thing: bpy.types.Object, layer: bpy.types.ViewLayer) -> tuple[object, ...]:
+def _traits(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> tuple[object, ...]:
     """Return what of an object may change without a report; of its shape no more than its name."""
     return (
-        thing.name_full,
-        tuple(value for row in thing.matrix_world for value in row),
-        None if thing.data is None else thing.data.name_full,
-        thing.hide_viewport,
-        thing.name in layer.objects and thing.visible_get(view_layer=layer),
-        None if thing.instance_collection is None else thing.instance_collection.name_full,
-        thing.instance_type,
-        *(repr(thing.get(name)) for name in (contract.WEIGHT, contract.FORBIDDEN, contract.MANDATORY)),
-        *((modifier.type, modifier.show_viewport) for modifier in thing.modifiers),
+        obj.name_full,
+        tuple(value for row in obj.matrix_world for value in row),
+        None if obj.data is None else obj.data.name_full,
+        obj.hide_viewport,
+        obj.name in layer.objects and obj.visible_get(view_layer=layer),
+        None if obj.instance_collection is None else obj.instance_collection.name_full,
+        obj.instance_type,
+        *(repr(obj.get(name)) for name in (contract.WEIGHT, contract.FORBIDDEN, contract.MANDATORY)),
+        *((modifier.type, modifier.show_viewport) for modifier in obj.modifiers),
     )

@@ -135,14 +135,14 @@ def _without_role(
     high = np.max([corner.max(axis=0) for corner in corners], axis=0) + NEAR
     placed = set().union(*members.values())
     large = []
-    for thing in scene.view_layers[0].objects:
-        if thing in placed or thing.type != "MESH" or _needs_no_role(thing) or not thing.visible_get():
+    for obj in scene.view_layers[0].objects:
+        if obj in placed or obj.type != "MESH" or _needs_no_role(obj) or not obj.visible_get():
             continue
-        box = _box(thing)
+        box = _box(obj)
         size = np.ptp(box, axis=0)
         near = (box[:, :2].max(axis=0) > low).all() and (box[:, :2].min(axis=0) < high).all()
         if near and size[2] >= LARGE and size[:2].max() >= LARGE:
-            large.append((float(size.max()), thing.name))
+            large.append((float(size.max()), obj.name))
     for size, name in sorted(large, reverse=True)[:MOST_NAMED]:
         yield Problem(
             "WARNING",
@@ -154,14 +154,14 @@ def _without_role(
         yield Problem("WARNING", f"{len(large) - MOST_NAMED:,} more large objects have no role: no ray ends on them.")
 
 
-def _needs_no_role(thing: bpy.types.Object) -> bool:
-    return thing.display_type in {"BOUNDS", "WIRE"} or any(
-        contract.kind(collection) in NEVER_IN_THE_WAY for collection in thing.users_collection
+def _needs_no_role(obj: bpy.types.Object) -> bool:
+    return obj.display_type in {"BOUNDS", "WIRE"} or any(
+        contract.kind(collection) in NEVER_IN_THE_WAY for collection in obj.users_collection
     )
 
 
-def _box(thing: bpy.types.Object) -> Float:
+def _box(obj: bpy.types.Object) -> Float:
     """Return the corners (8, 3) of an object's bounding box in site axes."""
-    matrix = np.array(thing.matrix_world, dtype=np.float64)
-    box: Float = np.array(thing.bound_box, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    box: Float = np.array(obj.bound_box, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     return box

@@ -97,7 +97,7 @@ def _reached(scene: bpy.types.Scene) -> set[bpy.types.Collection]:
     waiting = [scene.collection]
     while waiting:
         collection = waiting.pop()
-        instanced = {thing.instance_collection for thing in collection.objects if thing.instance_type == "COLLECTION"}
+        instanced = {obj.instance_collection for obj in collection.objects if obj.instance_type == "COLLECTION"}
         following = {*collection.children, *instanced} - reached - {None}
         reached |= following
         waiting += following

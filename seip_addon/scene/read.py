@@ -131,26 +131,26 @@ def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, li
         mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
         poles=poles_of(parts),
     )
-    hidden_sentences = (hidden_sentence(name, things) for name, things in hidden.items())
+    hidden_sentences = (hidden_sentence(name, objects) for name, objects in hidden.items())
     return SceneReading(geometry, (*hidden_sentences, *foot_sentences(parts)))
 
 
 def missing_libraries(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> dict[str, str]:
-    """Say of each thing which library it lacks, by its name: Blender shows nothing, or a placeholder, in its place."""
+    """Say of each object which library it lacks, by its name: Blender shows nothing, or a placeholder, in its place."""
     objects = set().union(*members.values())
     instanced = {item.instance_collection for item in objects if item.instance_collection is not None}
     objects.update(*(collection.all_objects for collection in instanced))
     data = {item.data for item in objects if item.data is not None}
     return {
-        thing.name: f"{thing.name!r} is linked from {thing.library.filepath}, which is not there: "
+        obj.name: f"{obj.name!r} is linked from {obj.library.filepath}, which is not there: "
         "bring the file back, relocate the library, or delete what is linked from it"
-        for thing in (*scene.collection.children_recursive, *instanced, *objects, *data)
-        if thing.library is not None and not Path(bpy.path.abspath(thing.library.filepath)).is_file()
+        for obj in (*scene.collection.children_recursive, *instanced, *objects, *data)
+        if obj.library is not None and not Path(bpy.path.abspath(obj.library.filepath)).is_file()
     }
 
 
 def shown_parts(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> Iterator[Shown]:
-    """Yield what the viewport shows of the members of collections, faulty things too."""
+    """Yield what the viewport shows of the members of collections, faulty objects too."""
     depsgraph = _depsgraph(scene)
     faces: dict[int, _Faces | None] = {}
     counts: dict[str, int] = {}
@@ -381,11 +381,11 @@ def hidden_members(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Obje
         name: sorted(item.name for item in objects if item.name in layer.objects and not _is_visible(item, layer))
         for name, objects in members.items()
     }
-    return {name: things for name, things in hidden.items() if things}
+    return {name: objects for name, objects in hidden.items() if objects}
 
 
-def _is_visible(thing: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
-    return bool(thing.visible_get(view_layer=layer))
+def _is_visible(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    return bool(obj.visible_get(view_layer=layer))
 
 
 def hidden_sentence(collection: str, hidden: list[str]) -> str:

@@ -180,14 +180,14 @@ def _stage(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
     images = set(bpy.data.images)
     stage = bpy.data.scenes.new("SEIP view")
     try:
-        for thing in shared:
-            stage.collection.objects.link(thing)
+        for obj in shared:
+            stage.collection.objects.link(obj)
         yield stage
     finally:
-        own = [thing for thing in stage.collection.objects if thing not in shared]
+        own = [obj for obj in stage.collection.objects if obj not in shared]
         world = [stage.world] if stage.world else []
         bpy.data.scenes.remove(stage)
-        bpy.data.batch_remove([*own, *(thing.data for thing in own), *world, *(set(bpy.data.images) - images)])
+        bpy.data.batch_remove([*own, *(obj.data for obj in own), *world, *(set(bpy.data.images) - images)])
 
 
 @contextmanager
@@ -213,7 +213,7 @@ def _rendered_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
         if layer.exclude or layer.collection.hide_render or contract.kind(layer.collection) in contract.AREAS:
             continue
         layers.extend(layer.children)
-        found |= {thing.name_full: thing for thing in layer.collection.objects}
+        found |= {obj.name_full: obj for obj in layer.collection.objects}
     return [
         found[name] for name in sorted(found) if found[name].type not in UNSEEN_TYPES and not found[name].hide_render
     ]

@@ -36,17 +36,17 @@ AREAS = tuple(role for role in ROLES if ROLES[role] in contract.AREAS)
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
-def roles_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[Role, ...]:
+def roles_of(scene: bpy.types.Scene, obj: bpy.types.Object) -> tuple[Role, ...]:
     """Return the roles that an object is linked to, directly or in a sub-collection."""
     kinds = {
         contract.kind(collection)
         for collection in scene.collection.children_recursive
-        if contract.kind(collection) in contract.INPUTS and collection.all_objects.get(thing.name) == thing
+        if contract.kind(collection) in contract.INPUTS and collection.all_objects.get(obj.name) == obj
     }
     return tuple(role for role, collection in ROLES.items() if collection in kinds)
 
 
-def assign(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], role: Role) -> int:
+def assign(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], role: Role) -> int:
     """Link objects to a role's collection, and return how many were not there before.
 
     Raises
@@ -54,19 +54,19 @@ def assign(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], role: Rol
     SeipError
         None of them can have the role.
     """
-    given = list(things)
-    fit = [thing for thing in given if _can_be(thing, role)]
+    given = list(objects)
+    fit = [obj for obj in given if _can_be(obj, role)]
     if not fit:
         wish = "meshes or empties" if role is Role.POLES else "meshes, or empties that instance a collection"
         raise SeipError(f"none of the {len(given)} selected objects can be among the {role.value}: select {wish}")
-    new = [thing for thing in fit if role not in roles_of(scene, thing)]
+    new = [obj for obj in fit if role not in roles_of(scene, obj)]
     collection = contract.find_or_make(scene, ROLES[role])
-    for thing in new:
-        collection.objects.link(thing)
+    for obj in new:
+        collection.objects.link(obj)
     return len(new)
 
 
-def take_out(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], role: Role) -> int:
+def take_out(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], role: Role) -> int:
     """Unlink objects from a role's collections, and return how many were there.
 
     One that would be in no collection at all is linked to the scene's own.
@@ -79,21 +79,21 @@ def take_out(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], role: R
     count = 0
     top = [c for c in scene.collection.children_recursive if contract.kind(c) == ROLES[role]]
     own = {c for collection in top for c in (collection, *collection.children_recursive) if c.library is None}
-    for thing in things:
-        linked = [collection for collection in own if thing.name in collection.objects]
+    for obj in objects:
+        linked = [collection for collection in own if obj.name in collection.objects]
         for collection in linked:
-            collection.objects.unlink(thing)
-        if linked and not thing.users_collection:
-            scene.collection.objects.link(thing)
+            collection.objects.unlink(obj)
+        if linked and not obj.users_collection:
+            scene.collection.objects.link(obj)
         count += bool(linked)
     if not count:
         raise SeipError(f"none of the selected objects is among the {role.value} of this file: nothing to take out")
     return count
 
 
-def _can_be(thing: bpy.types.Object, role: Role) -> bool:
-    instancer = thing.type == "EMPTY" and thing.instance_collection is not None
-    return thing.type in SURFACES or instancer or (thing.type == "EMPTY" and role is Role.POLES)
+def _can_be(obj: bpy.types.Object, role: Role) -> bool:
+    instancer = obj.type == "EMPTY" and obj.instance_collection is not None
+    return obj.type in SURFACES or instancer or (obj.type == "EMPTY" and role is Role.POLES)
 
 
 def add_area(
@@ -124,12 +124,12 @@ def add_area(
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(_polygon(size, corners), [], [tuple(range(corners))])
     mesh.materials.append(material(shade))
-    thing = bpy.data.objects.new(name, mesh)
-    thing.location = (middle[0], middle[1], middle[2] + above)
-    thing.rotation_euler = (0.0, 0.0, turn)
-    thing.hide_render = True
-    contract.find_or_make(scene, ROLES[role]).objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new(name, mesh)
+    obj.location = (middle[0], middle[1], middle[2] + above)
+    obj.rotation_euler = (0.0, 0.0, turn)
+    obj.hide_render = True
+    contract.find_or_make(scene, ROLES[role]).objects.link(obj)
+    return obj
 
 
 def _polygon(size: tuple[float, float], corners: int) -> list[tuple[float, float, float]]:

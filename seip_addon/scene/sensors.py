@@ -49,49 +49,47 @@ def read_sensors(
         raise SeipError(
             f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{others}: place some first"
         )
-    return tuple(_mounted(thing, label, catalogue) for label, thing in sensors.items())
+    return tuple(_mounted(obj, label, catalogue) for label, obj in sensors.items())
 
 
 def labelled_sensors(scene: bpy.types.Scene, *, hidden: bool = False) -> dict[str, bpy.types.Object]:
     """Return the empties of sensors by their labels, S2 before S10; see `read_sensors`."""
-    empties = [thing for thing in _empties(scene) if hidden or _is_shown(thing, scene.view_layers[0])]
+    empties = [obj for obj in _empties(scene) if hidden or _is_shown(obj, scene.view_layers[0])]
     labels = _labels(empties)
-    return {labels[thing.name]: thing for thing in sorted(empties, key=lambda thing: _natural(labels[thing.name]))}
+    return {labels[obj.name]: obj for obj in sorted(empties, key=lambda obj: _natural(labels[obj.name]))}
 
 
-def _is_shown(thing: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
-    return thing.name in layer.objects and bool(thing.visible_get(view_layer=layer))
+def _is_shown(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    return obj.name in layer.objects and bool(obj.visible_get(view_layer=layer))
 
 
 def _empties(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     collection = contract.find(scene, contract.SENSORS)
-    return [] if collection is None else [thing for thing in collection.all_objects if thing.type == "EMPTY"]
+    return [] if collection is None else [obj for obj in collection.all_objects if obj.type == "EMPTY"]
 
 
 def placed_sensors(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     """Return the empties of sensors by their labels, S2 before S10; those without a label are not among them."""
     collection = contract.find(scene, contract.SENSORS)
-    things = [] if collection is None else [thing for thing in collection.objects if contract.LABEL in thing]
-    return {
-        str(thing[contract.LABEL]): thing for thing in sorted(things, key=lambda one: _natural(one[contract.LABEL]))
-    }
+    objects = [] if collection is None else [obj for obj in collection.objects if contract.LABEL in obj]
+    return {str(obj[contract.LABEL]): obj for obj in sorted(objects, key=lambda one: _natural(one[contract.LABEL]))}
 
 
-def _mounted(thing: bpy.types.Object, label: str, catalogue: Mapping[str, LidarModel]) -> MountedSensor:
-    key = thing.get(contract.SENSOR)
+def _mounted(obj: bpy.types.Object, label: str, catalogue: Mapping[str, LidarModel]) -> MountedSensor:
+    key = obj.get(contract.SENSOR)
     if not isinstance(key, str):
         raise SeipError(
-            f"empty {thing.name!r} in {contract.SENSORS!r} names no LiDAR: "
+            f"empty {obj.name!r} in {contract.SENSORS!r} names no LiDAR: "
             f"set its custom property {contract.SENSOR} to a key of the catalogue, or take it out"
         )
     try:
         model = find_models(catalogue, [key])[key]
     except SeipError as error:
-        raise SeipError(f"empty {thing.name!r}: {error}") from error
-    return MountedSensor(label, model, *pose_of(thing))
+        raise SeipError(f"empty {obj.name!r}: {error}") from error
+    return MountedSensor(label, model, *pose_of(obj))
 
 
-def pose_of(thing: bpy.types.Object) -> tuple[Float, Float]:
+def pose_of(obj: bpy.types.Object) -> tuple[Float, Float]:
     """Return where a sensor's empty is, (3,) metres, and how it is turned, (3, 3) from its axes to the site's.
 
     Raises
@@ -99,10 +97,10 @@ def pose_of(thing: bpy.types.Object) -> tuple[Float, Float]:
     SeipError
         It has no proper transform.
     """
-    matrix = np.array(thing.matrix_world, dtype=np.float64)
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
     length = np.linalg.norm(matrix[:3, :3], axis=0)
     if not (np.isfinite(matrix).all() and (length > 0).all()):
-        raise SeipError(f"empty {thing.name!r} has no place, or a scale of zero: set its transform anew")
+        raise SeipError(f"empty {obj.name!r} has no place, or a scale of zero: set its transform anew")
     return matrix[:3, 3], _orthonormal(matrix[:3, :3] / length)
 
 
@@ -116,15 +114,15 @@ def _orthonormal(matrix: Float) -> Float:
 def _labels(empties: list[bpy.types.Object]) -> dict[str, str]:
     """Return each empty's label by its name: its own, or a new one where it has none or a copy has the same."""
     found: dict[str, str] = {}
-    for thing in sorted(empties, key=lambda thing: _natural(thing.name)):
-        label = thing.get(contract.LABEL)
+    for obj in sorted(empties, key=lambda obj: _natural(obj.name)):
+        label = obj.get(contract.LABEL)
         if isinstance(label, str) and label and label not in found.values():
-            found[thing.name] = label
-    for thing in empties:
-        if thing.name not in found:
+            found[obj.name] = label
+    for obj in empties:
+        if obj.name not in found:
             free = (f"S{number}" for number in range(1, len(empties) + 1))
             taken = {*found.values(), *(other.get(contract.LABEL) for other in empties)}
-            found[thing.name] = next(label for label in free if label not in taken)
+            found[obj.name] = next(label for label in free if label not in taken)
     return found
 
 

@@ -65,15 +65,15 @@ def animate(scene: bpy.types.Scene, trajectories: Trajectories) -> tuple[bpy.typ
     moved = trajectories.moved_to(origin_of(scene))
     collection = contract.find(scene, contract.TRAFFIC) or _new_collection(scene)
     meshes: dict[tuple[object, ...], bpy.types.Mesh] = {}
-    things = []
+    objects = []
     for number, (user, body) in enumerate(zip(moved.users, bodies, strict=True)):
         samples = slice(int(moved.first[number]), int(moved.first[number + 1]))
-        thing = _road_user(user, _shared_mesh(meshes, user, body))
-        _keyframe(thing, frames[samples], moved, samples)
-        collection.objects.link(thing)
-        things.append(thing)
+        obj = _road_user(user, _shared_mesh(meshes, user, body))
+        _keyframe(obj, frames[samples], moved, samples)
+        collection.objects.link(obj)
+        objects.append(obj)
     _show_span(scene, frames)
-    return tuple(things)
+    return tuple(objects)
 
 
 def clear_traffic(scene: bpy.types.Scene) -> None:
@@ -81,11 +81,11 @@ def clear_traffic(scene: bpy.types.Scene) -> None:
     collection = contract.find(scene, contract.TRAFFIC)
     if collection is None:
         return
-    things = [thing for thing in collection.objects if MARK in thing]
-    actions = {thing.animation_data.action for thing in things if thing.animation_data} - {None}
-    meshes = {thing.data for thing in things}
+    objects = [obj for obj in collection.objects if MARK in obj]
+    actions = {obj.animation_data.action for obj in objects if obj.animation_data} - {None}
+    meshes = {obj.data for obj in objects}
     materials = {material for mesh in meshes for material in mesh.materials if material}
-    bpy.data.batch_remove(things)
+    bpy.data.batch_remove(objects)
     for owned in (actions, meshes, materials):  # what a user has put to another use stays
         bpy.data.batch_remove([data for data in owned if not data.users])
     if MARK in collection and not collection.all_objects and not collection.children:
@@ -121,7 +121,7 @@ def read_traffic(scene: bpy.types.Scene) -> Generator[Progress, None, Trajectori
     """
     collection = contract.find(scene, contract.TRAFFIC)
     members = set(collection.all_objects) if collection else set()
-    roots = sorted((thing for thing in members if thing.parent not in members), key=lambda thing: thing.name)
+    roots = sorted((obj for obj in members if obj.parent not in members), key=lambda obj: obj.name)
     categories = [_category(root) for root in roots]
     if not roots:
         raise SeipError(
@@ -186,17 +186,17 @@ def _shared_mesh(meshes: dict[tuple[object, ...], bpy.types.Mesh], user: RoadUse
 
 
 def _road_user(user: RoadUser, mesh: bpy.types.Mesh) -> bpy.types.Object:
-    thing = bpy.data.objects.new(user.name, mesh)
-    thing[MARK] = True
-    thing[contract.CATEGORY] = user.category
-    thing[contract.PAINT] = user.paint
-    return thing
+    obj = bpy.data.objects.new(user.name, mesh)
+    obj[MARK] = True
+    obj[contract.CATEGORY] = user.category
+    obj[contract.PAINT] = user.paint
+    return obj
 
 
-def _keyframe(thing: bpy.types.Object, frames: Float, motion: Trajectories, samples: slice) -> None:
+def _keyframe(obj: bpy.types.Object, frames: Float, motion: Trajectories, samples: slice) -> None:
     """Give an object an action: where it is, how it is turned, and when it is there."""
-    action = bpy.data.actions.new(thing.name)
-    slot = action.slots.new(id_type="OBJECT", name=thing.name)
+    action = bpy.data.actions.new(obj.name)
+    slot = action.slots.new(id_type="OBJECT", name=obj.name)
     strip = action.layers.new("Traffic").strips.new(type="KEYFRAME")
     curves = strip.channelbag(slot, ensure=True).fcurves
     for axis in range(3):
@@ -207,7 +207,7 @@ def _keyframe(thing: bpy.types.Object, frames: Float, motion: Trajectories, samp
     there = np.array([frames[0] - 1.0, frames[0], gone])
     for path in ("hide_viewport", "hide_render"):
         _add_curve(curves, path, 0, there, np.array([1.0, 0.0, 1.0]), CONSTANT)
-    data = thing.animation_data_create()
+    data = obj.animation_data_create()
     data.action = action
     data.action_slot = slot
 
@@ -255,12 +255,12 @@ def _same_frame_afterwards(scene: bpy.types.Scene) -> Iterator[None]:
         scene.frame_set(frame, subframe=part)
 
 
-def _category(thing: bpy.types.Object) -> str:
-    category = thing.get(contract.CATEGORY)
+def _category(obj: bpy.types.Object) -> str:
+    category = obj.get(contract.CATEGORY)
     if category not in CATEGORIES:
         found = "has no" if category is None else f"has {category!r} as its"
         raise SeipError(
-            f"object {thing.name!r} in {contract.TRAFFIC!r} {found} custom property {contract.CATEGORY!r}: "
+            f"object {obj.name!r} in {contract.TRAFFIC!r} {found} custom property {contract.CATEGORY!r}: "
             f"set it to one of {', '.join(CATEGORIES)}"
         )
     return str(category)

@@ -88,13 +88,13 @@ def clear_result(scene: bpy.types.Scene) -> None:
     for name in (contract.SENSORS, contract.COVERAGE):
         collection = contract.find(scene, name)
         if collection is not None:
-            for thing in [thing for thing in collection.objects if MARK in thing]:
-                _remove(thing)
+            for obj in [obj for obj in collection.objects if MARK in obj]:
+                _remove(obj)
 
 
-def _remove(thing: bpy.types.Object) -> None:
-    mesh = thing.data
-    bpy.data.objects.remove(thing)
+def _remove(obj: bpy.types.Object) -> None:
+    mesh = obj.data
+    bpy.data.objects.remove(obj)
     if mesh is not None and not mesh.users:
         bpy.data.meshes.remove(mesh)
 
@@ -169,7 +169,7 @@ def _hardware(sensor: Sensor) -> Solid:
 def coverage_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the mesh that shows the coverage, None where no result has been written."""
     collection = contract.find(scene, contract.COVERAGE)
-    own = [] if collection is None else [thing for thing in collection.objects if MARK in thing]
+    own = [] if collection is None else [obj for obj in collection.objects if MARK in obj]
     return own[0] if own else None
 
 
@@ -186,10 +186,10 @@ def recolour(scene: bpy.types.Scene, colours: Colouring) -> None:
     SeipError
         There is no coverage, or it is of other targets.
     """
-    thing = _shown_coverage(scene)
-    if len(thing.data.polygons) != len(colours.of):
+    obj = _shown_coverage(scene)
+    if len(obj.data.polygons) != len(colours.of):
         raise SeipError(f"scene {scene.name!r} shows the coverage of other targets: place sensors again")
-    _paint(thing, colours)
+    _paint(obj, colours)
 
 
 def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
@@ -207,8 +207,8 @@ def show_seen_by(scene: bpy.types.Scene, seen_by: Integer) -> None:
     """
     aspect = _shown_coverage(scene).get(ASPECT)
     recolour(scene, as_placed(seen_by))
-    thing = _shown_coverage(scene)
-    thing.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
+    obj = _shown_coverage(scene)
+    obj.data.attributes[SEEN_BY].data.foreach_set("value", seen_by.astype(np.int32))
     if aspect:
         colour_coverage(scene, aspect)
 
@@ -221,30 +221,30 @@ def colour_coverage(scene: bpy.types.Scene, aspect: Aspect) -> None:
     SeipError
         There is no coverage.
     """
-    thing = _shown_coverage(scene)
-    attributes = thing.data.attributes
-    seen_by = np.empty(len(thing.data.polygons), dtype=np.int32)
+    obj = _shown_coverage(scene)
+    attributes = obj.data.attributes
+    seen_by = np.empty(len(obj.data.polygons), dtype=np.int32)
     weight = np.ones(len(seen_by), dtype=np.float32)  # a mesh of an earlier version has none
     attributes[SEEN_BY].data.foreach_get("value", seen_by)
     if TARGET_WEIGHT in attributes:
         attributes[TARGET_WEIGHT].data.foreach_get("value", weight)
-    _paint(thing, colouring(aspect, seen_by.astype(np.int64), weight.astype(np.float64)))
-    thing[ASPECT] = aspect
+    _paint(obj, colouring(aspect, seen_by.astype(np.int64), weight.astype(np.float64)))
+    obj[ASPECT] = aspect
 
 
 def _shown_coverage(scene: bpy.types.Scene) -> bpy.types.Object:
-    thing = coverage_of(scene)
-    if thing is None:
+    obj = coverage_of(scene)
+    if obj is None:
         raise SeipError(f"scene {scene.name!r} shows no coverage: place sensors first")
-    return thing
+    return obj
 
 
-def _paint(thing: bpy.types.Object, colours: Colouring) -> None:
+def _paint(obj: bpy.types.Object, colours: Colouring) -> None:
     """Colour squares: ``seip_colour`` serves the viewport's Attribute colours, materials serve all others.
 
     The words and the shares of the classes stay with the object, for the legend.
     """
-    mesh = thing.data
+    mesh = obj.data
     palette = np.array([linear(colour) for colour in colours.colours], dtype=np.float32)
     attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "CORNER")
     attribute.data.foreach_set("color", np.repeat(palette[colours.of], 4, axis=0).ravel())
@@ -254,23 +254,23 @@ def _paint(thing: bpy.types.Object, colours: Colouring) -> None:
         mesh.materials.append(matt(words, colour))
     mesh.polygons.foreach_set("material_index", colours.of.astype(np.int32))
     mesh.update()
-    thing[CLASS_WORDS], thing[CLASS_COLOURS] = list(colours.words), list(colours.colours)
-    thing[SHARES] = colours.shares.tolist()
-    thing[ASPECT] = ""
+    obj[CLASS_WORDS], obj[CLASS_COLOURS] = list(colours.words), list(colours.colours)
+    obj[SHARES] = colours.shares.tolist()
+    obj[ASPECT] = ""
 
 
 def _write_coverage(collection: bpy.types.Collection, targets: Targets, deployment: Deployment) -> None:
-    thing = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment.seen_by))
-    thing[MARK] = True
-    _paint(thing, as_placed(deployment.seen_by))
-    thing["seip_coverage"] = deployment.coverage
-    thing["seip_seen_twice"] = deployment.seen_twice
-    thing["seip_coverage_weighted"] = deployment.weighted
+    obj = bpy.data.objects.new("Coverage", _coverage_mesh(targets, deployment.seen_by))
+    obj[MARK] = True
+    _paint(obj, as_placed(deployment.seen_by))
+    obj["seip_coverage"] = deployment.coverage
+    obj["seip_seen_twice"] = deployment.seen_twice
+    obj["seip_coverage_weighted"] = deployment.weighted
     if deployment.central is not None:
-        thing["seip_coverage_central"] = deployment.central
-    thing["seip_price"] = deployment.price
-    thing["seip_spacing"] = targets.spacing
-    collection.objects.link(thing)
+        obj["seip_coverage_central"] = deployment.central
+    obj["seip_price"] = deployment.price
+    obj["seip_spacing"] = targets.spacing
+    collection.objects.link(obj)
 
 
 def _coverage_mesh(targets: Targets, seen_by: Integer) -> bpy.types.Mesh:

@@ -20,10 +20,10 @@ def coverage_overlay() -> Overlay:
 
 def legend_of_coverage(scene: bpy.types.Scene) -> Block | None:
     """Return what the colours of a scene's coverage mean, None where there is none."""
-    thing = coverage_of(scene)
-    if thing is None or CLASS_WORDS not in thing:
+    obj = coverage_of(scene)
+    if obj is None or CLASS_WORDS not in obj:
         return None
-    rows = zip(thing[CLASS_WORDS], thing[CLASS_COLOURS], thing[SHARES], strict=True)
+    rows = zip(obj[CLASS_WORDS], obj[CLASS_COLOURS], obj[SHARES], strict=True)
     entries = tuple(Entry(f"{words}  {share:.1%}", ((*rgb(colour), 1.0),)) for words, colour, share in rows)
     return Block("Coverage", entries)
 

@@ -102,9 +102,9 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     placed.seip.active_kept = 0
     assert bpy.ops.seip.show_comparison() == {"FINISHED"}
     assert bpy.ops.seip.rank_candidates() == {"FINISHED"}
-    there = {name: thing.matrix_world.copy() for name, thing in selection.sensor_empties(placed).items()}
+    there = {name: obj.matrix_world.copy() for name, obj in selection.sensor_empties(placed).items()}
     assert bpy.ops.seip.export_result() == {"FINISHED"}
-    assert {name: thing.matrix_world for name, thing in selection.sensor_empties(placed).items()} == there
+    assert {name: obj.matrix_world for name, obj in selection.sensor_empties(placed).items()} == there
     out = tmp_path / "out"
     written = load_placement_record(out / "placement.json")
     assert comparable(written) == comparable(parsed_record(placed.seip.result.record))
@@ -118,7 +118,7 @@ def test_a_judged_deployment_is_kept_compared_ranked_and_exported(placed, tmp_pa
     assert spawned["rotation"]["pitch"] == pytest.approx(-math.degrees(0.2), abs=1e-4)
     bpy.ops.wm.open_mainfile(filepath=str(out / "placed.blend"))
     scene = bpy.context.scene
-    assert {name: thing.matrix_world for name, thing in selection.sensor_empties(scene).items()} == there
+    assert {name: obj.matrix_world for name, obj in selection.sensor_empties(scene).items()} == there
     assert not sensor_edits(scene)
     assert bpy.ops.seip.export_result() == {"FINISHED"}  # found again from the file and the cache
     assert comparable(load_placement_record(out / "placement.json")) == comparable(written)

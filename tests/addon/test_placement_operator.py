@@ -158,7 +158,7 @@ def test_each_scene_keeps_its_own(junction):
 
 def test_nothing_of_the_users_is_changed(junction):
     def users() -> dict[str, object]:
-        return {thing.name: thing.matrix_world.copy() for thing in bpy.data.objects if MARK not in thing}
+        return {obj.name: obj.matrix_world.copy() for obj in bpy.data.objects if MARK not in obj}
 
     before = users()
     bpy.ops.seip.solve_placement()
@@ -172,12 +172,12 @@ def test_rules_come_from_what_is_selected_and_hold(junction):
     bpy.context.view_layer.objects.active = first
     assert bpy.ops.seip.add_rule(rule="FORBIDDEN") == {"FINISHED"}
     bpy.ops.seip.solve_placement()
-    assert position not in {thing["seip_position"] for thing in selection.sensor_empties(junction).values()}
+    assert position not in {obj["seip_position"] for obj in selection.sensor_empties(junction).values()}
     junction.seip.goal.position = position
     bpy.ops.seip.add_rule(rule="MANDATORY")
     assert [(one.name, one.rule) for one in junction.seip.goal.rules] == [(position, "MANDATORY")]
     bpy.ops.seip.solve_placement()
-    assert position in {thing["seip_position"] for thing in selection.sensor_empties(junction).values()}
+    assert position in {obj["seip_position"] for obj in selection.sensor_empties(junction).values()}
     assert bpy.ops.seip.remove_rule() == {"FINISHED"}
     assert not bpy.ops.seip.remove_rule.poll()
 
@@ -202,15 +202,15 @@ def test_the_version_is_in_the_file(junction, tmp_path, monkeypatch):
 
 def test_a_scene_without_region_has_its_sentence(junction):
     region = bpy.data.collections["SEIP Region"]
-    for thing in list(region.objects):
-        region.objects.unlink(thing)
+    for obj in list(region.objects):
+        region.objects.unlink(obj)
     with pytest.raises(RuntimeError, match="There is no region"):
         bpy.ops.seip.solve_placement()
 
 
 def test_a_region_without_targets_has_its_sentence(junction):
-    for thing in bpy.data.collections["SEIP Region"].objects:
-        thing.location.x += 5000.0
+    for obj in bpy.data.collections["SEIP Region"].objects:
+        obj.location.x += 5000.0
     with pytest.raises(RuntimeError, match=r"Error: .*target"):
         bpy.ops.seip.solve_placement()
 

@@ -49,7 +49,7 @@ def test_candidates_are_ranked_as_a_slow_loop_does(placed):
 
 def test_a_click_selects_the_sensor(placed):
     placed.seip.result.active_sensor = 1
-    assert [thing["seip_label"] for thing in bpy.context.selected_objects] == ["S2"]
+    assert [obj["seip_label"] for obj in bpy.context.selected_objects] == ["S2"]
 
 
 def test_two_placements_are_compared_target_by_target(placed):

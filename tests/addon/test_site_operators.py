@@ -28,7 +28,7 @@ def choose(scene, path=MAP, radius=30.0):
 
 
 def shapes(scene):
-    return {thing.name: np.array(thing.matrix_world).tolist() for thing in scene.objects if thing.type == "MESH"}
+    return {obj.name: np.array(obj.matrix_world).tolist() for obj in scene.objects if obj.type == "MESH"}
 
 
 def test_a_map_s_junctions_are_listed(scene):
@@ -121,10 +121,10 @@ def test_a_drawn_area_is_active_and_can_be_undone(scene):
     scene.cursor.location = (5.0, 6.0, 1.0)
     bpy.ops.ed.undo_push()
     bpy.ops.seip.add_area(role="WEIGHTED_REGIONS", size=(10.0, 20.0))
-    thing = bpy.context.object
-    assert thing.name == "Weighted regions"
-    assert thing.select_get()
-    assert tuple(thing.location[:2]) == (5.0, 6.0)
+    obj = bpy.context.object
+    assert obj.name == "Weighted regions"
+    assert obj.select_get()
+    assert tuple(obj.location[:2]) == (5.0, 6.0)
     bpy.ops.ed.undo_push()
     bpy.ops.ed.undo()
     assert "Weighted regions" not in bpy.data.objects
@@ -132,21 +132,21 @@ def test_a_drawn_area_is_active_and_can_be_undone(scene):
 
 def test_weights_and_rules_are_the_contract_s_own(scene):
     bpy.ops.mesh.primitive_plane_add()
-    thing = bpy.context.object
-    assert thing.seip_region_weight == 2.0
-    assert thing.seip_pole_rule == "FREE"
-    assert not thing.keys()
-    thing.seip_region_weight = 3.3
-    assert thing[contract.WEIGHT] == 3.3
-    thing.seip_pole_rule = "MANDATORY"
-    assert thing[contract.MANDATORY]
-    thing.seip_pole_rule = "FORBIDDEN"
-    assert thing[contract.FORBIDDEN]
-    assert contract.MANDATORY not in thing
-    thing.seip_pole_rule = "FREE"
-    assert list(thing.keys()) == [contract.WEIGHT]
-    thing[contract.WEIGHT] = "heavy"
-    assert thing.seip_region_weight == 2.0
+    obj = bpy.context.object
+    assert obj.seip_region_weight == 2.0
+    assert obj.seip_pole_rule == "FREE"
+    assert not obj.keys()
+    obj.seip_region_weight = 3.3
+    assert obj[contract.WEIGHT] == 3.3
+    obj.seip_pole_rule = "MANDATORY"
+    assert obj[contract.MANDATORY]
+    obj.seip_pole_rule = "FORBIDDEN"
+    assert obj[contract.FORBIDDEN]
+    assert contract.MANDATORY not in obj
+    obj.seip_pole_rule = "FREE"
+    assert list(obj.keys()) == [contract.WEIGHT]
+    obj[contract.WEIGHT] = "heavy"
+    assert obj.seip_region_weight == 2.0
 
 
 def test_the_check_lists_and_shows(scene):

@@ -33,8 +33,8 @@ def files(folder):
 
 def test_traffic_is_loaded_animated_and_cleared(placed):
     assert bpy.ops.seip.load_traffic() == {"FINISHED"}
-    things = bpy.data.collections["SEIP Traffic"].objects
-    assert placed.seip.traffic.loaded.startswith(f"{len(things)} road users, 0 to ")
+    objects = bpy.data.collections["SEIP Traffic"].objects
+    assert placed.seip.traffic.loaded.startswith(f"{len(objects)} road users, 0 to ")
     assert bpy.ops.seip.clear_traffic() == {"FINISHED"}
     assert "SEIP Traffic" not in bpy.data.collections
     assert not placed.seip.traffic.loaded
@@ -180,7 +180,7 @@ def test_a_second_scan_of_the_same_scene_needs_no_preparation(placed):
     placed.frame_set(300)
     bpy.ops.seip.scan_frame()
     assert session.scan_of(placed).simulation is first
-    empty = next(thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY")
+    empty = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.type == "EMPTY")
     empty.location.z += 1.0
     bpy.ops.seip.scan_frame()
     assert session.scan_of(placed).simulation is not first

@@ -52,8 +52,8 @@ def test_sight_lines_are_the_row_of_the_grid(placed):
 
 
 def test_a_sensor_that_was_moved_has_no_sight_lines(placed):
-    thing = next(thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.get("seip_label") == "S1")
-    thing.location.x += 0.5
+    obj = next(obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.get("seip_label") == "S1")
+    obj.location.x += 0.5
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
         bpy.ops.seip.show_sight_lines(sensor="S1")

@@ -177,8 +177,8 @@ def test_traffic_of_another_place_has_its_sentence(folder):
 
 def test_a_scene_without_sensors_or_traffic_has_its_sentence(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "placed.blend"))
-    for thing in list(contract.find(bpy.context.scene, contract.SENSORS).objects):
-        bpy.data.objects.remove(thing)
+    for obj in list(contract.find(bpy.context.scene, contract.SENSORS).objects):
+        bpy.data.objects.remove(obj)
     save_blend(folder / "bare.blend")
     with pytest.raises(SeipError, match="no sensors"):
         simulate.main(

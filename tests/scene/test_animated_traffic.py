@@ -50,22 +50,22 @@ def traffic(seed=0, users=6, samples=30, step=0.2, start=0.0):
     )
 
 
-def shown(scene, thing):
+def shown(scene, obj):
     """An object as the viewport shows it at the scene's frame, or None."""
     instances = scene.view_layers[0].depsgraph.object_instances
-    return next((np.array(i.matrix_world) for i in instances if i.object.original == thing), None)
+    return next((np.array(i.matrix_world) for i in instances if i.object.original == obj), None)
 
 
-def check_frames(scene, trajectories, things, frames, atol=2e-4):
+def check_frames(scene, trajectories, objects, frames, atol=2e-4):
     rate = scene.render.fps / scene.render.fps_base
     for frame in frames:
         scene.frame_set(frame)
         truth = trajectories.at(frame / rate)
         there = dict(zip(truth.user.tolist(), range(len(truth)), strict=True))
-        for number, thing in enumerate(things):
-            matrix = shown(scene, thing)
+        for number, obj in enumerate(objects):
+            matrix = shown(scene, obj)
             assert (matrix is not None) == (number in there)
-            assert thing.hide_render == (number not in there)
+            assert obj.hide_render == (number not in there)
             if matrix is not None:
                 index = there[number]
                 yaw, pitch = truth.yaw[index], truth.pitch[index]
@@ -79,13 +79,13 @@ def check_frames(scene, trajectories, things, frames, atol=2e-4):
 def test_objects_are_where_the_trajectories_are_at_every_frame(scene, fps, base):
     scene.render.fps, scene.render.fps_base = fps, base
     trajectories = traffic()
-    things = animate(scene, trajectories)
+    objects = animate(scene, trajectories)
     assert (scene.render.fps, scene.render.fps_base) == (fps, pytest.approx(base))
     last = trajectories.span[1] * fps / base
     assert scene.frame_start <= trajectories.span[0] * fps / base
     assert last - 1e-3 <= scene.frame_end < last + 1
     forth = list(range(scene.frame_end + 3))
-    check_frames(scene, trajectories, things, [*forth, *np.random.default_rng(0).permutation(forth).tolist()])
+    check_frames(scene, trajectories, objects, [*forth, *np.random.default_rng(0).permutation(forth).tolist()])
 
 
 @given(st.integers(0, 1000), st.sampled_from([0.04, 0.1, 0.5]), st.floats(0.0, 900.0), st.integers(1, 4))
@@ -94,33 +94,33 @@ def test_objects_are_where_random_trajectories_are(seed, step, start, samples):
     scene = bpy.context.scene
     scene[contract.ORIGIN] = ORIGIN.tolist()
     trajectories = traffic(seed, 3, samples, step, round(start, 2))
-    things = animate(scene, trajectories)
+    objects = animate(scene, trajectories)
     frames = range(max(scene.frame_start - 1, 0), scene.frame_end + 2)
-    check_frames(scene, trajectories, things, frames, atol=2e-3)  # a key's frame is single precision: 0.04 ms here
+    check_frames(scene, trajectories, objects, frames, atol=2e-3)  # a key's frame is single precision: 0.04 ms here
 
 
 def test_another_origin_is_moved_to_the_scenes(scene):
     trajectories = traffic()
-    here = [np.array(thing.matrix_world) for thing in animate(scene, trajectories)]
+    here = [np.array(obj.matrix_world) for obj in animate(scene, trajectories)]
     moved = animate(scene, trajectories.moved_to(ORIGIN + np.array((100.0, -50.0, 3.0))))
-    assert np.allclose(here, [np.array(thing.matrix_world) for thing in moved], atol=1e-4)
+    assert np.allclose(here, [np.array(obj.matrix_world) for obj in moved], atol=1e-4)
 
 
 def test_objects_have_bodies_names_and_properties(scene):
     trajectories = traffic(users=7)
-    things = animate(scene, trajectories)
-    assert [thing.name for thing in things] == [user.name for user in trajectories.users]
-    assert set(contract.find(scene, contract.TRAFFIC).objects) == set(things)
-    for thing, user in zip(things, trajectories.users, strict=True):
+    objects = animate(scene, trajectories)
+    assert [obj.name for obj in objects] == [user.name for user in trajectories.users]
+    assert set(contract.find(scene, contract.TRAFFIC).objects) == set(objects)
+    for obj, user in zip(objects, trajectories.users, strict=True):
         body = fitted_body(user)
-        assert len(thing.data.polygons) == len(body)
-        assert np.allclose(np.array(thing.dimensions), SIZES[user.category], atol=1e-5)
-        faces = [[tuple(thing.data.vertices[v].co) for v in face.vertices] for face in thing.data.polygons]
+        assert len(obj.data.polygons) == len(body)
+        assert np.allclose(np.array(obj.dimensions), SIZES[user.category], atol=1e-5)
+        faces = [[tuple(obj.data.vertices[v].co) for v in face.vertices] for face in obj.data.polygons]
         assert np.allclose(faces, body.triangles, atol=1e-5)
-        slots = [thing.data.materials[face.material_index].name for face in thing.data.polygons]
+        slots = [obj.data.materials[face.material_index].name for face in obj.data.polygons]
         assert slots == [f"SEIP {name}" for name in body.material.tolist()]
-        assert thing["seip_category"] == user.category
-        assert thing["seip_paint"] == user.paint
+        assert obj["seip_category"] == user.category
+        assert obj["seip_paint"] == user.paint
 
 
 def test_every_material_of_every_body_has_a_colour():
@@ -163,15 +163,15 @@ def animated_cube(scene, name="mine", size=(4.0, 2.0, 1.5), origin_up=0.75, **pr
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], faces)
-    thing = bpy.data.objects.new(name, mesh)
+    obj = bpy.data.objects.new(name, mesh)
     for frame, place, yaw in ((1, 0.0, 0.0), (11, 20.0, 0.4), (21, 30.0, 3.5)):
-        thing.location, thing.rotation_euler = (place, -place / 2, origin_up), (0.0, 0.0, yaw)
-        thing.keyframe_insert("location", frame=frame)
-        thing.keyframe_insert("rotation_euler", frame=frame)
+        obj.location, obj.rotation_euler = (place, -place / 2, origin_up), (0.0, 0.0, yaw)
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_euler", frame=frame)
     for key, value in properties.items():
-        thing[key] = value
-    contract.find_or_make(scene, contract.TRAFFIC).objects.link(thing)
-    return thing
+        obj[key] = value
+    contract.find_or_make(scene, contract.TRAFFIC).objects.link(obj)
+    return obj
 
 
 def test_the_users_objects_are_left_alone(scene):
@@ -196,8 +196,8 @@ def test_the_animation_survives_saving_and_opening(scene, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "traffic.blend"), check_existing=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "traffic.blend"))
     scene = bpy.context.scene
-    things = [scene.objects[user.name] for user in trajectories.users]
-    check_frames(scene, trajectories, things, range(0, scene.frame_end, 7))
+    objects = [scene.objects[user.name] for user in trajectories.users]
+    check_frames(scene, trajectories, objects, range(0, scene.frame_end, 7))
 
 
 def test_what_is_read_is_what_was_written(scene):

@@ -55,10 +55,10 @@ def test_a_scene_beside_others_leaves_them_alone(model):
     first = built(model)
     note = bpy.data.objects.new("a note of mine", None)
     first.collection.objects.link(note)
-    before = sorted(thing.name for thing in first.objects)
+    before = sorted(obj.name for obj in first.objects)
     second = bpy.data.scenes.new("second")
     finish(build_scene(second, model, "map.xodr"))
-    assert sorted(thing.name for thing in first.objects) == before
+    assert sorted(obj.name for obj in first.objects) == before
     assert not set(first.objects) & set(second.objects)
     assert len(second.objects) == len(before) - 1
     assert [len(read_scene(scene).geometry.roads) for scene in (first, second)] == [1, 1]
@@ -82,13 +82,13 @@ def test_shapes_arrive_as_they_are(model):
     built(model)
     bpy.context.view_layer.update()
     for part in model.parts:
-        thing = bpy.data.objects[part.name]
-        vertices = np.array([vertex.co for vertex in thing.data.vertices])
+        obj = bpy.data.objects[part.name]
+        vertices = np.array([vertex.co for vertex in obj.data.vertices])
         np.testing.assert_allclose(vertices, part.solid.vertices, atol=1e-5)
-        assert [tuple(face.vertices) for face in thing.data.polygons] == list(part.solid.faces)
-        assert tuple(thing.matrix_world.translation) == pytest.approx(part.foot)
-        assert thing.rotation_euler.z == pytest.approx(part.yaw)
-        used = [thing.data.materials[face.material_index].name for face in thing.data.polygons]
+        assert [tuple(face.vertices) for face in obj.data.polygons] == list(part.solid.faces)
+        assert tuple(obj.matrix_world.translation) == pytest.approx(part.foot)
+        assert obj.rotation_euler.z == pytest.approx(part.yaw)
+        used = [obj.data.materials[face.material_index].name for face in obj.data.polygons]
         assert used == [f"SEIP {name}" for name in part.solid.materials]
 
 
@@ -111,9 +111,9 @@ def test_the_scene_knows_where_it_is(model):
 def test_areas_that_only_mean_something_are_not_rendered(model):
     built(model)
     for name, is_outline in (("Region", True), ("Middle", True), ("Road", False), ("Pavement", False)):
-        thing = bpy.data.objects[name]
-        assert thing.hide_render == is_outline
-        assert not thing.hide_viewport
+        obj = bpy.data.objects[name]
+        assert obj.hide_render == is_outline
+        assert not obj.hide_viewport
 
 
 def test_the_camera_sees_the_whole_region(model):

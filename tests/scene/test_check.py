@@ -31,19 +31,19 @@ def sheet(scene, name, where, half_x, half_y, at=(0, 0, 0)):
     return put(scene, bpy.data.objects.new(name, mesh), where, at)
 
 
-def put(scene, thing, where, at=(0, 0, 0)):
-    thing.location = at
+def put(scene, obj, where, at=(0, 0, 0)):
+    obj.location = at
     collection = scene.collection if where is None else contract.find_or_make(scene, where)
-    collection.objects.link(thing)
-    return thing
+    collection.objects.link(obj)
+    return obj
 
 
 def cube(scene, name, where, at, side):
     bpy.ops.mesh.primitive_cube_add(size=side, location=at)
-    thing = bpy.context.object
-    thing.name = name
-    scene.collection.objects.unlink(thing)
-    return put(scene, thing, where, at)
+    obj = bpy.context.object
+    obj.name = name
+    scene.collection.objects.unlink(obj)
+    return put(scene, obj, where, at)
 
 
 def lay_out(geometry):
@@ -51,7 +51,7 @@ def lay_out(geometry):
 
 
 def problems(scene):
-    return [(p.severity, p.thing, p.text) for p in finish(check_site(contents_of(scene), lay_out)).problems]
+    return [(p.severity, p.obj, p.text) for p in finish(check_site(contents_of(scene), lay_out)).problems]
 
 
 def only(scene):
@@ -80,7 +80,7 @@ def test_all_faults_are_listed_where_reading_stops_at_the_first(scene):
     weighted = sheet(scene, "weighted", contract.WEIGHTED_REGIONS, 3, 3)
     weighted["seip_weight"] = "heavy"
     found = problems(scene)
-    assert {(severity, thing) for severity, thing, _ in found} == {
+    assert {(severity, obj) for severity, obj, _ in found} == {
         ("ERROR", name) for name in ("broken", "flat", "bare", "weighted")
     }
     with pytest.raises(SeipError):
@@ -89,8 +89,8 @@ def test_all_faults_are_listed_where_reading_stops_at_the_first(scene):
 
 def test_an_area_that_stands_on_edge(scene):
     sheet(scene, "edge", contract.FORBIDDEN_AREAS, 3, 3).rotation_euler.x = 1.5707963267948966
-    severity, thing, text = only(scene)
-    assert (severity, thing) == ("ERROR", "edge")
+    severity, obj, text = only(scene)
+    assert (severity, obj) == ("ERROR", "edge")
     assert "covers no area in plan" in text
 
 
@@ -138,6 +138,6 @@ def test_a_missing_library(scene, tmp_path):
 
 
 def test_checking_changes_nothing(scene):
-    before = [(thing.name, tuple(c.name for c in thing.users_collection)) for thing in bpy.data.objects]
+    before = [(obj.name, tuple(c.name for c in obj.users_collection)) for obj in bpy.data.objects]
     problems(scene)
-    assert [(thing.name, tuple(c.name for c in thing.users_collection)) for thing in bpy.data.objects] == before
+    assert [(obj.name, tuple(c.name for c in obj.users_collection)) for obj in bpy.data.objects] == before

@@ -45,7 +45,7 @@ def test_names_and_order_of_objects_change_nothing():
         for item in members:
             collection.objects.unlink(item)
         for index in rng.permutation(len(members)):
-            members[index].name = f"thing {rng.integers(1_000_000)}"
+            members[index].name = f"obj {rng.integers(1_000_000)}"
             collection.objects.link(members[index])
     after = site_of(scene)
     assert after.triangles.tobytes() == before.triangles.tobytes()

@@ -188,11 +188,11 @@ def box(scene, name, where, low, high, at=(0, 0, 0)):
 def lamp_asset(scene, where=()):
     """A shaft of 8 m and, as an object of its own, a lamp head on it."""
     asset = bpy.data.collections.new("lamp asset")
-    for thing in (
+    for obj in (
         box(scene, "shaft", where, (-0.1, -0.1, 0), (0.1, 0.1, 8)),
         box(scene, "head", (), (0, -0.2, 0), (1.5, 0.2, 0.3), (0.4, 0, 8)),
     ):
-        asset.objects.link(thing)
+        asset.objects.link(obj)
     return asset
 
 
@@ -239,10 +239,8 @@ def test_a_pole_is_as_high_as_its_shaft(scene):
     post = box(scene, "post", (contract.POLES,), (-0.1, -0.1, -0.2), (0.1, 0.1, 6), (3, 9, 0.5))
     arm = box(scene, "arm", (), (1, -0.1, 6), (4, 0.1, 7.5))
     both = bpy.data.meshes.new("both")
-    vertices = [tuple(v.co) for thing in (post, arm) for v in thing.data.vertices]
-    faces = [
-        tuple(i + 6 * n for i in face.vertices) for n, thing in enumerate((post, arm)) for face in thing.data.polygons
-    ]
+    vertices = [tuple(v.co) for obj in (post, arm) for v in obj.data.vertices]
+    faces = [tuple(i + 6 * n for i in face.vertices) for n, obj in enumerate((post, arm)) for face in obj.data.polygons]
     both.from_pydata(vertices, [], faces)
     post.data = both
     put(scene, bpy.data.objects.new("mark", None), (contract.POLES,), (8, 9, 0.1))

@@ -60,8 +60,8 @@ def test_sub_collections_count(scene, plate):
 def test_a_light_is_nothing_and_an_empty_a_pole(scene):
     light = bpy.data.objects.new("light", bpy.data.lights.new("light", "POINT"))
     empty = bpy.data.objects.new("empty", None)
-    for thing in (light, empty):
-        scene.collection.objects.link(thing)
+    for obj in (light, empty):
+        scene.collection.objects.link(obj)
     with pytest.raises(SeipError, match="select meshes or empties"):
         roles.assign(scene, [light], Role.POLES)
     with pytest.raises(SeipError, match="instance a collection"):

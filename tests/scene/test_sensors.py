@@ -40,7 +40,7 @@ def scene(example):
 
 
 def empties(scene):
-    return [thing for thing in contract.find(scene, contract.SENSORS).objects if thing.type == "EMPTY"]
+    return [obj for obj in contract.find(scene, contract.SENSORS).objects if obj.type == "EMPTY"]
 
 
 def test_sensors_are_read_as_they_were_written(scene, example):
@@ -69,11 +69,11 @@ def test_tilted_sensors_are_read_as_they_were_written_and_their_rays_go_where_th
     write_result(scene, example.site, tilted)
     for read, written in zip(read_sensors(scene, CATALOGUE), tilted.sensors, strict=True):
         np.testing.assert_allclose(read.orientation, written.orientation, atol=1e-6)
-        thing = next(thing for thing in empties(scene) if thing["seip_label"] == written.label)
-        assert thing["seip_tilt_deg"] == pytest.approx(math.degrees(written.tilt))
-        assert thing.name.startswith(f"{written.model.key} @ {written.height:.3g} m, tilted ")
+        obj = next(obj for obj in empties(scene) if obj["seip_label"] == written.label)
+        assert obj["seip_tilt_deg"] == pytest.approx(math.degrees(written.tilt))
+        assert obj.name.startswith(f"{written.model.key} @ {written.height:.3g} m, tilted ")
         rays = beam_directions(written.model).reshape(-1, 3)[::997]
-        pointed = np.array([thing.matrix_world.to_3x3() @ Vector(ray) for ray in rays])
+        pointed = np.array([obj.matrix_world.to_3x3() @ Vector(ray) for ray in rays])
         np.testing.assert_allclose(rotated(rays, written.orientation), pointed, atol=1e-6)
         ahead = read.orientation[:, 0]
         assert -math.degrees(math.asin(ahead[2])) == pytest.approx(math.degrees(written.tilt), abs=1e-4)
@@ -81,11 +81,11 @@ def test_tilted_sensors_are_read_as_they_were_written_and_their_rays_go_where_th
 
 def test_a_tilted_sensor_that_a_hand_moves_keeps_its_tilt(scene, example, tilted):
     write_result(scene, example.site, tilted)
-    thing = empties(scene)[0]
-    thing.location.x += 3.0
-    thing.rotation_euler.z += 0.5
-    read = next(sensor for sensor in read_sensors(scene, CATALOGUE) if sensor.label == thing["seip_label"])
-    written = next(sensor for sensor in tilted.sensors if sensor.label == thing["seip_label"])
+    obj = empties(scene)[0]
+    obj.location.x += 3.0
+    obj.rotation_euler.z += 0.5
+    read = next(sensor for sensor in read_sensors(scene, CATALOGUE) if sensor.label == obj["seip_label"])
+    written = next(sensor for sensor in tilted.sensors if sensor.label == obj["seip_label"])
     np.testing.assert_allclose(read.orientation, orientation(written.yaw + 0.5, written.tilt), atol=1e-6)
     np.testing.assert_allclose(read.xyz, written.xyz + np.array((3.0, 0.0, 0.0)), atol=1e-5)
 
@@ -94,8 +94,8 @@ def test_posts_of_tilted_sensors_stand_on_the_ground_and_brackets_reach_the_pole
     write_result(scene, example.site, tilted)
     bpy.context.view_layer.update()
     for written in tilted.sensors:
-        thing = next(thing for thing in empties(scene) if thing["seip_label"] == written.label)
-        (body,) = thing.children
+        obj = next(obj for obj in empties(scene) if obj["seip_label"] == written.label)
+        (body,) = obj.children
         corners = np.array([body.matrix_world @ v.co for v in body.data.vertices])
         if written.on_pole:
             assert np.hypot(*(corners[:, :2] - written.foot[:2]).T).min() < 0.05
@@ -106,16 +106,16 @@ def test_posts_of_tilted_sensors_stand_on_the_ground_and_brackets_reach_the_pole
 
 
 def test_what_a_hand_has_done_counts(scene):
-    thing = empties(scene)[0]
+    obj = empties(scene)[0]
     parent = bpy.data.objects.new("mast", None)
     scene.collection.objects.link(parent)
     parent.location = (1.0, 2.0, 3.0)
     parent.rotation_euler = (0.0, 0.0, math.pi / 2)
-    thing.parent = parent
-    thing.location = (10.0, 0.0, 1.0)
-    thing.rotation_euler = (0.0, math.radians(20), 0.0)
-    thing.scale = (2.0, 0.5, 3.0)
-    sensor = next(s for s in read_sensors(scene, CATALOGUE) if s.label == thing["seip_label"])
+    obj.parent = parent
+    obj.location = (10.0, 0.0, 1.0)
+    obj.rotation_euler = (0.0, math.radians(20), 0.0)
+    obj.scale = (2.0, 0.5, 3.0)
+    sensor = next(s for s in read_sensors(scene, CATALOGUE) if s.label == obj["seip_label"])
     np.testing.assert_allclose(sensor.xyz, (1.0, 12.0, 4.0), atol=1e-5)
     np.testing.assert_allclose(
         sensor.orientation[:, 0], (0.0, math.cos(math.radians(20)), -math.sin(math.radians(20))), atol=1e-6
@@ -123,9 +123,9 @@ def test_what_a_hand_has_done_counts(scene):
 
 
 def test_a_copy_and_one_without_a_label_get_the_first_that_is_free(scene):
-    for thing in (empties(scene)[0].copy(), empties(scene)[1].copy()):
-        contract.find(scene, contract.SENSORS).objects.link(thing)
-    del thing["seip_label"]
+    for obj in (empties(scene)[0].copy(), empties(scene)[1].copy()):
+        contract.find(scene, contract.SENSORS).objects.link(obj)
+    del obj["seip_label"]
     extra = empties(scene)[-1].copy()
     extra["seip_label"] = "S10"
     contract.find(scene, contract.SENSORS).objects.link(extra)
@@ -135,8 +135,8 @@ def test_a_copy_and_one_without_a_label_get_the_first_that_is_free(scene):
 def test_a_hidden_sensor_is_none(scene):
     empties(scene)[0].hide_set(True)
     assert len(read_sensors(scene, CATALOGUE)) == 2
-    for thing in empties(scene):
-        thing.hide_set(True)
+    for obj in empties(scene):
+        obj.hide_set(True)
     with pytest.raises(SeipError, match="3 hidden ones"):
         read_sensors(scene, CATALOGUE)
 
@@ -148,11 +148,11 @@ def test_a_scene_without_sensors_has_its_sentence(example):
 
 @pytest.mark.parametrize("key", [None, 5, "type9"])
 def test_a_type_that_nobody_knows_has_its_sentence(scene, key):
-    thing = empties(scene)[0]
+    obj = empties(scene)[0]
     if key is None:
-        del thing["seip_sensor"]
+        del obj["seip_sensor"]
     else:
-        thing["seip_sensor"] = key
+        obj["seip_sensor"] = key
     with pytest.raises(SeipError, match="type9" if key == "type9" else "names no LiDAR"):
         read_sensors(scene, CATALOGUE)
 

@@ -29,23 +29,23 @@ def scene(example):
 
 
 def empties(scene):
-    things = contract.find(scene, contract.SENSORS).objects
-    return sorted((thing for thing in things if thing.type == "EMPTY"), key=lambda thing: thing["seip_label"])
+    objects = contract.find(scene, contract.SENSORS).objects
+    return sorted((obj for obj in objects if obj.type == "EMPTY"), key=lambda obj: obj["seip_label"])
 
 
 def coverage(scene):
-    (thing,) = contract.find(scene, contract.COVERAGE).objects
-    return thing
+    (obj,) = contract.find(scene, contract.COVERAGE).objects
+    return obj
 
 
 def fingerprint(objects):
     """Digest of all meshes, transforms, properties and settings that a user would miss."""
     state = hashlib.sha256()
-    for thing in sorted(objects, key=lambda thing: thing.name):
-        vertices = np.array([v.co for v in thing.data.vertices]) if thing.type == "MESH" else np.zeros(0)
-        state.update(repr((thing.name, thing.type, [list(r) for r in thing.matrix_world], vertices.tolist())).encode())
-        state.update(repr((sorted(thing.keys()), thing.hide_render, [c.name for c in thing.users_collection])).encode())
-        state.update(repr([slot.material.name for slot in thing.material_slots]).encode())
+    for obj in sorted(objects, key=lambda obj: obj.name):
+        vertices = np.array([v.co for v in obj.data.vertices]) if obj.type == "MESH" else np.zeros(0)
+        state.update(repr((obj.name, obj.type, [list(r) for r in obj.matrix_world], vertices.tolist())).encode())
+        state.update(repr((sorted(obj.keys()), obj.hide_render, [c.name for c in obj.users_collection])).encode())
+        state.update(repr([slot.material.name for slot in obj.material_slots]).encode())
     return state.hexdigest()
 
 
@@ -132,10 +132,10 @@ def test_a_second_result_replaces_the_first(example, scene):
         return [len(data) for data in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.collections)]
 
     write_result(scene, example.site, example.deployment)
-    first, names = counts(), sorted(thing.name for thing in bpy.data.objects)
+    first, names = counts(), sorted(obj.name for obj in bpy.data.objects)
     write_result(scene, example.site, example.deployment)
     assert counts() == first
-    assert sorted(thing.name for thing in bpy.data.objects) == names
+    assert sorted(obj.name for obj in bpy.data.objects) == names
     write_result(scene, example.site, deploy(example.site, example.models, example.visible, [5]))
     assert len(empties(scene)) == 1
     clear_result(scene)
@@ -211,9 +211,9 @@ def test_a_sensor_behind_a_building_is_marked_as_hidden(example, scene, tmp_path
     assert hidden == {poses[0]: False, poses[1]: True}
 
 
-def colours_of(thing):
+def colours_of(obj):
     """Return the colour of each square by its material, and that of its first corner by the attribute."""
-    mesh = thing.data
+    mesh = obj.data
     material = np.array([mesh.materials[face.material_index].diffuse_color for face in mesh.polygons])
     corner = np.empty(len(mesh.loops) * 4, dtype=np.float32)
     mesh.color_attributes["seip_colour"].data.foreach_get("color", corner)
@@ -224,14 +224,14 @@ def colours_of(thing):
 def test_coverage_is_recoloured_from_the_mesh_alone(example, scene, aspect):
     write_result(scene, example.site, example.deployment)
     colour_coverage(scene, aspect)
-    thing = coverage(scene)
+    obj = coverage(scene)
     expected = colouring(aspect, example.deployment.seen_by, example.site.targets.weight)
     wanted = np.array([linear(colour) for colour in expected.colours])[expected.of]
-    for shown in colours_of(thing):
+    for shown in colours_of(obj):
         assert np.allclose(shown, wanted, atol=1e-6)
-    assert list(thing["seip_classes"]) == list(expected.words)
-    assert np.allclose(thing["seip_shares"], expected.shares)
-    assert thing["seip_aspect"] == aspect
+    assert list(obj["seip_classes"]) == list(expected.words)
+    assert np.allclose(obj["seip_shares"], expected.shares)
+    assert obj["seip_aspect"] == aspect
 
 
 def test_one_name_in_two_colours_is_two_materials(example, scene):

@@ -323,12 +323,12 @@ def _record() -> dict[str, Any]:
 
 
 def _sensors() -> list[bpy.types.Object]:
-    things = [thing for thing in bpy.data.collections["SEIP Sensors"].objects if thing.type == "EMPTY"]
-    return sorted(things, key=lambda thing: str(thing["seip_label"]))
+    objects = [obj for obj in bpy.data.collections["SEIP Sensors"].objects if obj.type == "EMPTY"]
+    return sorted(objects, key=lambda obj: str(obj["seip_label"]))
 
 
 def _places() -> dict[str, tuple[float, ...]]:
-    return {thing["seip_label"]: tuple(thing.matrix_world.translation) for thing in _sensors()}
+    return {obj["seip_label"]: tuple(obj.matrix_world.translation) for obj in _sensors()}
 
 
 _listen()

@@ -177,7 +177,7 @@ def _known() -> SceneState | None:
 
 def _empties() -> list[bpy.types.Object]:
     collection = bpy.data.collections.get("SEIP Sensors")
-    return [thing for thing in collection.objects if thing.type == "EMPTY"] if collection else []
+    return [obj for obj in collection.objects if obj.type == "EMPTY"] if collection else []
 
 
 play(scenario, Window(OUT))

@@ -92,8 +92,8 @@ def placed_objects(road_map: RoadMap, *, area: BaseGeometry | None = None) -> tu
     return tuple(
         placed
         for road in road_map.roads
-        for thing in road.objects
-        for placed in _placed(road, thing)
+        for obj in road.objects
+        for placed in _placed(road, obj)
         if area is None or _extent(placed).intersects(area)
     )
 
@@ -102,18 +102,18 @@ def _extent(placed: PlacedObject) -> BaseGeometry:
     return MultiPoint(np.vstack([placed.position, *(outline.base for outline in placed.outlines)])[:, :2]).convex_hull
 
 
-def _placed(road: Road, thing: RoadObject) -> Iterator[PlacedObject]:
-    if not thing.repeats:
-        yield _place(road, thing, thing)
-    for repeat in thing.repeats:
+def _placed(road: Road, obj: RoadObject) -> Iterator[PlacedObject]:
+    if not obj.repeats:
+        yield _place(road, obj, obj)
+    for repeat in obj.repeats:
         if repeat.distance == 0.0 and repeat.length > 0.0:
-            yield _strip(road, thing, repeat)
+            yield _strip(road, obj, repeat)
         else:
-            for along in _steps(road, thing, repeat):
-                yield _place(road, thing, _in_row(thing, repeat, float(along)))
+            for along in _steps(road, obj, repeat):
+                yield _place(road, obj, _in_row(obj, repeat, float(along)))
 
 
-def _steps(road: Road, thing: RoadObject, repeat: Repeat) -> Float:
+def _steps(road: Road, obj: RoadObject, repeat: Repeat) -> Float:
     """Return where the copies of a row stand, metres from its start."""
     length = min(repeat.length, road.length - repeat.s)
     if repeat.distance == 0.0 or length <= 0.0:
@@ -121,11 +121,11 @@ def _steps(road: Road, thing: RoadObject, repeat: Repeat) -> Float:
     # A row whose length is a multiple of the distance has its last copy in spite of rounding.
     count = math.floor(min(length / repeat.distance + 1e-9, _MAX_COPIES)) + 1
     if count > _MAX_COPIES:
-        raise SeipError(f"road {road.id}: object {thing.id} is repeated too often; correct its <repeat> in the map")
+        raise SeipError(f"road {road.id}: object {obj.id} is repeated too often; correct its <repeat> in the map")
     return repeat.distance * np.arange(count)
 
 
-def _in_row(thing: RoadObject, repeat: Repeat, along: float) -> RoadObject:
+def _in_row(obj: RoadObject, repeat: Repeat, along: float) -> RoadObject:
     """Return the copy of an object some metres along a row."""
     share = along / repeat.length if repeat.length > 0.0 else 0.0
 
@@ -133,7 +133,7 @@ def _in_row(thing: RoadObject, repeat: Repeat, along: float) -> RoadObject:
         return ends[0] + share * (ends[1] - ends[0])
 
     return replace(
-        thing,
+        obj,
         s=repeat.s + along,
         t=between(repeat.t),
         z_offset=between(repeat.z_offset),
@@ -144,42 +144,42 @@ def _in_row(thing: RoadObject, repeat: Repeat, along: float) -> RoadObject:
     )
 
 
-def _place(road: Road, original: RoadObject, thing: RoadObject) -> PlacedObject:
+def _place(road: Road, original: RoadObject, obj: RoadObject) -> PlacedObject:
     """Return an object in map coordinates; ``original`` says where the corners on the road were meant."""
-    position = _point(road, thing.s, thing.t, thing.z_offset)
-    yaw = float(road.frame(np.array([thing.s])).heading[0]) + thing.heading
-    turn = orientation(yaw, thing.pitch, thing.roll)
+    position = _point(road, obj.s, obj.t, obj.z_offset)
+    yaw = float(road.frame(np.array([obj.s])).heading[0]) + obj.heading
+    turn = orientation(yaw, obj.pitch, obj.roll)
 
     def foot(corner: Corner) -> Float:
         if not corner.on_road:
             return np.asarray(position + turn @ np.array([corner.along, corner.aside, corner.up]))
-        s, t = corner.along + thing.s - original.s, corner.aside + thing.t - original.t
-        return _point(road, s, t, corner.up + thing.z_offset - original.z_offset)
+        s, t = corner.along + obj.s - original.s, corner.aside + obj.t - original.t
+        return _point(road, s, t, corner.up + obj.z_offset - original.z_offset)
 
     def height(corner: Corner) -> float:
-        return thing.height if corner.height is None else corner.height
+        return obj.height if corner.height is None else corner.height
 
     return PlacedObject(
         road_id=road.id,
-        id=thing.id,
-        name=thing.name,
-        kind=thing.kind,
+        id=obj.id,
+        name=obj.name,
+        kind=obj.kind,
         position=position,
         yaw=yaw,
-        pitch=thing.pitch,
-        roll=thing.roll,
-        length=thing.length,
-        width=thing.width,
-        height=thing.height,
-        radius=thing.radius,
+        pitch=obj.pitch,
+        roll=obj.roll,
+        length=obj.length,
+        width=obj.width,
+        height=obj.height,
+        radius=obj.radius,
         outlines=tuple(
             Outline(np.array([*map(foot, outline.corners)]), np.array([*map(height, outline.corners)]), outline.closed)
-            for outline in thing.outlines
+            for outline in obj.outlines
         ),
     )
 
 
-def _strip(road: Road, thing: RoadObject, repeat: Repeat) -> PlacedObject:
+def _strip(road: Road, obj: RoadObject, repeat: Repeat) -> PlacedObject:
     """Return a row without gaps as one object with one outline."""
     end = min(repeat.s + repeat.length, road.length)
     begin = min(repeat.s, end)
@@ -196,7 +196,7 @@ def _strip(road: Road, thing: RoadObject, repeat: Repeat) -> PlacedObject:
 
     starts = np.concatenate([road.reference_line.s, road.elevation.start, road.superelevation.start])
     knots = [begin, *starts[(starts > begin) & (starts < end)].tolist(), end]
-    _, points = sample(lines, knots, _STRIP_TOLERANCE, f"road {road.id}, object {thing.id}")
+    _, points = sample(lines, knots, _STRIP_TOLERANCE, f"road {road.id}, object {obj.id}")
     left, right, height = points[:, 0], points[:, 1], points[:, 2, 2]
     closed = bool(width.any())
     outline = Outline(
@@ -204,7 +204,7 @@ def _strip(road: Road, thing: RoadObject, repeat: Repeat) -> PlacedObject:
         np.concatenate([height, height[::-1]]) if closed else height,
         closed,
     )
-    first = _in_row(thing, repeat, 0.0)
+    first = _in_row(obj, repeat, 0.0)
     placed = _place(road, first, replace(first, length=end - begin, outlines=()))
     return replace(placed, outlines=(outline,) if len(points) else ())
 

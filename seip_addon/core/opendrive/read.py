@@ -247,7 +247,7 @@ def _height(lane: Node, edge: str, start: float) -> Profile:
 
 def _object(node: Node) -> RoadObject:
     outlines = (*node.children("outline"), *node.children("outlines", "outline"))
-    thing = RoadObject(
+    obj = RoadObject(
         id=node.text("id", ""),
         name=node.text("name", ""),
         kind=node.text("type", "none").lower(),
@@ -264,7 +264,7 @@ def _object(node: Node) -> RoadObject:
         outlines=tuple(filter(lambda outline: outline.corners, map(_outline, outlines))),
         repeats=(),
     )
-    return replace(thing, repeats=tuple(_repeat(child, thing) for child in node.children("repeat")))
+    return replace(obj, repeats=tuple(_repeat(child, obj) for child in node.children("repeat")))
 
 
 def _outline(node: Node) -> ObjectOutline:
@@ -287,7 +287,7 @@ def _corner(node: Node) -> Corner:
     )
 
 
-def _repeat(node: Node, thing: RoadObject) -> Repeat:
+def _repeat(node: Node, obj: RoadObject) -> Repeat:
     distance = node.number("distance", 0.0)
     if distance < 0.0:
         raise SeipError(f"{node.place}: distance={distance:g} of <repeat> is below zero; correct it in the map")
@@ -297,15 +297,15 @@ def _repeat(node: Node, thing: RoadObject) -> Repeat:
         return start, node.number(f"{name}End", start, most=most)
 
     return Repeat(
-        s=node.number("s", thing.s),
+        s=node.number("s", obj.s),
         length=node.number("length", 0.0),
         distance=distance,
-        t=pair("t", thing.t),
-        z_offset=pair("zOffset", thing.z_offset, _MAX_OBJECT_HEIGHT),
-        height=pair("height", thing.height, _MAX_OBJECT_HEIGHT),
-        width=pair("width", thing.width),
-        object_length=pair("length", thing.length),
-        radius=pair("radius", thing.radius),
+        t=pair("t", obj.t),
+        z_offset=pair("zOffset", obj.z_offset, _MAX_OBJECT_HEIGHT),
+        height=pair("height", obj.height, _MAX_OBJECT_HEIGHT),
+        width=pair("width", obj.width),
+        object_length=pair("length", obj.length),
+        radius=pair("radius", obj.radius),
     )
 
 

@@ -59,13 +59,13 @@ class Problem:
         An error stops a survey.
     text : str
         The problem and its remedy.
-    thing : str
+    obj : str
         Name of the object concerned; empty where it is the scene.
     """
 
     severity: Severity
     text: str
-    thing: str = ""
+    obj: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -167,9 +167,9 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     ]
     others, lights = split_posts(placed, local_signals, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
-    things = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
+    objects = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
     other_levels, below = _other_level_parts(levels.others, street)
-    furniture = [*things, *signals, *_described_parts(description, street)]
+    furniture = [*objects, *signals, *_described_parts(description, street)]
     yield next(stages)
     pavement, notes = _pavement_parts(street, below)
     yield next(stages)

@@ -109,7 +109,7 @@ def _kind_by_looks(placed: PlacedObject, words: frozenset[str]) -> Kind:
 
 
 def post_of(placed: PlacedObject) -> Post | None:
-    """Return the post that an object is, None where it is another thing."""
+    """Return the post that an object is, None where it is something else."""
     kind = kind_of(placed)
     if kind not in (Kind.POST, Kind.LAMP):
         return None

@@ -42,8 +42,8 @@ def test_local_corners_turn_with_the_object(tmp_path, wrap):
     corners = '<cornerLocal u="2" v="0" z="-0.5" height="3"/><cornerLocal u="0" v="1" z="0"/>'
     outline = f'<outline closed="false">{corners}</outline>'
     text = f'<object id="1" s="10" t="4" zOffset="1" hdg="{math.pi / 2}" height="9">{wrap.format(outline)}</object>'
-    (thing,) = objects(tmp_path, text)
-    (found,) = thing.outlines
+    (obj,) = objects(tmp_path, text)
+    (found,) = obj.outlines
     np.testing.assert_allclose(found.base, [[10, 6, 0.5], [9, 4, 1]], atol=1e-12)
     # The second corner says nothing: the object's height holds.
     assert found.height.tolist() == [3, 9]
@@ -56,21 +56,21 @@ def test_pitch_and_roll_turn_about_the_new_axes(tmp_path):
         f'<object id="1" s="0" t="0" hdg="{math.pi / 2}" pitch="{math.pi / 2}" roll="{math.pi / 2}">'
         f"<outline>{corners}</outline></object>"
     )
-    (thing,) = objects(tmp_path, text)
+    (obj,) = objects(tmp_path, text)
     # Yaw: x ahead to +y. Pitch, right-handed about the new y (-x): x ahead to -z. Roll about that x.
-    np.testing.assert_allclose(thing.outlines[0].base, [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-12)
-    assert thing.outlines[0].closed
+    np.testing.assert_allclose(obj.outlines[0].base, [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-12)
+    assert obj.outlines[0].closed
 
 
 def test_corners_on_the_road_follow_its_bend_and_slope(tmp_path):
     corners = '<cornerRoad s="10" t="0" dz="0.5" height="2"/><cornerRoad s="20" t="1" dz="0" height="4"/>'
     text = f'<object id="1" s="0" t="0"><outline>{corners}</outline></object>'
-    (thing,) = objects(tmp_path, text, plan=geometry('<arc curvature="0.1"/>'), elevation=UPHILL)
+    (obj,) = objects(tmp_path, text, plan=geometry('<arc curvature="0.1"/>'), elevation=UPHILL)
     expected = [
         [10 * math.sin(1), 10 - 10 * math.cos(1), 6.5],
         [9 * math.sin(2), 10 - 9 * math.cos(2), 7.0],
     ]
-    np.testing.assert_allclose(thing.outlines[0].base, expected, atol=1e-12)
+    np.testing.assert_allclose(obj.outlines[0].base, expected, atol=1e-12)
 
 
 def test_a_row_has_a_copy_at_each_step_between_its_ends(tmp_path):
@@ -111,7 +111,7 @@ def test_a_row_has_from_its_object_what_it_does_not_say(tmp_path):
 
 def test_a_row_ends_with_its_road(tmp_path):
     text = '<object id="1" s="0" t="0"><repeat s="90" length="1000" distance="4"/></object>'
-    assert [thing.position[0] for thing in objects(tmp_path, text)] == pytest.approx([90, 94, 98])
+    assert [obj.position[0] for obj in objects(tmp_path, text)] == pytest.approx([90, 94, 98])
 
 
 def test_a_strip_without_width_is_a_wall_along_a_line(tmp_path):
@@ -155,7 +155,7 @@ def test_an_area_keeps_what_stands_in_it_or_reaches_into_it(tmp_path):
         f'<object id="large" s="20" t="0"><outline>{corners}</outline></object>'
     )
     found = objects(tmp_path, text, area=shapely.Point(50, 2).buffer(5))
-    assert [thing.id for thing in found] == ["near", "large"]
+    assert [obj.id for obj in found] == ["near", "large"]
 
 
 def test_signals_have_a_place_and_a_direction(tmp_path):

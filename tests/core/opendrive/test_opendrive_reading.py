@@ -232,11 +232,11 @@ def is_read_or_refused_in_words(folder, span, value):
     try:
         road_map = read_text(folder, text, "mutant.xodr")
         surfaces = map_lanes(road_map)
-        things = (*placed_objects(road_map), *placed_signals(road_map))
+        objects = (*placed_objects(road_map), *placed_signals(road_map))
     except SeipError:
         return
     assert all(np.isfinite(surface.triangles).all() for surface in surfaces)
-    assert all(np.isfinite(thing.position).all() for thing in things)
+    assert all(np.isfinite(obj.position).all() for obj in objects)
 
 
 @given(st.sampled_from(VALUES), st.sampled_from(WRONG))

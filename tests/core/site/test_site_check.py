@@ -43,7 +43,7 @@ def checked(*surfaces, poles=(), problems=()):
 
 
 def found(*surfaces, poles=()):
-    return [(p.severity, p.thing, p.text) for p in checked(*surfaces, poles=poles).problems]
+    return [(p.severity, p.obj, p.text) for p in checked(*surfaces, poles=poles).problems]
 
 
 def moved(surface, x=0.0, y=0.0, z=0.0, name=None):

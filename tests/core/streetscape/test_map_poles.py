@@ -27,7 +27,7 @@ def signal(s=95, t=-5, name=""):
     return SIGNAL.format(s=s, t=t, name=name)
 
 
-def thing(kind="pole", t=-5.5, s=95, name="", size='height="6" radius="0.1"', number=9):
+def obj(kind="pole", t=-5.5, s=95, name="", size='height="6" radius="0.1"', number=9):
     return OBJECT.format(id=number, kind=kind, name=name, s=s, t=t, size=size)
 
 
@@ -46,9 +46,9 @@ def has_arm(pole):
 
 
 OWN_POSTS = {
-    "by type": thing(),
-    "by name": thing("-1", name="TrafficMast_02"),
-    "by shape": thing("none", size='height="5.5" length="0.2" width="0.25"'),
+    "by type": obj(),
+    "by name": obj("-1", name="TrafficMast_02"),
+    "by shape": obj("none", size='height="5.5" length="0.2" width="0.25"'),
     "by an outline": '<object id="9" type="-1" name="" s="95" t="-5.5" zOffset="0" hdg="0"><outline>'
     + "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="6"/>' for u, v in [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1)])
     + "</outline></object>",
@@ -65,7 +65,7 @@ def test_a_post_of_the_map_carries_the_signal_near_it(tmp_path, own, t):
 
 
 def test_a_mast_some_way_off_carries_a_lamp_over_the_carriageway_on_an_arm_up_to_it(tmp_path):
-    built = model(tmp_path, signals=signal(t=1.5), furniture=thing(t=-7, name="mast"))
+    built = model(tmp_path, signals=signal(t=1.5), furniture=obj(t=-7, name="mast"))
     (pole,) = poles(built)
     assert pole.source == FROM_MAP
     tip = np.array(pole.foot[:2]) + 8.5 * np.array([math.cos(pole.yaw), math.sin(pole.yaw)])
@@ -74,7 +74,7 @@ def test_a_mast_some_way_off_carries_a_lamp_over_the_carriageway_on_an_arm_up_to
 
 
 def test_a_street_light_further_off_is_none_of_the_signals(tmp_path):
-    built = model(tmp_path, signals=signal(), furniture=thing("streetLamp", s=86))
+    built = model(tmp_path, signals=signal(), furniture=obj("streetLamp", s=86))
     assert sorted(pole.source for pole in poles(built)) == [ASSUMED, FROM_MAP]
 
 
@@ -138,11 +138,11 @@ def test_an_arm_that_would_reach_over_no_lane_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("furniture", "carries"),
     [
-        (thing(size='height="4" radius="0.025"'), False),
-        (thing(size='height="4" length="0.05" width="0.05"'), False),
-        (thing(name="sign post", size='height="4" radius="0.1"'), False),
-        (thing(size='height="4" radius="0.06"'), True),
-        (thing("-1", size='height="4" radius="0.05"'), True),
+        (obj(size='height="4" radius="0.025"'), False),
+        (obj(size='height="4" length="0.05" width="0.05"'), False),
+        (obj(name="sign post", size='height="4" radius="0.1"'), False),
+        (obj(size='height="4" radius="0.06"'), True),
+        (obj("-1", size='height="4" radius="0.05"'), True),
     ],
 )
 def test_posts_of_traffic_signs_carry_no_sensor(tmp_path, furniture, carries):
@@ -164,7 +164,7 @@ def test_posts_of_traffic_signs_carry_no_sensor(tmp_path, furniture, carries):
     ],
 )
 def test_objects_without_a_type_count_by_their_name_and_shape(tmp_path, kind, name, size, material):
-    built = model(tmp_path, furniture=thing(kind, t=-12, name=name, size=size))
+    built = model(tmp_path, furniture=obj(kind, t=-12, name=name, size=size))
     of_map = [part for part in built.parts if part.name.startswith(name or kind)]
     assert material in {each for part in of_map for each in part.solid.materials}
 
