@@ -34,7 +34,7 @@ LIFT = max(height for height, _ in AREA_OVERLAYS.values()) + 0.02
 BODY_RADIUS, BODY_HEIGHT = 0.12, 0.22  # metres; somewhat larger than life
 POST_RADIUS, BRACKET_RADIUS = 0.06, 0.03  # metres
 BODY_SIDES = 16
-SAME_PLACE = 0.01  # metres in plan, below which a sensor stands on its foot
+OFF_AXIS_DISTANCE = 0.01  # metres in plan, below which a sensor stands on its foot
 
 
 def write_result(scene: bpy.types.Scene, site: Site, deployment: Deployment) -> None:
@@ -159,7 +159,7 @@ def _hardware(sensor: Sensor) -> Solid:
     if not sensor.on_pole:
         return join(body, tube(foot, top, (POST_RADIUS, POST_RADIUS), "post"))
     aside = sensor.foot[:2] - sensor.xyz[:2]
-    if math.hypot(*aside) > SAME_PLACE:
+    if math.hypot(*aside) > OFF_AXIS_DISTANCE:
         below = (sensor.orientation @ top)[2]
         shaft = upright @ np.array((*aside, below))  # on the pole's axis, as high as the underside of the body
         return join(body, tube(shaft, top, (BRACKET_RADIUS, BRACKET_RADIUS), "post"))

@@ -16,7 +16,7 @@ from .description import SiteDescription
 
 MAX_ROAD_DISTANCE = 1000.0
 """Metres beyond the roads of a map within which a place may be meant."""
-SAME_PLACE = 10.0
+ALTERNATIVE_DISTANCE = 10.0
 """A pair of numbers that is the same place in degrees and in metres, but for so much (metres), is meant in metres."""
 MAX_ORIGIN_OFFSET = 0.05
 """Degrees from the origin of a map's reference within which its roads lie."""
@@ -69,7 +69,7 @@ def _converted(
         if abs(latitude) < 90.0:
             projected = np.array(to_metres(math.radians(latitude), math.radians(longitude)))
             for place in (projected - road_map.header_offset[:2], projected):
-                if _is_within(place, low, high) and np.hypot(*(place - near)) > SAME_PLACE:
+                if _is_within(place, low, high) and np.hypot(*(place - near)) > ALTERNATIVE_DISTANCE:
                     return float(place[0]), float(place[1])
     return None
 

@@ -12,7 +12,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from .trajectories import Trajectories
 
-SAME_PLACE = 1.0
+MATCH_RADIUS = 1.0
 """Metres in plan within which two vehicles are in one place."""
 
 MAX_OVERLAP = 0.5
@@ -51,7 +51,7 @@ def vehicle_positions(name: str, trajectories: Trajectories) -> VehiclePositions
 
 
 def overlap_of(one: VehiclePositions, other: VehiclePositions) -> float | None:
-    """Return the share of the vehicles of a run that are within `SAME_PLACE` of one of the other at the same instant.
+    """Return the share of the vehicles of a run that are within `MATCH_RADIUS` of one of the other at the same instant.
 
     Instants are the same by the clock, or as long after the first: the larger share counts,
     and of the two runs that which has more of its vehicles in the other.
@@ -86,7 +86,9 @@ def _aligned(one: VehiclePositions, other: VehiclePositions, shift: float) -> fl
 
 def _near(xy: Float, others: Float) -> int:
     """Return the number of points (n, 2) that have one of others (k, 2) nearby."""
-    nearby = shapely.STRtree(shapely.points(others)).query(shapely.points(xy), predicate="dwithin", distance=SAME_PLACE)
+    nearby = shapely.STRtree(shapely.points(others)).query(
+        shapely.points(xy), predicate="dwithin", distance=MATCH_RADIUS
+    )
     return len(np.unique(nearby[0]))
 
 
@@ -104,9 +106,9 @@ def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions
         if share is not None and share > MAX_OVERLAP:
             raise SeipError(
                 f"{one.name} and {other.name} are nearly the same traffic: {share:.0%} of the vehicles of one are "
-                f"within {SAME_PLACE:g} m of one of the other at the same instant, and {MAX_OVERLAP:.0%} is the most "
+                f"within {MATCH_RADIUS:g} m of one of the other at the same instant, and {MAX_OVERLAP:.0%} is the most "
                 "for runs that are to be independent: name runs that were simulated with other demand and other seeds"
             )
         said.append(f"{one.name} and {other.name} {'cannot be told' if share is None else format(share, '.0%')}")
-    measure = f"vehicles of one run within {SAME_PLACE:g} m of one of another at the same instant"
+    measure = f"vehicles of one run within {MATCH_RADIUS:g} m of one of another at the same instant"
     return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(said)}"

@@ -15,7 +15,7 @@ from ..site.target_squares import target_squares
 MAX_LINES = 1500
 """Limit on the lines drawn: of more targets a sample is taken."""
 SAMPLE_SEED = 0
-SAME_PLACE = 0.01
+POSE_DISTANCE = 0.01
 """Metres that a sensor may be from a candidate pose and still hang there: Blender's numbers are single precision."""
 SAME_TURN = 5e-5
 """Difference of cosines up to which two orientations are the same."""
@@ -83,7 +83,7 @@ def pose_at(candidates: Candidates, sensor: str, xyz: Float, orientation: Float)
     """
     same = np.flatnonzero(candidates.sensor == sensor)
     away = np.linalg.norm(candidates.xyz[same] - xyz, axis=1)
-    near = same[np.argsort(away, kind="stable")][: np.count_nonzero(away <= SAME_PLACE)]
+    near = same[np.argsort(away, kind="stable")][: np.count_nonzero(away <= POSE_DISTANCE)]
     turned_alike = (np.abs(candidates.orientation(int(pose)) - orientation).max() <= SAME_TURN for pose in near)
     return next((int(pose) for pose, alike in zip(near, turned_alike, strict=True) if alike), None)
 
