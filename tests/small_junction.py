@@ -101,13 +101,15 @@ def make_site(geometry: SceneGeometry, spacing: float, heights: tuple[float, ...
     inside = shapely.contains_xy(geometry.region, x, y)
     xyz = np.stack((x[inside], y[inside], np.zeros(inside.sum())), axis=1)
     central = shapely.contains_xy(geometry.weighted_regions[0].polygon, xyz[:, 0], xyz[:, 1])
+    triangles = np.concatenate([mesh.triangles for mesh in (*geometry.roads, *geometry.ground, *geometry.occluders)])
     return Site(
         name=geometry.name,
         origin=geometry.origin,
         region=geometry.region,
         targets=Targets(xyz, np.where(central, 2.0, 1.0), central, spacing),
         candidates=make_candidates(geometry, right, heights),
-        triangles=np.concatenate([mesh.triangles for mesh in (*geometry.roads, *geometry.ground, *geometry.occluders)]),
+        triangles=triangles,
+        reflectivity=np.full(len(triangles), 0.3),
     )
 
 

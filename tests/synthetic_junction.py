@@ -54,6 +54,11 @@ def sphere(centre: Float, radius: float, rows: int = 10, columns: int = 16) -> F
     )
 
 
+def varied_reflectivity(triangles):
+    """A reflectivity for each triangle, whatever its neighbours have, that follows from its corners."""
+    return 0.05 + 0.9 * np.modf(np.abs(triangles.sum(axis=(1, 2))) * 7.13)[0]
+
+
 def junction_site(
     positions: int = 150,
     sensors: Sequence[str] = ("type1", "type2", "type3"),
@@ -107,6 +112,7 @@ def junction_site(
         targets=Targets(target, np.ones(len(target)), central, spacing),
         candidates=make_candidates(ground[p] + np.column_stack([0 * h, 0 * h, h]), np.asarray(sensors)[s], h),
         triangles=triangles,
+        reflectivity=varied_reflectivity(triangles),
     )
 
 

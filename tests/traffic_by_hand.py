@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from seip_addon.core.lidar import LidarModel
+from seip_addon.core.lidar import CarlaDropoff, LidarModel
 from seip_addon.core.scans import MountedSensor, StaticScene, level_orientation
 from seip_addon.core.traffic import RoadUser, Trajectories
 
@@ -48,8 +48,7 @@ def make_model(**changes) -> LidarModel:
         "points_per_second": 7 * 720 * 10.0,
         "rotation_rate": 10.0,
         "price_range": (1.0, 2.0),
-        "attenuation": 0.01,
-        "dropoff_general": 0.2,
+        "law": CarlaDropoff(attenuation=0.01, general=0.2),
     }
     return LidarModel(**figures | changes)
 

@@ -19,11 +19,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from seip_addon.core.lidar import LidarModel
+from seip_addon.core.lidar import CarlaDropoff, LidarModel, RangeEquation
+from seip_addon.core.lidar.model import DetectionLaw
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.visibility.grid import compute_visibility, full_scan_visibility
+from seip_addon.core.visibility.near_surfaces import caster_tolerance
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
 from seip_addon.core.visibility.settings import VisibilitySettings
 
@@ -33,6 +35,8 @@ Boolean = NDArray[np.bool_]
 ROUNDINGS = 16
 """So many roundings to float32 lie between the coordinates of a scene and a ray's return: storing corners, origin and
 direction, their differences, two products and a sum of each edge function, and the quotient that is the distance."""
+BORDER_STEPS = 30.0
+"""Tolerances of the ray caster along a grazing ray within which surfaces are held to meet."""
 HALF_STEP = 2.0**-24
 """Largest relative error of one rounding to float32."""
 
@@ -65,6 +69,8 @@ def draw_case(seed: int) -> Case:
     if random.random() < 0.2:  # something far off shifts the middle and widens the tolerance
         far = np.append(random.uniform(-20, 20, 2) * half, 0.0)
         triangles = np.concatenate([triangles, (far + random.normal(0, 1, (3, 3)))[None]])
+    if random.random() < 0.4:  # faces upon faces, as a marking lies upon a road
+        triangles = np.concatenate([triangles, _upon(random, triangles)])
     if random.random() < 0.5:  # as Blender keeps them
         triangles = triangles.astype(np.float32).astype(np.float64)
     models = {key: _model(random, key, half) for key in ("one", "two")}
@@ -77,9 +83,12 @@ def draw_case(seed: int) -> Case:
             targets=Targets(targets, np.ones(len(targets)), np.zeros(len(targets), dtype=bool), 1.0),
             candidates=_poses(random, triangles, targets, half),
             triangles=triangles,
+            reflectivity=_reflectivity(random, triangles),
         ),
         models,
-        VisibilitySettings(delta, float(random.choice([0.0, 0.0, random.uniform(0, 0.9)]))),
+        VisibilitySettings(
+            delta, float(random.choice([0.0, 0.0, random.uniform(0, 0.9)])), float(random.uniform(0.05, 0.95))
+        ),
         kind,
     )
 
@@ -149,6 +158,31 @@ def _grazed(random: np.random.Generator, half: float, delta: float) -> Float:
 KINDS = {"soup": _soup, "level": _level, "steps": _steps, "tilted": _tilted, "grazed": _grazed}
 
 
+def _upon(random: np.random.Generator, triangles: Float) -> Float:
+    """Copies of some faces, and parts of others in the same plane."""
+    some = triangles[random.random(len(triangles)) < 0.5]
+    whole = random.random(len(some)) < 0.5
+    corners = np.einsum("nij,njk->nik", random.dirichlet((0.3, 0.3, 0.3), (len(some), 3)), some)
+    corners[whole] = some[whole][:, [1, 2, 0]]
+    return corners
+
+
+def _reflectivity(random: np.random.Generator, triangles: Float) -> Float:
+    """One for all, a few different ones, or one for each."""
+    count = len(triangles)
+    several = random.choice(random.uniform(0.0, 1.0, 3), count)
+    reflectivity = [np.full(count, random.uniform(0.05, 1.0)), several, random.uniform(0.0, 1.0, count)]
+    return reflectivity[int(random.integers(3))]
+
+
+def _law(random: np.random.Generator, half: float) -> DetectionLaw:
+    """CARLA's, or a range equation whose ranges are within the scene, beyond it, or hardly any."""
+    if random.random() < 0.4:
+        return CarlaDropoff()
+    far = half * float(10.0 ** random.uniform(-1.0, 1.0))
+    return RangeEquation.of_ranges(far, far * float(random.uniform(1.1, 2.8)), float(random.uniform(0.3, 0.95)))
+
+
 def _model(random: np.random.Generator, key: str, half: float) -> LidarModel:
     channels, steps = int(random.integers(1, 25)), int(random.integers(1, 240))
     spread = random.choice([1.5, 0.5, 0.1])
@@ -167,6 +201,7 @@ def _model(random: np.random.Generator, key: str, half: float) -> LidarModel:
         rotation_rate=10.0,
         price_range=(1.0, 2.0),
         azimuth_offsets=random.uniform(-7, 7, channels) * (random.random() < 0.7),
+        law=_law(random, half),
     )
 
 
@@ -247,29 +282,30 @@ def _rays(model: LidarModel, yaw: float, tilt: float) -> Float:
 
 def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:
     triangles, targets = case.site.triangles, case.site.targets.xyz
-    delta, least = case.settings.delta, case.settings.min_intensity
+    delta = case.settings.delta
     points = triangles.reshape(-1, 3)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     width = max(np.abs(points - middle).max(), np.abs(origin - middle).max(), np.abs(points - origin).max())
     noise = ROUNDINGS * HALF_STEP * float(width)
+    border = BORDER_STEPS * caster_tolerance(triangles)
 
     rays = _rays(model, yaw, tilt)
     ray, triangle, certain, begin, end = _hits(rays, triangles - origin, noise)
     # what may be met first: all that begins before something that is certainly met ends
     limit = np.full(len(rays), np.inf)
     np.minimum.at(limit, ray[certain], end[certain])
-    first = begin <= limit[ray]
+    # which of surfaces that meet stops a ray is chance, so that each of them must return it strongly enough
+    first = begin <= limit[ray] + border
     ray, triangle, certain, begin, end = (part[first] for part in (ray, triangle, certain, begin, end))
 
     a, b, c = np.moveaxis(triangles[triangle], 1, 0)
     normal = np.cross(b - a, c - a)
     cosine = np.abs((normal * rays[ray]).sum(axis=1)) / np.linalg.norm(normal, axis=1)
-    strong = cosine * np.exp(-model.attenuation * np.array([end, begin]))
+    reflected = case.site.reflectivity[triangle] * cosine
     surely = (begin >= model.min_range + noise) & (end <= model.max_range - noise)
     maybe = (end >= model.min_range - noise) & (begin <= model.max_range + noise)
-    if least > 0:
-        surely &= strong[0] >= least + 1e-9
-        maybe &= strong[1] >= least - 1e-9
+    surely &= _is_strong(model, case.settings, end, reflected * (1 - 1e-9))
+    maybe &= _is_strong(model, case.settings, begin, reflected * (1 + 1e-9))
     # distances of targets from the stretch of each ray in which its return lies: of both ends, and least
     start = (origin + begin[:, None] * rays[ray])[:, None] - targets
     stop = (origin + end[:, None] * rays[ray])[:, None] - targets
@@ -286,6 +322,21 @@ def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: Lidar
     some = np.zeros(len(rays), dtype=bool)
     some[ray[certain]] = True
     return (sure & some[:, None]).any(axis=0), near_perhaps.any(axis=0)
+
+
+def _is_strong(model: LidarModel, settings: VisibilitySettings, distance: Float, reflected: Float) -> Boolean:
+    """Whether hits count: by the intensity that is asked for, or by the probability of detection, written out."""
+    law = model.law
+    if isinstance(law, CarlaDropoff):
+        return reflected * np.exp(-law.attenuation * distance) >= settings.min_intensity * (1 - 1e-12)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        power = np.log(reflected) - 2 * law.extinction * distance - 2 * np.log(distance)
+    return law.ceiling * ndtr((power - law.threshold) / law.spread) >= settings.detection * (1 - 1e-12)
+
+
+def ndtr(z: Float) -> Float:
+    """Return Φ(z), from the error function of the C library."""
+    return np.array([0.5 * math.erfc(-one / math.sqrt(2)) for one in z])
 
 
 def _hits(

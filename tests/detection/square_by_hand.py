@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.lidar import CarlaDropoff, load_catalogue
 from seip_addon.core.scans import MountedSensor, StaticScene, level_orientation
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.trajectories import RoadUser
@@ -34,7 +34,7 @@ def road():
 
 
 def sensors():
-    model = replace(load_catalogue()["type1"], dropoff_general=0.1)
+    model = replace(load_catalogue()["type1"], law=CarlaDropoff(general=0.1))
     return tuple(
         MountedSensor(f"S{number}", model, np.array(place), level_orientation(0.3 * number))
         for number, place in enumerate([(-8.0, -6.0, 5.0), (12.0, 9.0, 6.0)])

@@ -93,7 +93,7 @@ def test_a_larger_loss_takes_what_a_smaller_one_takes():
 
 def test_rain_takes_light_range_and_returns():
     clear, wet = sensors()[0].model, Rain(20.0).disturbed_sensors(sensors())[0].model
-    assert wet.attenuation == pytest.approx(clear.attenuation + 0.04)
+    assert wet.law.attenuation == pytest.approx(clear.law.attenuation + 0.04)
     # As strong as from 100 m in clear air: exp(-0.04 r) / r^2 = 1 / 100^2.
     assert math.exp(-0.04 * wet.max_range) / wet.max_range**2 == pytest.approx(1e-4, rel=1e-9)
     assert range_in(100.0, 0.0) == 100.0

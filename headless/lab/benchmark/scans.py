@@ -14,7 +14,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import LidarModel, return_chance, return_intensity
+from seip_addon.core.lidar import LidarModel, return_chance
 from seip_addon.core.progress import finish
 from seip_addon.core.scans import (
     Frame,
@@ -186,17 +186,17 @@ def combined(
 def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, users: int) -> Scan:
     """Cast every ray of a sensor against everything."""
     model, rays = scanner.sensor.model, len(scanner.directions)
-    distance, intensity = np.full(rays, np.inf), np.zeros(rays)
+    distance, intensity, reflected = np.full(rays, np.inf), np.zeros(rays), np.zeros(rays)
     instance = np.full(rays, STATIC_INSTANCE, dtype=np.int32)
     for begin in range(0, rays, _RAYS_AT_ONCE):
         directions = scanner.directions[begin : begin + _RAYS_AT_ONCE]
         far, triangle = surface.caster.cast(scanner.sensor.xyz, directions, model.max_range)
         hit = np.flatnonzero(triangle >= 0)
         distance[begin + hit] = far[hit]
-        reflected = surface.reflected(directions[hit], triangle[hit])
-        intensity[begin + hit] = return_intensity(model, far[hit], reflected)
+        reflected[begin + hit] = surface.reflected(directions[hit], triangle[hit])
+        intensity[begin + hit] = model.law.intensity(far[hit], reflected[begin + hit])
         instance[begin + hit] = owner[triangle[hit]]
-    chance = return_chance(model, distance, intensity).astype(np.float32)
+    chance = return_chance(model, distance, reflected).astype(np.float32)
     nobody = np.zeros(users, dtype=np.int64)
     return Scan(distance, intensity, chance, instance, nobody, nobody)
 

@@ -20,6 +20,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.site.site import Site
 from seip_addon.core.visibility.chunks import compute_rows, sharing_rays
 from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.near_surfaces import near_surfaces
 from seip_addon.core.visibility.ray_casting import Engine, RayCaster, make_ray_caster
 from seip_addon.core.visibility.scanning import ScanPosition
 from seip_addon.core.visibility.settings import VisibilitySettings
@@ -91,6 +92,7 @@ class FullAndLazy:
     ) -> None:
         self._site, self._models, self._settings = site, models, settings
         self._caster = make_ray_caster(site.triangles, engine)
+        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
         self._lazy = VisibilityModel(site, settings, self._caster)
 
     def full(self, poses: Integer) -> tuple[Boolean, int]:
@@ -98,8 +100,8 @@ class FullAndLazy:
         candidates = self._site.candidates
         used = [self._models[key] for key in candidates.sensor[poses].tolist()]
         origin, yaw = candidates.xyz[poses[0]], float(candidates.yaw[poses[0]])
-        position = ScanPosition(self._caster, origin, yaw, used, self._settings)
-        return seen_by_tilted_full_scan(position, float(candidates.tilt[poses[0]]), self._site.targets.xyz)
+        position = ScanPosition(self._caster, origin, yaw, used, self._settings, self._site.reflectivity)
+        return seen_by_tilted_full_scan(position, float(candidates.tilt[poses[0]]), self._surfaces)
 
     def lazy(self, poses: Integer) -> tuple[Boolean, int]:
         """Cast only rays that can matter; see `full`."""

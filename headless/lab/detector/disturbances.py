@@ -96,8 +96,7 @@ class DropOff(Disturbance):
         """Return the sensors with a larger general drop-off."""
 
         def lossy(model: LidarModel) -> LidarModel:
-            general = model.dropoff_general
-            return replace(model, dropoff_general=general + (1 - general) * self.size)
+            return replace(model, law=model.law.losing(self.size))
 
         return _with_models(sensors, lossy)
 
@@ -129,7 +128,7 @@ class Rain(Disturbance):
 
         def dimmed(model: LidarModel) -> LidarModel:
             lost = 2 * self.size / 1000.0
-            return replace(model, attenuation=model.attenuation + lost, max_range=range_in(model.max_range, lost))
+            return replace(model.in_air(self.size / 1000.0), max_range=range_in(model.max_range, lost))
 
         return _with_models(sensors, dimmed)
 

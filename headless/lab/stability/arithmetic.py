@@ -285,6 +285,7 @@ def _site(scene: HardScene) -> Site:
             dropped={},
         ),
         triangles=scene.triangles,
+        reflectivity=np.ones(len(scene.triangles)),
     )
 
 

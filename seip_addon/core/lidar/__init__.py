@@ -1,21 +1,25 @@
 """LiDAR models: beams, price, returns and noise.
 
-Visibility uses the beam pattern and the range alone. Noise, intensity and
-drop-off are for scans of traffic, and seeded by the generator that is passed in.
+Visibility and scans share the law by which returns are detected. Noise and luck are for scans alone, and seeded.
 """
 
 from .beams import BeamPattern, beam_directions
+from .carla_dropoff import CarlaDropoff
 from .catalogue import find_models, load_catalogue
 from .model import LidarModel
-from .noisy_returns import measured_returns, return_chance, return_intensity
+from .noisy_returns import measured_returns, return_chance
+from .range_equation import RangeEquation
+from .surface_patches import surface_deviation
 
 __all__ = [
     "BeamPattern",
+    "CarlaDropoff",
     "LidarModel",
+    "RangeEquation",
     "beam_directions",
     "find_models",
     "load_catalogue",
     "measured_returns",
     "return_chance",
-    "return_intensity",
+    "surface_deviation",
 ]

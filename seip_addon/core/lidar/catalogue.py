@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -13,7 +14,9 @@ import numpy as np
 
 from ..errors import SeipError
 from ..storage.toml_table import Key, parse_toml, read_table
+from .carla_dropoff import CarlaDropoff
 from .model import LidarModel
+from .range_equation import MAKER_PROBABILITY, RangeEquation
 
 
 def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
@@ -73,10 +76,40 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     (low, high), price_range = values.pop("range_m"), tuple(values.pop("price_usd"))
     given = {_FIELDS.get(name, name): value for name, value in values.items() if value is not None}
     angles = {name: np.radians(given.pop(f"{name}_deg")) for name in ("elevations", "azimuth_offsets")}
+    kind = given.pop("model", (CarlaDropoff if _DROPOFF.keys() & given.keys() else RangeEquation).model)
+    own = {name: given.pop(name) for name in (*_DROPOFF, *_DETECTION) if name in given}
+    strange = [name for name in own if name not in (_DROPOFF if kind == CarlaDropoff.model else _DETECTION)]
+    if strange:
+        raise SeipError(
+            f'{where}: {strange[0]} is no figure of the model "{kind}": leave it out, or name the other model'
+        )
     try:
-        return LidarModel(key=key, min_range=low, max_range=high, price_range=price_range, **angles, **given)
+        law, assumed = (_dropoff(own), "") if kind == CarlaDropoff.model else _range_equation(own, high)
+        return LidarModel(
+            key=key, min_range=low, max_range=high, price_range=price_range, law=law, assumed=assumed, **angles, **given
+        )
     except SeipError as error:
-        raise SeipError(f"{error} (in {file})") from error
+        sentence = str(error)
+        raise SeipError(f"{sentence} (in {file})" if key in sentence else f"{where}: {sentence}") from error
+
+
+def _dropoff(given: Mapping[str, float]) -> CarlaDropoff:
+    return CarlaDropoff(**{_DROPOFF[name]: value for name, value in given.items()})
+
+
+def _range_equation(given: Mapping[str, Any], longest: float) -> tuple[RangeEquation, str]:
+    """Return the law of published ranges or of a measurement, and what of it is assumed."""
+    if "detection_law" in given:
+        if len(given) > 1:
+            raise SeipError("give either detection_law, as measured, or detection_range_m and detection_probability")
+        threshold, spread, ceiling = given["detection_law"]
+        return RangeEquation(threshold, spread, ceiling), ""
+    probability = given.get("detection_probability", MAKER_PROBABILITY)
+    if "detection_range_m" in given:
+        low, high = given["detection_range_m"]
+        return RangeEquation.of_ranges(low, high, probability), ""
+    assumed = f"its longest range, {longest:g} m, is taken to be that at 80 % reflectivity, and 1/r² for that at 10 %"
+    return RangeEquation.of_ranges(longest / _SQRT_8, longest, probability), assumed
 
 
 def _is_number(value: object) -> TypeGuard[float]:
@@ -96,11 +129,20 @@ def _numbers(value: object) -> list[float]:
     return [float(one) for one in value]
 
 
-def _pair(value: object) -> list[float]:
-    numbers = _numbers(value)
-    if len(numbers) != 2:
-        raise ValueError(f"must hold 2 numbers, not {len(numbers)}")
-    return numbers
+def _several(count: int) -> Callable[[object], list[float]]:
+    def read(value: object) -> list[float]:
+        numbers = _numbers(value)
+        if len(numbers) != count:
+            raise ValueError(f"must hold {count} numbers, not {len(numbers)}")
+        return numbers
+
+    return read
+
+
+def _law(value: object) -> str:
+    if value not in _LAWS:
+        raise ValueError(f"must be one of {', '.join(map(repr, _LAWS))}, not {value!r}")
+    return str(value)
 
 
 def _channels(value: object) -> int:
@@ -109,15 +151,34 @@ def _channels(value: object) -> int:
     return value
 
 
+_LAWS = (RangeEquation.model, CarlaDropoff.model)
+_SQRT_8 = math.sqrt(8.0)
+"""Ratio of the ranges at 80 and at 10 % reflectivity where power falls with 1/r² alone."""
+
 _FIELDS = {
     "rotation_rate_hz": "rotation_rate",
     "range_noise_std_m": "range_noise_std",
-    "attenuation_per_m": "attenuation",
-    "dropoff_general_rate": "dropoff_general",
+    "range_noise_growth_per_m": "range_noise_growth",
 }
 """Fields of a model that a catalogue calls by another name, with their units."""
 
+_DROPOFF = {
+    "attenuation_per_m": "attenuation",
+    "dropoff_general_rate": "general",
+    "dropoff_intensity_limit": "intensity_limit",
+    "dropoff_zero_intensity": "zero_intensity",
+}
+"""Figures of `CarlaDropoff`, by their names in a catalogue."""
+
+_pair = _several(2)
 _OPTIONAL = Key(_number, None)
+_DETECTION = {
+    "detection_range_m": Key(_pair, None),
+    "detection_probability": _OPTIONAL,
+    "detection_law": Key(_several(3), None),
+}
+"""Figures of the range equation."""
+
 _KEYS = {
     "name": Key(str),
     "manufacturer": Key(str),
@@ -129,10 +190,10 @@ _KEYS = {
     "price_source": Key(str, None),
     "azimuth_offsets_deg": Key(_numbers, ()),
     "range_noise_std_m": _OPTIONAL,
-    "attenuation_per_m": _OPTIONAL,
-    "dropoff_general_rate": _OPTIONAL,
-    "dropoff_intensity_limit": _OPTIONAL,
-    "dropoff_zero_intensity": _OPTIONAL,
+    "range_noise_growth_per_m": _OPTIONAL,
+    "model": Key(_law, None),
+    **_DETECTION,
+    **dict.fromkeys(_DROPOFF, _OPTIONAL),
 }
 _EVEN = {"channels": Key(_channels), "field_of_view_deg": Key(_pair)}
 _UNEVEN = {"elevations_deg": Key(_numbers)}

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from .carla_dropoff import CarlaDropoff
+from .range_equation import RangeEquation
+
+DetectionLaw = RangeEquation | CarlaDropoff
+"""Law by which returns are detected: physical, or the one of CARLA."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,15 +45,13 @@ class LidarModel:
         What each channel's azimuth is ahead of the head's, counter-clockwise.
         Zeros when not given.
     range_noise_std : float, metres
-        Standard deviation of the range noise (Gaussian).
-    attenuation : float, 1/m
-        a in the intensity law I = ρ · cos θ · exp(−a · r).
-    dropoff_general : float
-        Share of all returns that is lost whatever their intensity.
-    dropoff_intensity_limit, dropoff_zero_intensity : float
-        A return of at least the limit is kept; below it the probability to be
-        lost grows linearly to ``dropoff_zero_intensity`` at intensity 0.
-        (The drop-off model of CARLA's ray-cast LiDAR.)
+        Standard deviation of the range noise (Gaussian) near the sensor.
+    range_noise_growth : float, 1/m
+        What is added to it for each square metre of r².
+    law : RangeEquation or CarlaDropoff
+        By which returns are detected.
+    assumed : str
+        What of the law no document says; empty where it follows from published ranges.
     """
 
     key: str
@@ -64,10 +67,9 @@ class LidarModel:
     price_source: str = ""
     azimuth_offsets: Float = field(default_factory=lambda: np.zeros(0))
     range_noise_std: float = 0.03
-    attenuation: float = 0.004
-    dropoff_general: float = 0.0
-    dropoff_intensity_limit: float = 0.8
-    dropoff_zero_intensity: float = 0.4
+    range_noise_growth: float = 0.0
+    law: DetectionLaw = field(default_factory=CarlaDropoff)
+    assumed: str = ""
 
     def __post_init__(self) -> None:
         if self.azimuth_offsets.size == 0:
@@ -88,6 +90,14 @@ class LidarModel:
     def price(self) -> float:
         """Middle of the price range in US dollars."""
         return sum(self.price_range) / 2
+
+    def range_noise(self, distance: Float) -> Float:
+        """Return the standard deviation of the range noise, (n,) float64, at distances (n,), all in metres."""
+        return self.range_noise_std + self.range_noise_growth * distance**2
+
+    def in_air(self, extinction: float) -> LidarModel:
+        """Return the sensor in air that takes so much more light, in 1/m, on each way."""
+        return replace(self, law=self.law.in_air(extinction))
 
 
 MAX_RAYS = 50_000_000
@@ -110,10 +120,7 @@ def _require_valid(model: LidarModel) -> None:
         ),
         "its price range must be positive, finite and not decreasing": 0 < low <= high < math.inf,
         "the range noise must be 0 m or more and finite": 0 <= model.range_noise_std < math.inf,
-        "attenuation must be 0 or more and finite": 0 <= model.attenuation < math.inf,
-        "the general drop-off must lie between 0 and 1": 0 <= model.dropoff_general <= 1,
-        "the drop-off at zero intensity must lie between 0 and 1": 0 <= model.dropoff_zero_intensity <= 1,
-        "the drop-off's intensity limit must lie above 0 and up to 1": 0 < model.dropoff_intensity_limit <= 1,
+        "the growth of the range noise must be 0 or more and finite": 0 <= model.range_noise_growth < math.inf,
     }
     for sentence, holds in checks.items():
         if not holds:

@@ -1,4 +1,4 @@
-"""Intensity, loss and noise of a LiDAR's returns."""
+"""Loss and noise of a LiDAR's returns."""
 
 from __future__ import annotations
 
@@ -11,49 +11,24 @@ from ..arrays import Float, Integer
 from .model import LidarModel
 
 
-def return_intensity(
-    model: LidarModel, distance: Float, cos_incidence: Float, reflectivity: Float | float = 1.0
-) -> Float:
-    """Return I = ρ · |cos θ| · exp(−a · r), the Lambertian law with attenuation in air.
-
-    Parameters
-    ----------
-    model : LidarModel
-        Its ``attenuation`` is a.
-    distance : (n,) float64, metres
-        Range r of each return; infinite on a miss, which has intensity 0.
-    cos_incidence : (n,) float64
-        Cosine of the angle between ray and surface normal.
-    reflectivity : (n,) float64 or float
-        Reflectivity ρ of each surface, 0 to 1.
-
-    Returns
-    -------
-    (n,) float64, 0 to 1
-    """
-    hit = np.isfinite(distance)
-    intensity: Float = np.abs(cos_incidence) * reflectivity * np.exp(-model.attenuation * np.where(hit, distance, 0.0))
-    return np.where(hit, intensity, 0.0)
-
-
-def return_chance(model: LidarModel, distance: Float, intensity: Float) -> Float:
-    """Return how likely each return is not to be lost: nought out of range, else CARLA's drop-off by intensity.
+def return_chance(model: LidarModel, distance: Float, reflected: Float, deviation: Float | None = None) -> Float:
+    """Return how likely each hit returns: nought out of range, else as the model's law says.
 
     Parameters
     ----------
     distance : (n,) float64, metres
         Infinite on a miss.
-    intensity : (n,) float64
-        Of each return, as `return_intensity` gives it.
+    reflected : (n,) float64, 0 to 1
+        Reflectivity of the surface times the cosine of the angle of incidence.
+    deviation : (n,) float64, optional
+        Of the surface; see `surface_deviation`.
 
     Returns
     -------
     (n,) float64, 0 to 1
     """
-    slope = model.dropoff_zero_intensity / model.dropoff_intensity_limit
-    keep = np.minimum(1.0, slope * intensity + (1.0 - model.dropoff_zero_intensity))
     within = (distance >= model.min_range) & (distance <= model.max_range)
-    return np.where(within, (1.0 - model.dropoff_general) * keep, 0.0)
+    return np.where(within, model.law.chance(distance, reflected, deviation), 0.0)
 
 
 def measured_returns(
@@ -79,14 +54,14 @@ def measured_returns(
     """
     fate, error = random.integers(2**32, size=(2, len(distance)), dtype=np.uint32)
     ray = np.flatnonzero(fate < chance * 2.0**32)
-    return ray, np.maximum(distance[ray] + model.range_noise_std * _normal(error[ray]), 0.0)
+    return ray, np.maximum(distance[ray] + model.range_noise(distance[ray]) * normal(error[ray]), 0.0)
 
 
-def _normal(bits: NDArray[np.uint32]) -> NDArray[np.float32]:
+def normal(bits: NDArray[np.uint32]) -> NDArray[np.float32]:
     """Return normally distributed numbers (n,) made of 32 random bits each (Box and Muller 1958), up to 4.9."""
     radius, cosine = _box_muller()
-    normal: NDArray[np.float32] = radius[bits >> 16] * cosine[bits & 0xFFFF]
-    return normal
+    drawn: NDArray[np.float32] = radius[bits >> 16] * cosine[bits & 0xFFFF]
+    return drawn
 
 
 @functools.cache

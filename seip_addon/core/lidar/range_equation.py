@@ -14,8 +14,18 @@ Of a diffuse (Lambertian) surface that fills the beam a LiDAR receives, but for 
 
 ρ is the reflectivity of the surface, θ the angle of incidence, α the extinction of the air, r the range and Φ the
 normal distribution. c is below 1 because some returns are lost whatever their power; s is the spread of ln p about
-what reflectivity and angle tell of it, most of which is the surface's own. m follows from the data sheet: from the
-range at which a surface of 10 % is detected.
+what reflectivity and angle tell of it. m follows from the data sheet: from the range at which a surface of 10 % is
+detected.
+
+Most of the spread is the surface's own and the same for every ray that meets it at the same place: of the variance
+s² a share `SURFACE_SHARE` is that of surfaces. Given how far, in standard deviations z, a place deviates from what
+its material promises,
+
+.. math::
+
+    P(z) = c \, Φ\left(\frac{\ln p + z s \sqrt{q} - m}{s \sqrt{1 - q}}\right),
+
+whose mean over z is P again.
 """
 
 from __future__ import annotations
@@ -23,21 +33,32 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import ClassVar
 
 import numpy as np
 
 from ..arrays import Float
 from ..errors import SeipError
+from .carla_dropoff import CarlaDropoff
 
 CEILING = 0.985
 SPREAD = 0.9
 """c and s where nothing is known of the sensor: sweeps of three makes have c of 0.98 to 1.00 and s of 0.5 to 1.3."""
 
+SURFACE_SHARE = 0.95
+"""q: with it the fate of a ray on a road is as much the same from sweep to sweep as in real sweeps."""
+
+MAKER_PROBABILITY = 0.9
+"""Probability of detection that the ranges of data sheets have where they name none."""
+
+DROPOFF_REFLECTIVITY = 0.2
+"""Of the surfaces, between asphalt and walls, for which `RangeEquation.as_dropoff` is right."""
+
 _STANDARD = NormalDist()
 
 
 @dataclass(frozen=True)
-class DetectionLaw:
+class RangeEquation:
     """How likely a LiDAR detects the return of a surface.
 
     Parameters
@@ -50,23 +71,46 @@ class DetectionLaw:
         c.
     extinction : float, 1/m
         α, 0 or more: of clear air, where data sheets were measured, next to nothing.
+
+    Raises
+    ------
+    SeipError
+        A parameter is out of its range.
     """
 
+    model: ClassVar[str] = "range equation"
     threshold: float
     spread: float = SPREAD
     ceiling: float = CEILING
     extinction: float = 0.0
 
+    def __post_init__(self) -> None:
+        checks = {
+            "the threshold of detection must be finite": math.isfinite(self.threshold),
+            "the spread of detection must lie above 0 and up to 10": 0 < self.spread <= 10,
+            "the ceiling of detection must lie above 0 and up to 1": 0 < self.ceiling <= 1,
+            "the extinction must be 0 or more and finite": 0 <= self.extinction < math.inf,
+        }
+        for sentence, holds in checks.items():
+            if not holds:
+                raise SeipError(sentence)
+
     @classmethod
     def of_ranges(
-        cls, at_10: float, at_80: float, probability: float = 0.9, *, spread: float = SPREAD, ceiling: float = CEILING
-    ) -> DetectionLaw:
+        cls,
+        at_10: float,
+        at_80: float,
+        probability: float = MAKER_PROBABILITY,
+        spread: float = SPREAD,
+        ceiling: float = CEILING,
+    ) -> RangeEquation:
         """Return the law of a data sheet.
 
         Parameters
         ----------
         at_10, at_80 : float, metres
-            Ranges at which surfaces of 10 and 80 % reflectivity that face the sensor are detected.
+            Ranges at which surfaces of 10 and 80 % reflectivity that face the sensor are detected. Where the longer one
+            is more than √8 times the other, which no extinction explains, the range at 10 % counts.
         probability : float
             With which they are, below the ceiling.
 
@@ -83,38 +127,50 @@ class DetectionLaw:
         # p falls by a factor of 8 from one range to the other: what 1/r² leaves of that is extinction
         extinction = max(0.0, (math.log(8.0) - 2.0 * math.log(at_80 / at_10)) / (2.0 * (at_80 - at_10)))
         law = cls(0.0, spread, ceiling, extinction)
-        least = math.log(0.1) - 2.0 * math.log(at_10) - 2.0 * extinction * at_10
-        return replace(law, threshold=least - math.log(law.least_power(probability)))
+        at_least = math.log(0.1) - 2.0 * math.log(at_10) - 2.0 * extinction * at_10
+        return replace(law, threshold=at_least - math.log(law.least_strength(probability)))
 
-    def probability(self, distance: Float, cos_incidence: Float, reflectivity: Float | float) -> Float:
-        """Return the probability of detection.
+    def in_air(self, extinction: float) -> RangeEquation:
+        """Return the law in air that takes so much more light, in 1/m, on each way."""
+        return replace(self, extinction=self.extinction + extinction)
+
+    def losing(self, share: float) -> RangeEquation:
+        """Return the law where so large a share of what is detected is lost, less than all."""
+        return replace(self, ceiling=self.ceiling * (1.0 - share))
+
+    def as_dropoff(self) -> CarlaDropoff:
+        """Return the drop-off that loses as much of a surface of `DROPOFF_REFLECTIVITY` at two ranges.
+
+        They are those at which 0.9 and 0.5 of the ceiling are detected of a surface that faces the sensor; CARLA's
+        intensity exp(−a · r) knows neither reflectivity nor angle.
+        """
+        near, far = (self.reach(DROPOFF_REFLECTIVITY, share * self.ceiling) for share in (0.9, 0.5))
+        attenuation = math.log(0.9 / 0.5) / (far - near)
+        return CarlaDropoff(attenuation, 1.0 - self.ceiling, min(1.0, math.exp(-attenuation * near) / 0.9), 1.0)
+
+    def strength(self, distance: Float, reflected: Float) -> Float:
+        """Return p in 1/m² of hits: 0 where they are infinitely far, infinite at no distance.
 
         Parameters
         ----------
         distance : (n,) float64, metres
-            Infinite on a miss, which is never detected.
-        cos_incidence : (n,) float64
-            Cosine of the angle between ray and surface normal, of either sign.
-        reflectivity : (n,) float64 or float, 0 to 1
+        reflected : (n,) float64
+            ρ · |cos θ|.
 
         Returns
         -------
-        (n,) float64, 0 to `ceiling`
+        (n,) float64
         """
-        with np.errstate(divide="ignore"):
-            power = np.log(self.power(distance, cos_incidence, reflectivity))
-        return self.ceiling * _normal_cdf((power - self.threshold) / self.spread)
-
-    def power(self, distance: Float, cos_incidence: Float, reflectivity: Float | float) -> Float:
-        """Return p in 1/m², (n,) float64, for arguments as of `probability`: 0 on a miss, infinite at no distance."""
-        hit = np.isfinite(distance)
-        there = np.where(hit, distance, 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            received = np.abs(cos_incidence) * reflectivity * np.exp(-2.0 * self.extinction * there) / there**2
-        power: Float = np.where(hit, np.nan_to_num(received, nan=0.0, posinf=np.inf), 0.0)
-        return power
+            power: Float = self.intensity(distance, reflected) / distance**2
+        return np.where(np.isnan(power), 0.0, power)
 
-    def least_power(self, probability: float) -> float:
+    def intensity(self, distance: Float, reflected: Float) -> Float:
+        """Return what sensors report of returns: power but for 1/r², as makers calibrate it; (n,)."""
+        intensity: Float = reflected * np.exp(-2.0 * self.extinction * distance)
+        return intensity
+
+    def least_strength(self, probability: float, min_intensity: float = 0.0) -> float:  # noqa: ARG002  # the other law's
         """Return p in 1/m² from which on a return is detected with a probability or more.
 
         Raises
@@ -129,18 +185,56 @@ class DetectionLaw:
             )
         return math.exp(self.threshold + self.spread * _STANDARD.inv_cdf(probability / self.ceiling))
 
-    def reach(self, reflectivity: float, probability: float, cos_incidence: float = 1.0) -> float:
-        """Return the range in metres up to which a surface is detected with a probability or more."""
-        squared = abs(cos_incidence) * reflectivity / self.least_power(probability)
-        far = math.sqrt(squared)
-        if self.extinction == 0.0 or far == 0.0:
+    def farthest_on_planes(self, reflectivity: Float, height: Float, least: float) -> Float:
+        """Return a distance (n,) in metres beyond which no plane has a power of ``least``.
+
+        Parameters
+        ----------
+        height : (n,) float64, metres
+            Of the sensor above each plane: cos θ is height / r there, so that p falls with r³.
+        """
+        far: Float = np.cbrt(reflectivity * height / least)
+        return far
+
+    def chance(self, distance: Float, reflected: Float, deviation: Float | float | None = None) -> Float:
+        """Return the probability that each hit is detected, (n,) float64, 0 to `ceiling`.
+
+        Parameters
+        ----------
+        distance : (n,) float64, metres
+            Infinite on a miss, which is never detected.
+        reflected : (n,) float64
+            ρ · |cos θ|.
+        deviation : (n,) float64, optional
+            Standard deviations that surfaces there deviate; the mean over all surfaces if not given.
+        """
+        with np.errstate(divide="ignore"):
+            power = np.log(self.strength(distance, reflected))
+        if deviation is None:
+            return self.ceiling * _normal_cdf((power - self.threshold) / self.spread)
+        shift = deviation * self.spread * math.sqrt(SURFACE_SHARE)
+        return self.ceiling * _normal_cdf(
+            (power + shift - self.threshold) / (self.spread * math.sqrt(1 - SURFACE_SHARE))
+        )
+
+    def reach(self, reflectivity: float, probability: float) -> float:
+        """Return the range in metres up to which a surface that faces the sensor is detected with a probability."""
+        return self._reach(reflectivity / self.least_strength(probability), 2)
+
+    def reach_on_level(self, reflectivity: float, probability: float, height: float) -> float:
+        """Return the range in metres up to which a level surface so far below the sensor is detected."""
+        return max(self._reach(reflectivity * height / self.least_strength(probability), 3), 0.0)
+
+    def _reach(self, strength: float, power: int) -> float:
+        """Solve strength · exp(−2αr) = rⁿ by halving."""
+        near, far = 0.0, float(strength ** (1.0 / power))
+        if self.extinction == 0.0:
             return far
-        near = 0.0
-        for _ in range(200):  # halves the doubt until no number lies between
+        for _ in range(200):  # until no number lies between
             middle = (near + far) / 2.0
             if not near < middle < far:
                 break
-            if squared * math.exp(-2.0 * self.extinction * middle) >= middle**2:
+            if strength * math.exp(-2.0 * self.extinction * middle) >= middle**power:
                 near = middle
             else:
                 far = middle

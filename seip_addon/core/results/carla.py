@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lidar import LidarModel
+from ..lidar import CarlaDropoff, LidarModel
+from ..lidar.range_equation import DROPOFF_REFLECTIVITY
 from ..placement.deployment import Deployment, Sensor
 from ..storage.files import save_json
 from .headings import clockwise_degrees, tilt_degrees
@@ -72,6 +73,7 @@ def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
 
 def _attributes(sensor: Sensor) -> dict[str, str]:
     model = sensor.model
+    dropoff = model.law if isinstance(model.law, CarlaDropoff) else model.law.as_dropoff()
     values = {
         "role_name": sensor.label,
         "channels": len(model.elevations),
@@ -81,11 +83,11 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
         "upper_fov": math.degrees(model.elevations.max()),
         "lower_fov": math.degrees(model.elevations.min()),
         "horizontal_fov": 360.0,
-        "atmosphere_attenuation_rate": model.attenuation,
+        "atmosphere_attenuation_rate": dropoff.attenuation,
         "noise_stddev": model.range_noise_std,
-        "dropoff_general_rate": model.dropoff_general,
-        "dropoff_intensity_limit": model.dropoff_intensity_limit,
-        "dropoff_zero_intensity": model.dropoff_zero_intensity,
+        "dropoff_general_rate": dropoff.general,
+        "dropoff_intensity_limit": dropoff.intensity_limit,
+        "dropoff_zero_intensity": dropoff.zero_intensity,
     }
     return {name: f"{value:.10g}" if isinstance(value, float) else str(value) for name, value in values.items()}
 
@@ -106,6 +108,11 @@ def _note(model: LidarModel) -> str:
         parts.append(
             f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, where "
             "CARLA fires all along it"
+        )
+    if not isinstance(model.law, CarlaDropoff):
+        parts.append(
+            f"detects a surface by its reflectivity and angle, where CARLA loses returns by range alone: the drop-"
+            f"off is that of {DROPOFF_REFLECTIVITY:.0%} reflectivity"
         )
     if model.min_range > 0.0:
         parts.append(f"returns nothing nearer than {model.min_range:g} m, where CARLA does")

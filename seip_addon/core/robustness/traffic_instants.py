@@ -35,15 +35,17 @@ class TrafficObstacles:
     ----------
     triangles : (n, 3, 3) float64, metres
         Of their bodies, local site axes.
+    reflectivity : (n,) float64, 0 to 1
     hulls : (k, 8, 3) float64, metres
         Corners of their bounding boxes.
     """
 
     triangles: Float
+    reflectivity: Float
     hulls: Float
 
 
-NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty((0, 8, 3)))  # the empty road
+NO_TRAFFIC = TrafficObstacles(np.empty((0, 3, 3)), np.empty(0), np.empty((0, 8, 3)))  # the empty road
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +123,15 @@ def obstacles_of(trajectories: Trajectories, snapshot: Snapshot) -> TrafficObsta
     if len(snapshot) == 0:
         return NO_TRAFFIC
     attitudes = rotations(snapshot.yaw, snapshot.pitch)
-    triangles, hulls = [], []
+    triangles, reflectivity, hulls = [], [], []
     for user, position, attitude in zip(snapshot.user.tolist(), snapshot.position, attitudes, strict=True):
-        own = fitted_body(trajectories.users[user]).triangles
+        body = fitted_body(trajectories.users[user])
+        own = body.triangles
         low, high = own.min(axis=(0, 1)) - _MARGIN, own.max(axis=(0, 1)) + _MARGIN
         triangles.append(position + own @ attitude.T)
+        reflectivity.append(body.reflectivity)
         hulls.append(position + (low + _CORNERS * (high - low)) @ attitude.T)
-    return TrafficObstacles(np.concatenate(triangles), np.array(hulls))
+    return TrafficObstacles(np.concatenate(triangles), np.concatenate(reflectivity), np.array(hulls))
 
 
 def _name(run: Trajectories) -> str:

@@ -6,8 +6,8 @@ distance d on the first of the scene's triangles or of the bodies of road users:
 - ``road``: a return nearer than δ to the target, as on the empty road. A return from
   a vehicle that stands on a target, or beside it, sees that place as one from the road does.
 - ``height``: a beam that comes nearer than δ to the point `LAYER_HEIGHT` metres above the
-  target before it ends. On the empty road nothing is there to return it; whatever
-  were there would. A vehicle adds nothing to this: where more stand less is seen.
+  target before it ends, where the sensor detects what faces it. On the empty road nothing is
+  there to return it; whatever were there would. A vehicle adds nothing to this: where more stand less is seen.
 
 The empty road is cast against once for a pose. At an instant only those rays are
 cast that pass through the bounding box of a road user, at the bodies alone, and a
@@ -27,6 +27,8 @@ from ..lidar import BeamPattern
 from ..progress import Progress
 from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation
+from ..site.scene_geometry import DEFAULT_REFLECTIVITY
+from ..visibility.near_surfaces import NearSurfaces, near_surfaces
 from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
 from ..visibility.scanning import ScanPosition
 from ..visibility.target_index import TargetIndex
@@ -72,18 +74,19 @@ def visibility_in_traffic(
     site, candidates = around.site, around.site.candidates
     engine = engine_name(around.engine)
     caster = make_ray_caster(site.triangles, engine)
-    vehicles = [_vehicle_caster(around, one, caster) for one in instants]
+    vehicles = [_vehicle_caster(around, one) for one in instants]
     wanted = site.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT if layer == "height" else 0.0])
     index = TargetIndex(wanted, around.sight.delta)
+    surfaces = near_surfaces(site.triangles, wanted, around.sight.delta, site.reflectivity)
     packed = np.zeros((len(instants), len(poses), (len(wanted) + 7) // 8), dtype=np.uint8)
 
     def compute(number: int) -> None:
         pose = int(poses[number])
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
-        place = ScanPosition(caster, xyz, float(yaw), [model], around.sight)
+        place = ScanPosition(caster, xyz, float(yaw), [model], around.sight, site.reflectivity)
         static = _StaticScan(place, wanted)
         visibility: _LayerVisibility = (
-            _HeightVisibility(static, wanted) if layer == "height" else _RoadVisibility(static, index, len(wanted))
+            _HeightVisibility(static, wanted) if layer == "height" else _RoadVisibility(static, index, surfaces)
         )
         for instant, present in enumerate(vehicles):
             packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(present)))
@@ -97,14 +100,17 @@ class _VehicleCaster:
     """The road users of an instant, ready to be cast against."""
 
     caster: RayCaster
+    reflectivity: Float
     hulls: Float
 
 
-def _vehicle_caster(around: Surroundings, present: TrafficObstacles, static: RayCaster) -> _VehicleCaster:
+def _vehicle_caster(around: Surroundings, present: TrafficObstacles) -> _VehicleCaster:
     """Make a caster of bodies that rounds as one of the scene and the bodies together would."""
-    everything = np.concatenate([static.triangles, present.triangles])
-    bodies = np.arange(len(everything)) >= len(static.triangles)
-    return _VehicleCaster(make_ray_caster(everything, engine_name(around.engine), bodies), present.hulls)
+    site = around.site
+    everything = np.concatenate([site.triangles, present.triangles])
+    bodies = np.arange(len(everything)) >= len(site.triangles)
+    reflectivity = np.concatenate([site.reflectivity, present.reflectivity])
+    return _VehicleCaster(make_ray_caster(everything, engine_name(around.engine), bodies), reflectivity, present.hulls)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +121,13 @@ class _BlockedRays:
     ----------
     ray : (k,) int64
     distance : (k,) float64, metres
-    points : (m, 3) float64, metres
-        Where those end that return.
+    returns : (k,) bool
+        Which of them return.
     """
 
     ray: Integer
     distance: Float
-    points: Float
+    returns: Boolean
 
 
 class _StaticScan:
@@ -150,6 +156,12 @@ class _StaticScan:
             self.counts[ray] = place.counting(self.model, directions, self.distance[ray], triangle)
 
     @property
+    def reach(self) -> float:
+        """How far off something of usual reflectivity is detected that faces the sensor, metres."""
+        detected = self.model.law.reach(DEFAULT_REFLECTIVITY, self.place.settings.detection)
+        return min(self.model.max_range, detected)
+
+    @property
     def rays(self) -> int:
         """Number of all rays."""
         return self.model.channels * self.model.azimuth_count
@@ -173,11 +185,6 @@ class _StaticScan:
         """Return the directions of rays, (n, 3)."""
         return self._pattern.directions(ray)
 
-    def returns(self) -> tuple[Integer, Float]:
-        """Return the rays that return on the empty road, ascending, and from where."""
-        ray = np.flatnonzero(self.counts)
-        return ray, self._ends(ray, self.distance[ray])
-
     def blocked_by(self, present: _VehicleCaster) -> _BlockedRays:
         """Cast at road users with the rays that pass their boxes, and keep what they stop before its end."""
         towards = np.zeros(self.rays, dtype=bool)
@@ -187,13 +194,8 @@ class _StaticScan:
         distance, triangle = present.caster.cast(self.place.origin, directions, self.model.max_range)
         sooner = distance < self.distance[ray]
         ray, distance = ray[sooner], distance[sooner]
-        bodies = replace(self.place, caster=present.caster)
-        returning = bodies.counting(self.model, directions[sooner], distance, triangle[sooner])
-        return _BlockedRays(ray, distance, self._ends(ray[returning], distance[returning]))
-
-    def _ends(self, ray: Integer, distance: Float) -> Float:
-        ends: Float = self.place.origin + distance[:, None] * self.directions(ray)
-        return ends
+        bodies = replace(self.place, caster=present.caster, reflectivity=present.reflectivity)
+        return _BlockedRays(ray, distance, bodies.counting(self.model, directions[sooner], distance, triangle[sooner]))
 
     @staticmethod
     def _in_parts(ray: Integer) -> list[Integer]:
@@ -208,25 +210,34 @@ class _LayerVisibility(Protocol):
 class _RoadVisibility:
     """Returns near targets; each is counted, so that those of stopped rays can be taken off."""
 
-    def __init__(self, static: _StaticScan, index: TargetIndex, targets: int) -> None:
-        self._index, self._targets = index, targets
-        returning, points = static.returns()
-        near = [index.pairs_within_delta(part) for part in np.array_split(points, max(1, len(points) // _RAYS_AT_ONCE))]
+    def __init__(self, static: _StaticScan, index: TargetIndex, surfaces: NearSurfaces) -> None:
+        self._static, self._index, self._surfaces, self._targets = static, index, surfaces, len(surfaces.xyz)
+        returning = np.flatnonzero(static.counts)
+        near = [
+            self._near(part, static.distance[part])
+            for part in np.array_split(returning, max(1, len(returning) // _RAYS_AT_ONCE))
+        ]
         self._target = np.concatenate([target for _, target in near]).astype(np.int32)
-        begins = np.cumsum([0, *(len(part) for part in np.array_split(points, len(near)))])
-        of = np.concatenate([first + point for first, (point, _) in zip(begins[:-1], near, strict=True)])
-        many = np.zeros(static.rays, dtype=np.int64)
-        many[returning] = np.bincount(of, minlength=len(returning))
+        many = np.bincount(np.concatenate([ray for ray, _ in near]), minlength=static.rays)
         self._first = np.concatenate([[0], np.cumsum(many)])
-        self._times = np.bincount(self._target, minlength=targets)
+        self._times = np.bincount(self._target, minlength=self._targets)
 
     def seen(self, stopped: _BlockedRays) -> Boolean:
         begin = self._first[stopped.ray]
         count = self._first[stopped.ray + 1] - begin
         lost = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
         seen: Boolean = self._times > np.bincount(self._target[lost], minlength=self._targets)
-        seen[self._index.within_delta(stopped.points)] = True
+        seen[self._near(stopped.ray[stopped.returns], stopped.distance[stopped.returns])[1]] = True
         return seen
+
+    def _near(self, ray: Integer, distance: Float) -> tuple[Integer, Integer]:
+        """Pair rays that return with the targets that they see, rays in their order."""
+        static, directions = self._static, self._static.directions(ray)
+        which, target = self._index.pairs_within_delta(static.place.origin + distance[:, None] * directions)
+        strong = static.place.counting_at_borders(
+            static.model, self._surfaces, directions[which], distance[which], target
+        )
+        return ray[which[strong]], target[strong]
 
 
 class _HeightVisibility:
@@ -234,7 +245,7 @@ class _HeightVisibility:
 
     def __init__(self, static: _StaticScan, points: Float) -> None:
         self._static, self._points = static, points
-        self._end = np.minimum(static.distance, static.model.max_range)
+        self._end = np.minimum(static.distance, static.reach)
         self._witness = static.nearest_to(points)
         self._seen = self._pass(self._witness, np.arange(len(points)))
         for point, ray in self._passing(np.flatnonzero(~self._seen)):

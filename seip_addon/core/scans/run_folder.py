@@ -230,7 +230,8 @@ def _frame_record(number: int, frame: Frame) -> Record:
 
 
 def _sensor_record(sensor: MountedSensor) -> Record:
-    model = {name: np.asarray(value).tolist() for name, value in _fields(sensor.model)}
+    law = {"model": sensor.model.law.model, **asdict(sensor.model.law)}
+    model = {name: np.asarray(value).tolist() for name, value in _fields(sensor.model)} | {"law": law}
     return {
         "label": sensor.label,
         "sensor": sensor.model.key,
@@ -246,4 +247,5 @@ def _fields(model: LidarModel) -> list[tuple[str, Any]]:
 
 def _parts(model: LidarModel) -> list[Any]:
     """Return the figures that scans follow from, not the words for people."""
-    return [value for name, value in _fields(model) if name not in {"name", "manufacturer", "source", "price_source"}]
+    unused = {"name", "manufacturer", "source", "price_source", "assumed"}
+    return [repr(value) if name == "law" else value for name, value in _fields(model) if name not in unused]

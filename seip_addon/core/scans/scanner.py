@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern, return_chance, return_intensity
+from ..lidar import BeamPattern, RangeEquation, return_chance, surface_deviation
 from ..visibility.ray_casting import RayCaster
 from .beam_culling import BeamWindows
 from .frame import STATIC_INSTANCE
@@ -153,11 +153,12 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class _Hits:
-    """Hits of rays; n of them."""
+    """Hits of rays; n of them, with the product of reflectivity and cosine, and the chance to return."""
 
     ray: Integer
     distance: Float
     reflected: Float
+    chance: Float
 
 
 class Scanner:
@@ -167,6 +168,8 @@ class Scanner:
     ----------
     ground : ReflectiveSurface
         All that stands still, in site axes.
+    seed : int
+        Of how surfaces deviate from their materials.
 
     Attributes
     ----------
@@ -178,8 +181,8 @@ class Scanner:
         How many scanners may scan at once to advantage.
     """
 
-    def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface) -> None:
-        self.sensor, self._model = sensor, sensor.model
+    def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface, seed: int) -> None:
+        self.sensor, self._model, self._seed = sensor, sensor.model, seed
         self._windows = BeamWindows(sensor.model)
         pattern = BeamPattern(sensor.model)
         self._steps, self.threads = sensor.model.azimuth_count, ground.caster.threads
@@ -187,13 +190,13 @@ class Scanner:
         self.directions: Float = pattern.directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
         self._distance = np.full(len(rays), np.inf)
-        reflected = np.zeros(len(rays))
+        self._intensity = np.zeros(len(rays))
+        self._chance = np.zeros(len(rays), dtype=np.float32)
         for begin in range(0, len(rays), _RAYS_AT_ONCE):
             part = slice(begin, begin + _RAYS_AT_ONCE)
             hits = self._cast(ground, sensor.xyz, self.directions[part], rays[part])
-            self._distance[hits.ray], reflected[hits.ray] = hits.distance, hits.reflected
-        self._intensity = return_intensity(self._model, self._distance, reflected)
-        self._chance = return_chance(sensor.model, self._distance, self._intensity).astype(np.float32)
+            self._distance[hits.ray], self._chance[hits.ray] = hits.distance, hits.chance
+            self._intensity[hits.ray] = self._model.law.intensity(hits.distance, hits.reflected)
         self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
 
     @property
@@ -209,20 +212,16 @@ class Scanner:
     def scan(self, traffic: MovingTraffic, users: int) -> Scan:
         """Return what the rays end on with traffic that is one of so many road users."""
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
-        reflected = np.empty(len(distance))
         instance = np.full(len(distance), STATIC_INSTANCE, dtype=np.int32)
         unoccluded = np.zeros(users, dtype=np.int64)
         for motion, hits in self._hits(traffic):
             unoccluded[motion.user] = self.in_range(hits.distance).sum()
             nearest = hits.distance < distance[hits.ray]
             ray = hits.ray[nearest]
-            distance[ray], reflected[ray] = hits.distance[nearest], hits.reflected[nearest]
+            distance[ray], chance[ray] = hits.distance[nearest], hits.chance[nearest]
+            intensity[ray] = self._model.law.intensity(hits.distance[nearest], hits.reflected[nearest])
             instance[ray] = motion.user
-        on_traffic = np.flatnonzero(instance != STATIC_INSTANCE)
-        far = distance[on_traffic]
-        intensity[on_traffic] = return_intensity(self._model, far, reflected[on_traffic])
-        chance[on_traffic] = return_chance(self._model, far, intensity[on_traffic])
-        visible = returns_by_user(instance[on_traffic[self.in_range(far)]], users)
+        visible = returns_by_user(instance[self.in_range(distance) & (instance != STATIC_INSTANCE)], users)
         return Scan(distance, intensity, chance, instance, unoccluded, visible)
 
     def in_range(self, distance: Float) -> Boolean:
@@ -256,12 +255,19 @@ class Scanner:
             directions = np.einsum("ni,nij->jn", directions, attitude)
         passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))
         start = origin[:, 0] if motion.is_still else origin[:, passing].T
-        return self._cast(shape, start, directions[:, passing].T, ray[passing])
+        return self._cast(shape, start, directions[:, passing].T, ray[passing], motion.user + 1)
 
-    def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer) -> _Hits:
+    def _cast(self, surface: ReflectiveSurface, origin: Float, directions: Float, ray: Integer, of: int = 0) -> _Hits:
+        """Cast rays at a surface in its axes; ``of`` is 0 for what stands still, else a road user's number and 1."""
         distance, triangle = surface.caster.cast(origin, directions, self._model.max_range)
         hit = np.flatnonzero(triangle >= 0)
-        return _Hits(ray[hit], distance[hit], surface.reflected(directions[hit], triangle[hit]))
+        distance, directions = distance[hit], directions[hit]
+        reflected = surface.reflected(directions, triangle[hit])
+        deviation = None
+        if isinstance(self._model.law, RangeEquation):
+            start = origin if origin.ndim == 1 else origin[hit]
+            deviation = surface_deviation(start + distance[:, None] * directions, (self._seed, of))
+        return _Hits(ray[hit], distance, reflected, return_chance(self._model, distance, reflected, deviation))
 
 
 def returns_by_user(instance: NDArray[np.int32], users: int) -> Integer:

@@ -179,7 +179,7 @@ def prepare(
     scanners = []
     for number, sensor in enumerate(sensors):
         yield Progress(number, len(sensors), "what stands still")
-        scanners.append(Scanner(sensor, ground))
+        scanners.append(Scanner(sensor, ground, settings.seed))
     yield Progress(len(sensors), len(sensors), "what stands still")
     return Simulation(static, scanners, trajectories, shapes, settings)
 

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float
 from ..site.far_objects import without_far_objects
-from ..site.scene_geometry import DEFAULT_REFLECTIVITY, SceneGeometry, joined
+from ..site.scene_geometry import SceneGeometry, ordered_surfaces
 from .sensor import MountedSensor
 
 
@@ -52,11 +52,5 @@ def static_scene(geometry: SceneGeometry, sensors: Sequence[MountedSensor] = ())
     if sensors:
         places = shapely.MultiPoint([sensor.xyz[:2] for sensor in sensors])
         geometry, warnings = without_far_objects(geometry, places, max(s.model.max_range for s in sensors))
-    meshes = (*geometry.roads, *geometry.ground, *geometry.occluders)
-    given = [
-        np.full(len(mesh.triangles), DEFAULT_REFLECTIVITY) if mesh.reflectivity is None else mesh.reflectivity
-        for mesh in meshes
-    ]
-    triangles, reflectivity = joined(meshes), np.concatenate([np.empty(0), *given])
-    order = np.lexsort([reflectivity, *triangles.reshape(len(triangles), 9).T[::-1]])
-    return StaticScene(triangles[order], reflectivity[order], geometry.region, warnings)
+    surfaces = ordered_surfaces((*geometry.roads, *geometry.ground, *geometry.occluders))
+    return StaticScene(*surfaces, geometry.region, warnings)

@@ -45,6 +45,23 @@ def joined(meshes: Sequence[Mesh]) -> Float:
     return np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
 
 
+def ordered_surfaces(meshes: Sequence[Mesh]) -> tuple[Float, Float]:
+    """Return the triangles of all meshes and the reflectivity of each, in an order that no order of meshes changes.
+
+    Returns
+    -------
+    triangles : (n, 3, 3) float64, metres
+    reflectivity : (n,) float64, 0 to 1
+    """
+    given = [
+        np.full(len(mesh.triangles), DEFAULT_REFLECTIVITY) if mesh.reflectivity is None else mesh.reflectivity
+        for mesh in meshes
+    ]
+    triangles, reflectivity = joined(meshes), np.concatenate([np.empty(0), *given])
+    order = np.lexsort([reflectivity, *triangles.reshape(len(triangles), 9).T[::-1]])
+    return triangles[order], reflectivity[order]
+
+
 @dataclass(frozen=True, eq=False)
 class Pole:
     """A post that can carry a sensor.

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
-from .scene_geometry import SceneGeometry, joined
+from .scene_geometry import SceneGeometry, joined, ordered_surfaces
 from .targets import Targets, generate_targets
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]
@@ -32,6 +31,8 @@ class Site:
         Region of interest in plan, local.
     triangles : (n, 3, 3) float64, metres
         All static surfaces that a ray which counts can end on, roads included.
+    reflectivity : (n,) float64, 0 to 1
+        Of each.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Site:
     targets: Targets
     candidates: Candidates
     triangles: Float
+    reflectivity: Float
 
 
 def make_site(
@@ -68,19 +70,13 @@ def make_site(
         raise SeipError("there is no road: put the meshes of the carriageway into SEIP Roads")
     road = joined(geometry.roads)
     near, _ = without_far_objects(geometry, geometry.region, reach)
-    everything = joined((*near.roads, *near.ground, *near.occluders))
+    triangles, reflectivity = ordered_surfaces((*near.roads, *near.ground, *near.occluders))
     return Site(
         name=geometry.name,
         origin=geometry.origin,
         region=geometry.region,
         targets=generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions),
         candidates=generate_candidates(geometry, settings),
-        triangles=_in_order(everything),
+        triangles=triangles,
+        reflectivity=reflectivity,
     )
-
-
-def _in_order(triangles: Float) -> Float:
-    """Triangles sorted by their coordinates, so that the order of objects leaves no trace."""
-    order = np.lexsort(triangles.reshape(len(triangles), 9).T[::-1])
-    ordered: Float = triangles[order]
-    return ordered

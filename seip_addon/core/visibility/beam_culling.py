@@ -35,7 +35,9 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..lidar import LidarModel
+from ..lidar.model import DetectionLaw
 from .near_surfaces import NearSurfaces
+from .settings import VisibilitySettings
 
 _MARGIN = 1e-9  # radians; a ray too many costs a cast, a ray too few a wrong grid
 
@@ -74,12 +76,14 @@ class Planes:
     normal : (p, 3) float64
         Unit normals, which point away from the place.
     distance : (p,) float64, metres
+    reflectivity : (p,) float64, 0 to 1
     tolerance : float, metres
         How far returns may lie off their plane.
     """
 
     normal: Float
     distance: Float
+    reflectivity: Float
     tolerance: float
 
 
@@ -101,6 +105,8 @@ class Beams:
     min_range, max_range : (c,) float64, metres
     rays : int
         How many numbers there are.
+    least : tuple of (law, float)
+        Of each sensor, by which law how strong a return must be; see `VisibilitySettings.least_strength`.
     """
 
     sensor: Integer
@@ -111,9 +117,10 @@ class Beams:
     min_range: Float
     max_range: Float
     rays: int
+    least: tuple[tuple[DetectionLaw, float], ...]
 
     @classmethod
-    def of(cls, models: Sequence[LidarModel], yaw: float) -> Beams:
+    def of(cls, models: Sequence[LidarModel], yaw: float, settings: VisibilitySettings) -> Beams:
         """Join the channels of models that look along the same yaw.
 
         Channels coincide whose elevation, azimuth offset and number of steps are the same.
@@ -133,7 +140,23 @@ class Beams:
             min_range=np.repeat([model.min_range for model in models], channels),
             max_range=np.repeat([model.max_range for model in models], channels),
             rays=int(end[-1]),
+            least=tuple((model.law, settings.least_strength(model)) for model in models),
         )
+
+    def reach(self, sensor: int, planes: Planes) -> Float:
+        r"""Return how far a sensor's returns off planes can be to count, (p,) float64, metres.
+
+        Of a plane at the distance k, a return at the distance d lies off it by the tolerance ε at most. A ray that
+        meets the plane at r has the cosine k / r, so that d differs from r by a share x = ε / k at most.
+        """
+        law, least = self.least[sensor]
+        if least == 0:
+            return np.full(len(planes.distance), np.inf)
+        share = planes.tolerance / np.maximum(planes.distance, planes.tolerance)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slack = (1 + share) / (1 - share) * (1 + _MARGIN)
+            far = law.farthest_on_planes(planes.reflectivity, planes.distance, least) * slack
+        return np.where(np.isnan(far), np.inf, far)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,12 +224,33 @@ class NearRays:
         return replace(halves, first=first, width=width), parent
 
 
-def target_patches(origin: Float, surfaces: NearSurfaces) -> Patches:
-    """Return the patches of targets as seen from a place, given as (3,) float64 in metres."""
-    azimuth, distance = _polar(surfaces.xyz - origin)
+def may_return(origin: Float, surfaces: NearSurfaces, beams: Beams) -> Boolean:
+    """Return of which targets returns can be strong enough for a sensor, (models, t) bool: for few others.
+
+    Parameters
+    ----------
+    origin : (3,) float64, metres
+    beams : Beams
+        Of the sensors there.
+    """
+    may = np.zeros((len(beams.least), len(surfaces.xyz)), dtype=bool)
+    if not any(least > 0 for _, least in beams.least):
+        return ~may
+    patches, planes = disc_patches(origin, surfaces, np.ones(len(surfaces.xyz), dtype=bool))
+    nearest = patches.distance - patches.radius
+    for sensor in range(len(beams.least)):
+        may[sensor, patches.target[nearest <= beams.reach(sensor, planes)]] = True
+    return may
+
+
+def target_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> Patches:
+    """Return the patches of wanted targets as seen from a place; see `disc_patches`."""
+    target = np.flatnonzero(wanted)
+    azimuth, distance = _polar(surfaces.xyz[target] - origin)
     radius = np.full(len(distance), surfaces.radius)
-    everyone = np.arange(len(distance))
-    return Patches(everyone, azimuth, distance, radius, surfaces.low - origin[2], surfaces.high - origin[2])
+    return Patches(
+        target, azimuth, distance, radius, surfaces.low[target] - origin[2], surfaces.high[target] - origin[2]
+    )
 
 
 def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tuple[Patches, Planes]:
@@ -225,7 +269,7 @@ def disc_patches(origin: Float, surfaces: NearSurfaces, wanted: Boolean) -> tupl
     azimuth, distance = _polar(centre)
     bottom, top = discs.low[pick] - origin[2], discs.high[pick] - origin[2]
     patches = Patches(discs.target[pick], azimuth, distance, discs.radius[pick] + surfaces.tolerance, bottom, top)
-    return patches, Planes(normal, np.abs(away), surfaces.tolerance)
+    return patches, Planes(normal, np.abs(away), discs.reflectivity[pick], surfaces.tolerance)
 
 
 def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> NearRays:
@@ -245,7 +289,7 @@ def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> N
     """
     arcs = _arcs(beams, patches)
     if planes is not None:
-        arcs = _cut_by_planes(arcs, planes)
+        arcs = _cut_by_planes(_cut_by_strength(arcs, beams, planes), planes)
     step = 2 * math.pi / beams.steps[arcs.channel]
     azimuth = arcs.azimuth - beams.zero[arcs.channel]
     first = np.ceil((azimuth - arcs.half_width) / step).astype(np.int64)
@@ -301,7 +345,7 @@ def _channels_at(beams: Beams, patches: Patches) -> tuple[Integer, Integer]:
     low = np.searchsorted(slopes, least)
     count = np.searchsorted(slopes, most, side="right") - low
     count = np.where((patches.bottom <= patches.top) & (near <= beams.max_range.max()), np.maximum(count, 0), 0)
-    return np.repeat(np.arange(len(count)), count), order[_counted(low, count)]
+    return np.repeat(np.arange(len(count)), count), order[counted(low, count)]
 
 
 def _between_heights(slope: Float, bottom: Float, top: Float) -> tuple[Float, Float]:
@@ -319,6 +363,17 @@ def _half_width(distance: Float, begin: Float, end: Float, radius: Float) -> Flo
     with np.errstate(divide="ignore", invalid="ignore"):
         cosine = (distance**2 + widest**2 - radius**2) / (2 * distance * widest)
     return np.where(outside, np.arccos(np.clip(np.where(outside, cosine, 0.0), -1, 1)), math.pi) + _MARGIN
+
+
+def _cut_by_strength(arcs: _Arcs, beams: Beams, planes: Planes) -> _Arcs:
+    """Leave of each arc what is near enough for a return to be strong enough."""
+    sensor = beams.sensor[arcs.channel]
+    end = arcs.end
+    for number, (_, least) in enumerate(beams.least):
+        if least > 0:
+            reach = beams.reach(number, planes)[arcs.patch] / np.hypot(1.0, arcs.slope)
+            end = np.where(sensor == number, np.minimum(end, reach), end)
+    return arcs if end is arcs.end else replace(arcs, end=end).pick(arcs.begin <= end)
 
 
 def _cut_by_planes(arcs: _Arcs, planes: Planes) -> _Arcs:
@@ -353,7 +408,7 @@ def _polar(xyz: Float) -> tuple[Float, Float]:
     return np.arctan2(xyz[:, 1], xyz[:, 0]), np.hypot(xyz[:, 0], xyz[:, 1])
 
 
-def _counted(first: Integer, count: Integer) -> Integer:
+def counted(first: Integer, count: Integer) -> Integer:
     """Return first, first + 1, … for each pair of a first number and a count, one after the other."""
     numbers: Integer = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
     return numbers

@@ -27,6 +27,7 @@ from ..storage.files import digest
 from ..storage.source_digest import source_digest
 from .chunks import Checkpoint, chunks_of, compute_chunks
 from .executors import VisibilityTask, dask_executor, thread_executor
+from .near_surfaces import near_surfaces
 from .ray_casting import Engine, RayCaster, engine_name
 from .scanning import ScanPosition
 from .settings import VisibilitySettings
@@ -56,7 +57,7 @@ class VisibilityGrid:
     key : str
         Digest of all inputs; see `visibility_key`.
     parameters : dict
-        Provenance, for information: delta, min_intensity, engine, sensors, numbers of rays and triangles.
+        Provenance, for information: delta, min_intensity, detection, engine, sensors, numbers of rays and triangles.
     """
 
     packed: NDArray[np.uint8]
@@ -121,11 +122,15 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
     used = _used_models(site, models)
     model_index = np.array([list(used).index(key) for key in site.candidates.sensor], dtype=np.int64)
     inputs: list[NDArray[Any] | str | float] = [FILE.schema, source_digest(__name__), engine]
-    inputs += [float(settings.delta), float(settings.min_intensity)]
+    strengths = {model.key: settings.least_strength(model) for model in used.values()}
+    inputs.append(float(settings.delta))
+    inputs += [str((least, repr(used[key].law) if least > 0 else "")) for key, least in strengths.items()]
+    if any(strengths.values()):
+        inputs.append(site.reflectivity)
     inputs += [site.triangles, site.targets.xyz, site.candidates.xyz, site.candidates.yaw, model_index]
     for model in used.values():
         inputs += [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
-        inputs += [float(model.min_range), float(model.max_range), float(model.attenuation)]
+        inputs += [float(model.min_range), float(model.max_range)]
     if site.candidates.tilt.any():
         inputs.append(site.candidates.tilt)
     return digest(*inputs)
@@ -192,11 +197,13 @@ def full_scan_visibility(
     used = _used_models(site, models)
     _check_site(site)
     poses, targets = site.candidates, site.targets.xyz
+    surfaces = near_surfaces(site.triangles, targets, settings.delta, site.reflectivity)
     packed = np.zeros((len(poses), (len(targets) + 7) // 8), dtype=np.uint8)
     for pose, key in enumerate(poses.sensor.tolist()):
         yield Progress(pose, len(poses), "full scan")
-        position = ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [used[key]], settings)
-        packed[pose] = np.packbits(seen_by_tilted_full_scan(position, float(poses.tilt[pose]), targets)[0])
+        origin, yaw = poses.xyz[pose], float(poses.yaw[pose])
+        position = ScanPosition(caster, origin, yaw, [used[key]], settings, site.reflectivity)
+        packed[pose] = np.packbits(seen_by_tilted_full_scan(position, float(poses.tilt[pose]), surfaces)[0])
     yield Progress(len(poses), len(poses), "full scan")
     return _grid(site, used, settings, caster.name, packed, {"rays_cast": _rays_of_full_scan(site, used)})
 

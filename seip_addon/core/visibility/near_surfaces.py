@@ -15,8 +15,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import shapely
 
-from ..arrays import Float, Integer
+from ..arrays import Boolean, Float, Integer
 from ..geometry.orientation import rotated
+from ..site.scene_geometry import DEFAULT_REFLECTIVITY
 
 _TARGETS_AT_ONCE = 2048  # bounds the memory of the pairs of targets and triangles
 
@@ -39,6 +40,8 @@ class Cuts:
     middle : (k, 3) float64, metres
         Of the disc.
     radius : (k,) float64, metres
+    reflectivity : (k,) float64, 0 to 1
+        Of the triangle.
     """
 
     target: Integer
@@ -46,6 +49,20 @@ class Cuts:
     normal: Float
     middle: Float
     radius: Float
+    reflectivity: Float
+
+    def pick(self, which: Integer) -> Cuts:
+        """Return some of the cuts."""
+        return Cuts(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def holds(self, points: Float, margin: float) -> Boolean:
+        """Return which points (k, 3) lie on their triangle, but for a margin in metres; (k,) bool."""
+        there: Boolean = np.abs(((points - self.corners[:, 0]) * self.normal).sum(axis=1)) <= margin
+        for side in range(3):
+            edge = self.corners[:, (side + 1) % 3] - self.corners[:, side]
+            outward = np.cross(edge, self.normal)
+            there &= ((points - self.corners[:, side]) * outward).sum(axis=1) <= margin * np.linalg.norm(edge, axis=1)
+        return there
 
     def bounds(self, tolerance: float) -> Discs:
         """Bound in plan and in height what lies both in the disc and in the triangle."""
@@ -70,6 +87,7 @@ class Cuts:
             radius=radius[both],
             low=low[both],
             high=high[both],
+            reflectivity=self.reflectivity[both],
             cuts=self,
         )
 
@@ -90,6 +108,7 @@ class Discs:
         In plan.
     low, high : (k,) float64, metres
         Heights between which the triangle and the disc both lie.
+    reflectivity : (k,) float64, 0 to 1
     cuts : Cuts
         What they are about.
     """
@@ -100,6 +119,7 @@ class Discs:
     radius: Float
     low: Float
     high: Float
+    reflectivity: Float
     cuts: Cuts
 
 
@@ -129,7 +149,9 @@ class NearSurfaces:
     tolerance: float
 
 
-def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurfaces:
+def near_surfaces(
+    triangles: Float, targets: Float, delta: float, reflectivity: Float | float = DEFAULT_REFLECTIVITY
+) -> NearSurfaces:
     """Find the surfaces near targets.
 
     Parameters
@@ -137,11 +159,14 @@ def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurface
     triangles : (n, 3, 3) float64, metres
     targets : (t, 3) float64, metres
     delta : float, metres
+    reflectivity : (n,) float64 or float, 0 to 1
+        Of the triangles.
 
     Returns
     -------
     NearSurfaces
     """
+    reflects = np.broadcast_to(np.asarray(reflectivity, dtype=np.float64), len(triangles))
     tolerance = caster_tolerance(triangles)
     radius = delta + tolerance
     in_plan = shapely.STRtree(shapely.box(*triangles[:, :, :2].min(axis=1).T, *triangles[:, :, :2].max(axis=1).T))
@@ -151,7 +176,7 @@ def near_surfaces(triangles: Float, targets: Float, delta: float) -> NearSurface
         near, triangle = in_plan.query(shapely.box(*(xy - radius).T, *(xy + radius).T))
         order = np.argsort(near, kind="stable")
         target = near[order] + begin
-        parts.append(_cut(triangles[triangle[order]], targets[target], target, radius))
+        parts.append(_cut(triangles[triangle[order]], targets[target], target, radius, reflects[triangle[order]]))
     cuts = Cuts(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Cuts)))
     return _about(targets, radius, cuts.bounds(tolerance), tolerance)
 
@@ -197,7 +222,7 @@ def caster_tolerance(triangles: Float) -> float:
     return max(_MIN_TOLERANCE, _FLOAT32_ROUNDINGS * float(np.finfo(np.float32).eps) * extent)
 
 
-def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Cuts:
+def _cut(corners: Float, centre: Float, target: Integer, ball: float, reflectivity: Float) -> Cuts:
     """Cut triangles with balls, pair by pair. Pairs that just miss each other near a corner may be among them."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
@@ -210,4 +235,4 @@ def _cut(corners: Float, centre: Float, target: Integer, ball: float) -> Cuts:
         outward = np.cross(edge, normal)
         meets &= ((centre - corners[:, side]) * outward).sum(axis=1) <= disc * np.linalg.norm(edge, axis=1)
     middle = centre - above[:, None] * normal
-    return Cuts(*(part[meets] for part in (target, corners, normal, middle, disc)))
+    return Cuts(*(part[meets] for part in (target, corners, normal, middle, disc, reflectivity)))

@@ -1,6 +1,7 @@
 """Scans of the sensors at one position, full or lazy.
 
-A target is seen if some return of the scan lies nearer than δ to it. So
+A target is seen if some return of the scan lies nearer than δ to it, and is strong enough. Where surfaces meet within
+the tolerance of the ray caster, the return of each of them must be: which of them stopped the ray is chance. So
 
 1. only rays are cast that can return from near a target (`beam_culling`);
 2. of these first, for each sensor and target, the one that should end nearest to it;
@@ -20,8 +21,8 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..lidar import BeamPattern, LidarModel, return_intensity
-from .beam_culling import Beams, NearRays, disc_patches, near_rays, target_patches
+from ..lidar import BeamPattern, LidarModel
+from .beam_culling import Beams, NearRays, counted, disc_patches, may_return, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
 from .settings import VisibilitySettings
@@ -58,6 +59,8 @@ class ScanPosition:
     yaw : float, radians
     models : sequence of LidarModel
         Whose scans from here are wanted.
+    reflectivity : (n,) float64, 0 to 1
+        Of the caster's triangles.
     """
 
     caster: Caster
@@ -65,16 +68,50 @@ class ScanPosition:
     yaw: float
     models: Sequence[LidarModel]
     settings: VisibilitySettings
+    reflectivity: Float
 
     def counting(self, model: LidarModel, directions: Float, distance: Float, triangle: Integer) -> Boolean:
         """Return which of a sensor's hits count as returns: within its range and strong enough, (n,) bool."""
         counts = (distance >= model.min_range) & (distance <= model.max_range)
-        if self.settings.min_intensity > 0:
-            corners = self.caster.triangles[triangle[counts]]
+        least = self.settings.least_strength(model)
+        if least > 0:
+            met = triangle[counts]
+            corners = self.caster.triangles[met]
             normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            cos_incidence = (normal * directions[counts]).sum(axis=1) / np.linalg.norm(normal, axis=1)
-            counts[counts] = return_intensity(model, distance[counts], cos_incidence) >= self.settings.min_intensity
+            normal /= np.linalg.norm(normal, axis=1)[:, None]
+            reflected = self.reflectivity[met] * np.abs((normal * directions[counts]).sum(axis=1))
+            counts[counts] = model.law.strength(distance[counts], reflected) >= least
         return counts
+
+    def counting_at_borders(
+        self, model: LidarModel, surfaces: NearSurfaces, directions: Float, distance: Float, target: Integer
+    ) -> Boolean:
+        """Return which of a sensor's returns from near targets are strong enough off every surface that meets there.
+
+        Parameters
+        ----------
+        surfaces : NearSurfaces
+            About the targets.
+        directions, distance : (n, 3) and (n,) float64
+            Of rays that return, each from nearer than δ to its target.
+        target : (n,) int64
+
+        Returns
+        -------
+        (n,) bool
+        """
+        least, cuts = self.settings.least_strength(model), surfaces.discs.cuts
+        strong = np.ones(len(target), dtype=bool)
+        if least == 0:
+            return strong
+        first = np.searchsorted(cuts.target, target)
+        count = np.searchsorted(cuts.target, target, side="right") - first
+        ray, cut = np.repeat(np.arange(len(target)), count), counted(first, count)
+        there = cuts.pick(cut).holds((self.origin + distance[:, None] * directions)[ray], surfaces.tolerance)
+        ray, cut = ray[there], cut[there]
+        reflected = cuts.reflectivity[cut] * np.abs((cuts.normal[cut] * directions[ray]).sum(axis=1))
+        strong[ray[model.law.strength(distance[ray], reflected) < least]] = False
+        return strong
 
 
 def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
@@ -92,12 +129,14 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     cast : int
         Number of rays.
     """
-    beams = Beams.of(position.models, position.yaw)
-    returns = _Returns(position, beams)
+    beams = Beams.of(position.models, position.yaw, position.settings)
+    returns = _Returns(position, beams, surfaces)
     seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
 
-    first = near_rays(beams, target_patches(position.origin, surfaces)).likeliest(beams.sensor)
-    sees, triangle = returns.see(first, surfaces.xyz)
+    hopeful = may_return(position.origin, surfaces, beams)
+    first = near_rays(beams, target_patches(position.origin, surfaces, hopeful.any(axis=0)))
+    first = first.pick(hopeful[beams.sensor[first.channel], first.target]).likeliest(beams.sensor)
+    sees, triangle = returns.see(first)
     seen[beams.sensor[first.channel], first.target] = sees
     unseen = np.zeros(len(surfaces.xyz), dtype=bool)
     unseen[first.target[~sees]] = True
@@ -107,14 +146,15 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     # every round keeps, beside each bundle, the triangle that stopped the last ray cast for it
     patches, planes = disc_patches(position.origin, surfaces, unseen)
     bundles = near_rays(beams, patches, planes)
-    bundles = bundles.pick(np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target]))
+    open_still = hopeful & ~seen
+    bundles = bundles.pick(np.flatnonzero(open_still[beams.sensor[bundles.channel], bundles.target]))
     triangle = blocker[beams.sensor[bundles.channel], bundles.target]
     while len(bundles):
         stopped = (triangle >= 0) & (bundles.width > 1)  # a single ray is cast as quickly as it is proven stopped
         corners = position.caster.triangles[triangle[stopped]]
         stopped[stopped] = stopped_by(position.origin, corners, beams, bundles.pick(stopped), planes)
         bundles = bundles.pick(~stopped)
-        sees, triangle = returns.see(bundles, surfaces.xyz)
+        sees, triangle = returns.see(bundles)
         seen[beams.sensor[bundles.channel[sees]], bundles.target[sees]] = True
         unseen = np.flatnonzero(~seen[beams.sensor[bundles.channel], bundles.target])
         bundles, part_of = bundles.pick(unseen).beside_middle()
@@ -122,10 +162,10 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     return seen, returns.cast
 
 
-def seen_by_all_rays(position: ScanPosition, targets: Float) -> tuple[Boolean, int]:
+def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
     """Find which targets are seen by casting every ray of every sensor: the reference."""
-    index = TargetIndex(targets, position.settings.delta)
-    seen = np.zeros((len(position.models), len(targets)), dtype=bool)
+    index = TargetIndex(surfaces.xyz, position.settings.delta)
+    seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
     cast = 0
     for number, model in enumerate(position.models):
         pattern = BeamPattern(model, position.yaw)
@@ -134,8 +174,10 @@ def seen_by_all_rays(position: ScanPosition, targets: Float) -> tuple[Boolean, i
             directions = pattern.directions(np.arange(begin, min(begin + _RAYS_AT_ONCE, total)))
             distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
             counts = position.counting(model, directions, distance, triangle)
-            points = _points(position.origin, directions[counts], distance[counts])
-            seen[number, index.within_delta(points)] = True
+            directions, distance = directions[counts], distance[counts]
+            ray, target = index.pairs_within_delta(_points(position.origin, directions, distance))
+            strong = position.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
+            seen[number, target[strong]] = True
         cast += total
     return seen, cast
 
@@ -149,8 +191,8 @@ class _Returns:
         Of the position.
     """
 
-    def __init__(self, position: ScanPosition, beams: Beams) -> None:
-        self._position, self._beams = position, beams
+    def __init__(self, position: ScanPosition, beams: Beams, surfaces: NearSurfaces) -> None:
+        self._position, self._beams, self._surfaces = position, beams, surfaces
         self._patterns = [BeamPattern(model, position.yaw) for model in position.models]
         self._first_channel = np.searchsorted(beams.sensor, np.arange(len(position.models)))
         self._reach = max(model.max_range for model in position.models)
@@ -165,12 +207,8 @@ class _Returns:
         """Number of rays that have been cast."""
         return len(self._distance) - 1
 
-    def see(self, bundles: NearRays, targets: Float) -> tuple[Boolean, Integer]:
-        """Tell which bundles' middle rays return from nearer than δ to their targets.
-
-        Parameters
-        ----------
-        targets : (t, 3) float64, metres
+    def see(self, bundles: NearRays) -> tuple[Boolean, Integer]:
+        """Tell which bundles' middle rays return from nearer than δ to their targets, strongly enough.
 
         Returns
         -------
@@ -179,13 +217,17 @@ class _Returns:
             That stops the ray; -1 for none.
         """
         row = self._rows(bundles.channel, bundles.middle % self._beams.steps[bundles.channel])
-        gap = self._point[row] - targets[bundles.target]
+        gap = self._point[row] - self._surfaces.xyz[bundles.target]
         sees = gap[:, 0] ** 2 + gap[:, 1] ** 2 + gap[:, 2] ** 2 < self._position.settings.delta**2
         triangle = self._triangle[row]
         near = np.flatnonzero(sees)
         for number, model in enumerate(self._position.models):
             own = near[self._beams.sensor[bundles.channel[near]] == number]
-            counts = self._position.counting(model, self._direction[row[own]], self._distance[row[own]], triangle[own])
+            directions, distance = self._direction[row[own]], self._distance[row[own]]
+            counts = self._position.counting(model, directions, distance, triangle[own])
+            counts[counts] = self._position.counting_at_borders(
+                model, self._surfaces, directions[counts], distance[counts], bundles.target[own[counts]]
+            )
             sees[own] = counts
         return sees, triangle
 

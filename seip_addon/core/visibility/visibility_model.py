@@ -18,7 +18,7 @@ from ..geometry.orientation import orientation as orientation_of
 from ..geometry.orientation import rotated
 from ..lidar import LidarModel
 from ..site.site import Site
-from .near_surfaces import near_surfaces, rotated_surfaces
+from .near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
 from .ray_casting import Engine, RayCaster, engine_name, make_ray_caster
 from .scanning import Caster, ScanPosition, seen_by_all_rays, seen_by_near_rays
 from .settings import VisibilitySettings
@@ -39,8 +39,8 @@ class VisibilityModel:
     """
 
     def __init__(self, site: Site, settings: VisibilitySettings, caster: RayCaster) -> None:
-        self._caster, self._settings = caster, settings
-        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta)
+        self._caster, self._settings, self._reflectivity = caster, settings, site.reflectivity
+        self._surfaces = near_surfaces(site.triangles, site.targets.xyz, settings.delta, site.reflectivity)
 
     @property
     def targets(self) -> int:
@@ -78,7 +78,7 @@ class VisibilityModel:
         return seen_by_near_rays(self._position(models, xyz, yaw), self._surfaces)
 
     def _position(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> ScanPosition:
-        return ScanPosition(self._caster, xyz, yaw, models, self._settings)
+        return ScanPosition(self._caster, xyz, yaw, models, self._settings, self._reflectivity)
 
 
 def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = "auto") -> VisibilityModel:
@@ -86,14 +86,15 @@ def visibility_model(site: Site, settings: VisibilitySettings, engine: Engine = 
     return VisibilityModel(site, settings, make_ray_caster(site.triangles, engine_name(engine)))
 
 
-def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, targets: Float) -> tuple[Boolean, int]:
+def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: NearSurfaces) -> tuple[Boolean, int]:
     """Find which targets sensors see that are tilted by an angle (radians), by casting every ray: the reference."""
     if tilt == 0:
-        return seen_by_all_rays(position, targets)
+        return seen_by_all_rays(position, surfaces)
     orientation = orientation_of(position.yaw, tilt)
     if _is_upright(orientation):
-        return seen_by_all_rays(replace(position, yaw=_yaw(orientation)), targets)
-    return seen_by_all_rays(_in_sensor_axes(position, orientation), rotated(targets - position.origin, orientation.T))
+        return seen_by_all_rays(replace(position, yaw=_yaw(orientation)), surfaces)
+    turned = rotated_surfaces(surfaces, position.origin, orientation)
+    return seen_by_all_rays(_in_sensor_axes(position, orientation), turned)
 
 
 def _is_upright(orientation: Float) -> bool:

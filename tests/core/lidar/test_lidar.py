@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +14,14 @@ from hypothesis import strategies as st
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import (
     BeamPattern,
+    CarlaDropoff,
     LidarModel,
+    RangeEquation,
     beam_directions,
     find_models,
     load_catalogue,
     measured_returns,
     return_chance,
-    return_intensity,
 )
 
 CATALOGUE = load_catalogue()
@@ -110,6 +112,21 @@ def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
     assert load_catalogue([tmp_path / "own.toml"])["type1"].name == "Mine"
 
 
+def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_path: Path) -> None:
+    def law_of(**changes: str) -> tuple[object, str]:
+        mine = load_catalogue([write_model(tmp_path / "mine.toml", **changes)])["mine"]
+        return mine.law, mine.assumed
+
+    published = law_of(detection_range_m="[20.0, 50.0]", detection_probability="0.8")
+    assert published == (RangeEquation.of_ranges(20.0, 50.0, 0.8), "")
+    assert law_of(detection_law="[-11.0, 1.1, 0.99]") == (RangeEquation(-11.0, 1.1, 0.99), "")
+    law, assumed = law_of()
+    assert assumed.startswith("its longest range, 50 m, is taken to be that at 80 % reflectivity")
+    assert isinstance(law, RangeEquation)
+    assert law.reach(0.8, 0.9) == pytest.approx(50.0)
+    assert law_of(dropoff_general_rate="0.1") == (CarlaDropoff(general=0.1), "")  # as before there was another law
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -143,6 +160,19 @@ def test_a_file_of_the_users_adds_and_replaces(tmp_path: Path) -> None:
         ({"dropoff_general_rate": "1.5"}, "drop-off"),
         ({"dropoff_zero_intensity": "-1"}, "drop-off"),
         ({"dropoff_intensity_limit": "0"}, "drop-off"),
+        ({"model": '"optics"'}, "model must be one of 'range equation', 'carla', not 'optics'"),
+        ({"model": '"carla"', "detection_range_m": "[9.0, 20.0]"}, 'no figure of the model "carla"'),
+        ({"model": '"range equation"', "attenuation_per_m": "0.1"}, 'no figure of the model "range equation"'),
+        ({"detection_range_m": "[9.0, 20.0]", "dropoff_general_rate": "0.1"}, 'no figure of the model "carla"'),
+        ({"detection_range_m": "[20.0, 9.0]"}, "the range at 80 % reflectivity"),
+        ({"detection_range_m": "[9.0]"}, "2 numbers"),
+        ({"detection_probability": "0.999"}, "a probability of detection"),
+        ({"detection_law": "[-11.0, 0.9]"}, "3 numbers"),
+        ({"detection_law": "[-11.0, 0.0, 0.9]"}, "the spread of detection"),
+        ({"detection_law": "[-11.0, 0.9, 1.1]"}, "the ceiling of detection"),
+        ({"detection_law": "[nan, 0.9, 0.9]"}, "the threshold of detection"),
+        ({"detection_law": "[-11.0, 0.9, 0.9]", "detection_probability": "0.5"}, "either detection_law"),
+        ({"range_noise_growth_per_m": "-1"}, "growth of the range noise"),
     ],
 )
 def test_each_fault_of_a_model_has_its_sentence(tmp_path: Path, changes: dict[str, str | None], words: str) -> None:
@@ -173,13 +203,12 @@ def test_an_unknown_sensor_names_close_ones() -> None:
 
 
 def test_intensity_falls_with_range_and_incidence() -> None:
-    model = CATALOGUE["type1"]
-    intensity = return_intensity(model, np.array([0.0, 100.0, 50.0, np.inf]), np.array([1.0, 1.0, -0.5, 1.0]))
-    np.testing.assert_allclose(intensity, [1, math.exp(-0.4), 0.5 * math.exp(-0.2), 0])
-    assert return_intensity(model, np.zeros(1), np.ones(1), reflectivity=0.1)[0] == pytest.approx(0.1)
+    law = CATALOGUE["type1"].law
+    intensity = law.intensity(np.array([0.0, 100.0, 50.0]), np.array([1.0, 1.0, 0.5]))
+    np.testing.assert_allclose(intensity, [1, math.exp(-0.4), 0.5 * math.exp(-0.2)])
 
 
-def sensor(**changes: float) -> LidarModel:
+def sensor(**changes: Any) -> LidarModel:
     return LidarModel(
         key="test",
         name="Test",
@@ -196,7 +225,8 @@ def sensor(**changes: float) -> LidarModel:
 
 
 def test_noise_and_drop_off_have_their_rates() -> None:
-    model = sensor(dropoff_general=0.25, dropoff_zero_intensity=0.4, dropoff_intensity_limit=0.8, range_noise_std=0.05)
+    law = CarlaDropoff(attenuation=0.0, general=0.25, zero_intensity=0.4, intensity_limit=0.8)
+    model = sensor(law=law, range_noise_std=0.05)
     count = 200_000
     intensity = np.repeat([0.9, 0.4, 0.0], count)
     distance = np.full(3 * count, 50.0)

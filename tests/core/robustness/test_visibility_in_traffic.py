@@ -15,7 +15,7 @@ from synthetic_junction import junction_site, make_candidates
 from traffic_by_hand import make_model, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import BeamPattern
+from seip_addon.core.lidar import BeamPattern, RangeEquation
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_instants import (
     BATCH_SECONDS,
@@ -29,6 +29,7 @@ from seip_addon.core.robustness.visibility_in_traffic import LAYER_HEIGHT, visib
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.near_surfaces import near_surfaces
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.scanning import ScanPosition, seen_by_all_rays
 from seip_addon.core.visibility.settings import VisibilitySettings
@@ -86,22 +87,26 @@ def views(instants, layer="road", around=AROUND):
     return np.array([seen.seen(instant) for instant in range(len(instants))])
 
 
-def place_of(pose, caster, settings=AROUND.sight):
+def place_of(pose, caster, around, reflectivity):
     poses = SITE.candidates
-    model = MODELS[str(poses.sensor[pose])]
-    return ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], settings)
+    model = around.models[str(poses.sensor[pose])]
+    return ScanPosition(caster, poses.xyz[pose], float(poses.yaw[pose]), [model], around.sight, reflectivity)
 
 
-def by_full_scan(bodies, engine=ANY, settings=AROUND.sight):
+def by_full_scan(bodies, engine=ANY, around=AROUND):
     """Every ray at everything in one ray caster."""
     caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), engine)
-    return np.concatenate([seen_by_all_rays(place_of(pose, caster, settings), SITE.targets.xyz)[0] for pose in POSES])
+    reflectivity = np.concatenate([SITE.reflectivity, bodies.reflectivity])
+    surfaces = near_surfaces(SITE.triangles, SITE.targets.xyz, around.sight.delta, SITE.reflectivity)
+    return np.concatenate(
+        [seen_by_all_rays(place_of(pose, caster, around, reflectivity), surfaces)[0] for pose in POSES]
+    )
 
 
 def beams_past(bodies, pose):
     """Every beam, from the least range to its end, against every point above a target: its distance to each."""
     caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), ANY)
-    place = place_of(pose, caster)
+    place = place_of(pose, caster, AROUND, SITE.reflectivity)
     (model,) = place.models
     directions = BeamPattern(model, place.yaw).directions(np.arange(model.channels * model.azimuth_count))
     end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
@@ -120,14 +125,17 @@ def beams_past(bodies, pose):
 @given(bodies=crowds)
 def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
     around = replace(AROUND, engine=engine)
-    assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine)).all()
+    assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine, around)).all()
 
 
 @cases(5, 2)
 @given(bodies=crowds)
 def test_only_returns_that_are_strong_enough_count(bodies):
-    sight = VisibilitySettings(delta=DELTA, min_intensity=0.3)
-    assert (views([bodies], around=replace(AROUND, sight=sight))[0] == by_full_scan(bodies, settings=sight)).all()
+    dropoff = replace(AROUND, sight=VisibilitySettings(delta=DELTA, min_intensity=0.3))
+    law = RangeEquation.of_ranges(12.0, 30.0)
+    physical = replace(AROUND, models={key: replace(model, law=law) for key, model in MODELS.items()})
+    for around in (dropoff, physical):
+        assert (views([bodies], around=around)[0] == by_full_scan(bodies, around=around)).all()
 
 
 @cases(5, 1)

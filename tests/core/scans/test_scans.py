@@ -18,6 +18,7 @@ from small_junction import box_triangles
 from traffic_by_hand import box_body, ground, make_model, make_sensor, make_static, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import CarlaDropoff
 from seip_addon.core.progress import finish
 from seip_addon.core.scans import (
     Frame,
@@ -268,7 +269,7 @@ def test_sensors_have_independent_noise() -> None:
 def test_noise_is_that_of_the_model() -> None:
     static, sensor = (
         make_static(ground()),
-        make_sensor(range_noise_std=0.05, dropoff_general=0.5, dropoff_zero_intensity=0.0),
+        make_sensor(range_noise_std=0.05, law=CarlaDropoff(general=0.5, zero_intensity=0.0)),
     )
     exact = simulation(static, [sensor], parked()).frame(0, 0.0)
     noisy = simulation(static, [sensor], parked(), NOISY).frame(0, 0.0)

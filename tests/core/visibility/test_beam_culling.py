@@ -20,6 +20,7 @@ from seip_addon.core.visibility.beam_culling import (
     target_patches,
 )
 from seip_addon.core.visibility.near_surfaces import near_surfaces
+from seip_addon.core.visibility.settings import VisibilitySettings
 
 
 def random_model(random: np.random.Generator) -> LidarModel:
@@ -71,8 +72,8 @@ def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: flo
     targets += random.normal(0, 0.3 * delta, (30, 3))
     targets[0] = origin + random.normal(0, 0.3 * delta, 3)  # δ about it may hold the sensor
     surfaces = near_surfaces(triangles, targets, delta)
-    beams = Beams.of([model], yaw)
-    coarse = near_rays(beams, target_patches(origin, surfaces))
+    beams = Beams.of([model], yaw, VisibilitySettings(delta))
+    coarse = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces)))
     patches, planes = disc_patches(origin, surfaces, np.ones(30, dtype=bool))
     fine = near_rays(beams, patches, planes)
 
@@ -82,9 +83,13 @@ def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: flo
     for near in (coarse, fine):
         assert rays_by_target(near, model, 30)[returns].all()
     within_range = np.linalg.norm(targets - origin, axis=1) < 60 - delta
-    likeliest = near_rays(beams, target_patches(origin, surfaces)).likeliest(beams.sensor)
+    likeliest = near_rays(beams, target_patches(origin, surfaces, all_of(surfaces))).likeliest(beams.sensor)
     assert set(np.flatnonzero(returns.any(axis=1) & within_range)) <= set(likeliest.target.tolist())
     assert len(np.unique(likeliest.target)) == len(likeliest.target)
+
+
+def all_of(surfaces):
+    return np.ones(len(surfaces.xyz), dtype=bool)
 
 
 def road(half: float) -> np.ndarray:
@@ -98,7 +103,10 @@ def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
     model = load_catalogue()["type3"]
     origin = np.array([0.0, 0.0, 5.0])
     surfaces = near_surfaces(road(80.0), targets, 1.0)
-    near = near_rays(Beams.of([model], 0.3), target_patches(origin, surfaces))
+    near = near_rays(
+        Beams.of([model], 0.3, VisibilitySettings()),
+        target_patches(origin, surfaces, all_of(surfaces)),
+    )
     down = np.tan(model.elevations)[near.channel]
     radius = -5.0 / down
     ends = near.target[down < 0]
@@ -115,7 +123,7 @@ def test_steep_surfaces_are_met_by_few_rays_more_than_needed() -> None:
     origin = np.array([0.0, 0.0, 1.0])
     surfaces = near_surfaces(wall, target, 1.0)
     patches, planes = disc_patches(origin, surfaces, np.array([True]))
-    kept = rays_by_target(near_rays(Beams.of([model], 0.0), patches, planes), model, 1)[0]
+    kept = rays_by_target(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes), model, 1)[0]
     points = hits(origin, beam_directions(model, 0.0).reshape(-1, 3), wall)
     returns = (np.linalg.norm(points - target, axis=2) < 1.0).any(axis=1)
     assert kept[returns].all()
@@ -128,16 +136,16 @@ def test_targets_out_of_range_and_without_surface_need_no_ray() -> None:
         *(np.array(values) for values in ([0, 1, 2], [0.0, 0, 0], [61.5, 0.1, 9], [0.3, 0.3, 0.3])),
         *(np.array(values) for values in ([-0.1, -0.1, np.inf], [0.1, 0.1, -np.inf])),
     )
-    assert len(near_rays(Beams.of([model], 0.0), patches)) == 0
+    assert len(near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches)) == 0
 
 
 def test_least_range_is_measured_along_the_ray() -> None:
     """Straight below a sensor a return is near in plan and as far off as the sensor is high."""
     model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.4), azimuth_offsets=np.zeros(1))
     surfaces = near_surfaces(road(20.0), np.array([[0.5, 0.0, 0.0]]), 1.0)
-    patches = target_patches(np.array([0.0, 0.0, 6.0]), surfaces)
+    patches = target_patches(np.array([0.0, 0.0, 6.0]), surfaces, all_of(surfaces))
     for least, some in ((5.0, True), (7.0, False)):
-        beams = Beams.of([replace(model, min_range=least)], 0.0)
+        beams = Beams.of([replace(model, min_range=least)], 0.0, VisibilitySettings())
         assert (len(near_rays(beams, patches)) > 0) == some
 
 
@@ -148,7 +156,9 @@ def test_the_sign_of_a_level_beam_does_not_matter() -> None:
     model = replace(random_model(np.random.default_rng(0)), points_per_second=10.0 * 360)
     one = {"azimuth_offsets": np.zeros(1)}
     kept = [
-        near_rays(Beams.of([replace(model, elevations=np.array([level]), **one)], 0.0), patches, planes)
+        near_rays(
+            Beams.of([replace(model, elevations=np.array([level]), **one)], 0.0, VisibilitySettings()), patches, planes
+        )
         for level in (0.0, -0.0)
     ]
     assert kept[0].width.tolist() == kept[1].width.tolist() != []
@@ -158,7 +168,7 @@ def test_a_sensor_as_far_above_a_face_as_returns_may_lie_off_it() -> None:
     surfaces = near_surfaces(road(20.0), np.array([[0.2, 0.0, 0.0]]), 1.0)
     patches, planes = disc_patches(np.array([0.0, 0.0, surfaces.tolerance]), surfaces, np.array([True]))
     model = replace(random_model(np.random.default_rng(0)), elevations=np.full(1, -1.2), azimuth_offsets=np.zeros(1))
-    assert (near_rays(Beams.of([model], 0.0), patches, planes).width == model.azimuth_count).any()
+    assert (near_rays(Beams.of([model], 0.0, VisibilitySettings()), patches, planes).width == model.azimuth_count).any()
 
 
 def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
@@ -176,9 +186,9 @@ def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
     )
     radius = 4 / math.tan(math.radians(20))
     targets = np.array([[0.0, radius, 0.0], [30.0, 0.0, 0.0]])
-    beams = Beams.of([model], 0.0)
+    beams = Beams.of([model], 0.0, VisibilitySettings())
     surfaces = near_surfaces(road(50.0), targets, 1.0)
-    near = near_rays(beams, target_patches(np.array([0.0, 0, 4]), surfaces)).likeliest(beams.sensor)
+    near = near_rays(beams, target_patches(np.array([0.0, 0, 4]), surfaces, all_of(surfaces))).likeliest(beams.sensor)
     assert near.target.tolist() == [0]
     assert (near.channel.tolist(), near.middle.tolist()) == ([1], [90])
     assert near.miss.min() == pytest.approx(0, abs=0.1)
@@ -186,7 +196,7 @@ def test_the_likeliest_ray_ends_at_the_target_on_a_level_road() -> None:
 
 def test_sensors_share_the_rays_of_equal_channels() -> None:
     models = load_catalogue()
-    beams = Beams.of([models["type2"], models["type3"]], 0.2)
+    beams = Beams.of([models["type2"], models["type3"]], 0.2, VisibilitySettings())
     equal = np.isin(models["type3"].elevations, models["type2"].elevations)
     assert equal.any()
     assert beams.rays == 7500 * (32 + 128 - equal.sum())

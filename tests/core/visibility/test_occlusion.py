@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.visibility.beam_culling import Beams, NearRays, Planes
 from seip_addon.core.visibility.occlusion import stopped_by
+from seip_addon.core.visibility.settings import VisibilitySettings
 
-BEAMS = Beams.of([load_catalogue()["type2"]], 0.4)
+BEAMS = Beams.of([load_catalogue()["type2"]], 0.4, VisibilitySettings())
 COUNT = 300
 
 
@@ -39,7 +40,7 @@ def test_what_is_proven_hidden_is_hidden(seed: int) -> None:
     normal = random.normal(0, 1, (COUNT, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal *= np.where((normal * middle).sum(axis=1) < 0, -1, 1)[:, None]
-    planes = Planes(normal, random.uniform(0.1, 40, COUNT), 1e-3)
+    planes = Planes(normal, random.uniform(0.1, 40, COUNT), np.ones(COUNT), 1e-3)
     stopped = stopped_by(origin, triangles, BEAMS, rays, planes)
     for number in np.flatnonzero(stopped):
         ray = directions(rays, number)
@@ -63,8 +64,10 @@ def test_a_wall_stops_what_is_behind_it_and_nothing_before_it() -> None:
     triangles = np.repeat(wall, 2, axis=0)
     road = np.array([[0.0, 0, -1], [0, 0, -1]])
     origin = np.zeros(3)
-    assert stopped_by(origin, triangles, BEAMS, rays, Planes(road, np.array([5.0, 5.0]), 1e-3)).tolist() == [True, True]
-    near = Planes(road, np.array([4.0, 4.0]), 1e-3)  # met at 8.6 m and 19 m
+    assert stopped_by(
+        origin, triangles, BEAMS, rays, Planes(road, np.array([5.0, 5.0]), np.ones(2), 1e-3)
+    ).tolist() == [True, True]
+    near = Planes(road, np.array([4.0, 4.0]), np.ones(2), 1e-3)  # met at 8.6 m and 19 m
     assert stopped_by(origin, triangles, BEAMS, rays, near).tolist() == [False, True]
     aside = bundles(channel, first + 1800, np.array([41, 41]))  # 86° from the wall's middle
     assert not stopped_by(origin, triangles, BEAMS, aside, near).any()

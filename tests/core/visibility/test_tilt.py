@@ -14,11 +14,11 @@ from float64_rays import nearest_return
 from hypothesis import given
 from hypothesis import strategies as st
 from random_cases import cases
-from synthetic_junction import junction_site, make_candidates, prism, rectangle
+from synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import angles_of, describe_tilt, orientation, orientations, rotated
-from seip_addon.core.lidar import beam_directions, load_catalogue
+from seip_addon.core.lidar import RangeEquation, beam_directions, load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective
 from seip_addon.core.progress import finish
@@ -47,6 +47,8 @@ from seip_addon.core.visibility.visibility_model import VisibilityModel
 from seip_addon.core.workflows.survey import SurveySettings
 
 MODELS = {key: replace(model, points_per_second=model.points_per_second / 8) for key, model in load_catalogue().items()}
+PHYSICAL = {key: replace(model, law=RangeEquation.of_ranges(12.0, 30.0)) for key, model in MODELS.items()}
+STRENGTHS = st.sampled_from([(MODELS, 0.0), (MODELS, 0.2), (PHYSICAL, 0.0)])
 SIGHT = VisibilitySettings()
 NOISE = 2e-3
 """Metres from δ within which float32 and float64 may disagree."""
@@ -69,13 +71,15 @@ def patch(seed, poses=3):
     yaw = np.repeat(random.uniform(-math.pi, math.pi, poses), 2)
     tilt = np.repeat(random.uniform(-0.6, 0.6, poses), 2)
     sensor = ["type1", "type2"] * poses
+    triangles = np.concatenate([road, *boxes])
     return Site(
         name="patch",
         origin=np.zeros(3),
         region=shapely.box(-15, -15, 15, 15),
         targets=Targets(target, np.ones(60), np.zeros(60, dtype=bool), 1.0),
         candidates=make_candidates(xyz, sensor, xyz[:, 2], yaw, tilt),
-        triangles=np.concatenate([road, *boxes]),
+        triangles=triangles,
+        reflectivity=varied_reflectivity(triangles),
     )
 
 
@@ -90,12 +94,17 @@ def tilted(site, yaw, tilt):
 
 
 @each_engine
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2]))
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([0.3, 1.0, 3.0]),
+    st.sampled_from([(MODELS, 0.0), (MODELS, 0.2), (PHYSICAL, 0.0)]),
+)
 @cases(20, 4)
-def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, min_intensity):
-    site, settings = patch(seed), VisibilitySettings(delta, min_intensity)
-    full = finish(full_scan_visibility(site, MODELS, settings, make_ray_caster(site.triangles, engine)))
-    assert (grid_of(site, settings, engine).packed == full.packed).all()
+def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, strength):
+    site, (models, min_intensity) = patch(seed), strength
+    settings = VisibilitySettings(delta, min_intensity)
+    full = finish(full_scan_visibility(site, models, settings, make_ray_caster(site.triangles, engine)))
+    assert (finish(compute_visibility(site, models, settings, engine)).packed == full.packed).all()
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-4, 4), TILT)
@@ -154,14 +163,14 @@ def test_the_key_of_an_upright_grid_is_as_it_was_before_there_were_tilts():
     site = street_site(generate_candidates(street(), CHOICE))
     poses, model = site.candidates, MODELS["type1"]
     pattern = [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
-    pattern += [float(model.min_range), float(model.max_range), float(model.attenuation)]
+    pattern += [float(model.min_range), float(model.max_range)]
     known = digest(
         *(
             FILE.schema,
             source_digest(grid.__name__),
             ANY,
             1.0,
-            0.0,
+            "(0.0, '')",
             site.triangles,
             site.targets.xyz,
             poses.xyz,
@@ -195,7 +204,9 @@ def street_site(candidates):
     x, y = (values.ravel() for values in np.meshgrid(np.arange(-29.0, 30, 2), np.arange(-6.0, 7, 2)))
     targets = Targets(np.column_stack([x, y, 0 * x]), np.ones(len(x)), np.zeros(len(x), dtype=bool), 2.0)
     parts = [mesh.triangles for mesh in (*street().roads, *street().ground, *street().occluders)]
-    return Site("street", np.zeros(3), street().region, targets, candidates, np.concatenate(parts))
+    triangles = np.concatenate(parts)
+    reflectivity = np.full(len(triangles), 0.3)
+    return Site("street", np.zeros(3), street().region, targets, candidates, triangles, reflectivity)
 
 
 def test_poses_are_positions_by_heights_by_tilts_by_types_and_tilted_ones_face_the_region():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +16,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from random_cases import cases
 from shapely import box
-from synthetic_junction import junction_site, make_candidates, prism, rectangle
+from synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import LidarModel, load_catalogue
+from seip_addon.core.lidar import LidarModel, RangeEquation, load_catalogue
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.visibility.chunks import Rows
@@ -36,7 +37,7 @@ from seip_addon.core.visibility.store import CheckpointFolder, stored_visibility
 Float = NDArray[np.float64]
 
 
-def small_model(key: str, channels: int = 12, steps: int = 90, **changes: float) -> LidarModel:
+def small_model(key: str, channels: int = 12, steps: int = 90, **changes: Any) -> LidarModel:
     """A sensor small enough for brute force, with uneven elevations and azimuth offsets."""
     place = np.linspace(0, 1, channels)
     values = {"min_range": 0.5, "max_range": 40.0} | changes
@@ -55,6 +56,14 @@ def small_model(key: str, channels: int = 12, steps: int = 90, **changes: float)
 
 
 MODELS = {"coarse": small_model("coarse", 6, 40), "fine": small_model("fine", 16, 120)}
+PHYSICAL = {
+    "coarse": replace(MODELS["coarse"], law=RangeEquation.of_ranges(8.0, 20.0)),
+    "fine": replace(MODELS["fine"], law=RangeEquation.of_ranges(15.0, 42.0)),
+}
+Strength = tuple[dict[str, LidarModel], tuple[float, ...]]
+STRENGTHS = st.sampled_from(
+    [(MODELS, (0.0,)), (MODELS, (0.2,)), (MODELS, (0.6,)), (PHYSICAL, ()), (PHYSICAL, (0.0, 0.5))]
+)
 
 
 def random_site(seed: int, poses: int = 3) -> Site:
@@ -70,6 +79,7 @@ def random_site(seed: int, poses: int = 3) -> Site:
     target = random.uniform(-14, 14, (60, 3))
     target[:, 2] = target[:, :2] @ slope
     xyz = random.uniform((-14, -14, 2.5), (14, 14, 8), (poses, 3))
+    triangles = np.concatenate([road, *boxes])
     return Site(
         name="random",
         origin=np.zeros(3),
@@ -78,7 +88,8 @@ def random_site(seed: int, poses: int = 3) -> Site:
         candidates=make_candidates(
             xyz, random.choice(list(MODELS), poses), xyz[:, 2], random.uniform(-math.pi, math.pi, poses)
         ),
-        triangles=np.concatenate([road, *boxes]),
+        triangles=triangles,
+        reflectivity=varied_reflectivity(triangles),
     )
 
 
@@ -98,12 +109,13 @@ def nearest_returns(site: Site) -> Float:
 
 
 @each_engine
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2, 0.6]))
-def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: float, min_intensity: float) -> None:
-    site, settings = random_site(seed), VisibilitySettings(delta, min_intensity)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 3.0]), STRENGTHS)
+def test_same_as_the_full_scan_bit_for_bit(engine: Engine, seed: int, delta: float, strength: Strength) -> None:
+    site, (models, least) = random_site(seed), strength
+    settings = VisibilitySettings(delta, *least)
     caster = make_ray_caster(site.triangles, engine)
-    lazy = finish(compute_visibility(site, MODELS, settings, engine))
-    full = finish(full_scan_visibility(site, MODELS, settings, caster))
+    lazy = finish(compute_visibility(site, models, settings, engine))
+    full = finish(full_scan_visibility(site, models, settings, caster))
     assert (lazy.packed == full.packed).all()
     assert lazy.key == full.key
     assert lazy.parameters["rays_cast"] <= full.parameters["rays_cast"] == full.parameters["rays_of_full_scan"]
@@ -124,15 +136,17 @@ def soup(seed: int) -> Site:
         targets=Targets(target, np.ones(50), np.zeros(50, dtype=bool), 1.0),
         candidates=make_candidates(xyz, list(MODELS) * 3, xyz[:, 2], yaw),
         triangles=triangles,
+        reflectivity=varied_reflectivity(triangles),
     )
 
 
 @each_engine
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 1.0, 5.0]), st.sampled_from([0.0, 0.3]))
-def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float, min_intensity: float) -> None:
-    site, settings = soup(seed), VisibilitySettings(delta, min_intensity)
-    lazy = finish(compute_visibility(site, MODELS, settings, engine))
-    full = finish(full_scan_visibility(site, MODELS, settings, make_ray_caster(site.triangles, engine)))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, 1.0, 5.0]), STRENGTHS)
+def test_same_as_the_full_scan_in_a_soup(engine: Engine, seed: int, delta: float, strength: Strength) -> None:
+    site, (models, least) = soup(seed), strength
+    settings = VisibilitySettings(delta, *least)
+    lazy = finish(compute_visibility(site, models, settings, engine))
+    full = finish(full_scan_visibility(site, models, settings, make_ray_caster(site.triangles, engine)))
     assert (lazy.packed == full.packed).all()
 
 
@@ -272,6 +286,7 @@ def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
     expected = grid_of(site, settings, engine).visible
     random = np.random.default_rng(seed)
     order, pose_order = random.permutation(len(site.targets)), random.permutation(len(site.candidates))
+    triangle_order = random.permutation(len(site.triangles))
     poses = site.candidates
     shuffled = replace(
         site,
@@ -279,7 +294,8 @@ def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
         candidates=make_candidates(
             poses.xyz[pose_order], poses.sensor[pose_order], poses.height[pose_order], poses.yaw[pose_order]
         ),
-        triangles=random.permutation(site.triangles, axis=0),
+        triangles=site.triangles[triangle_order],
+        reflectivity=site.reflectivity[triangle_order],
     )
     assert (grid_of(shuffled, settings, engine).visible == expected[np.ix_(pose_order, order)]).all()
 
@@ -287,13 +303,15 @@ def test_the_order_of_things_does_not_matter(engine: Engine, seed: int) -> None:
 def one_sensor_site(*walls: Float) -> Site:
     """A sensor 5 m above the middle of a level road, targets along the x axis."""
     x = np.arange(-14.0, 15.0)
+    triangles = np.concatenate([rectangle((-15, -15), (15, 15)), *walls])
     return Site(
         name="one",
         origin=np.zeros(3),
         region=box(-15, -15, 15, 15),
         targets=Targets(np.column_stack([x, 0 * x, 0 * x]), np.ones(29), np.zeros(29, dtype=bool), 1.0),
         candidates=make_candidates(np.array([[0.0, 0.0, 5.0]]), ["fine"], np.array([5.0])),
-        triangles=np.concatenate([rectangle((-15, -15), (15, 15)), *walls]),
+        triangles=triangles,
+        reflectivity=np.full(len(triangles), 0.3),
     )
 
 
@@ -327,6 +345,7 @@ def test_range_limits_returns() -> None:
 @needs_any
 def test_weak_returns_do_not_count() -> None:
     site = one_sensor_site()
+    site = replace(site, reflectivity=np.ones(len(site.triangles)))
     x = np.abs(site.targets.xyz[:, 0])
     models = {"fine": small_model("fine", 64, 360)}
     everything, strong = (
@@ -340,6 +359,21 @@ def test_weak_returns_do_not_count() -> None:
 
 
 @needs_any
+def test_the_road_is_seen_as_far_as_its_returns_are_detected() -> None:
+    site = one_sensor_site()
+    law = RangeEquation.of_ranges(9.0, 25.0)
+    reach = law.reach_on_level(0.3, 0.9, 5.0)
+    away = np.hypot(np.abs(site.targets.xyz[:, 0]), 5.0)
+    models = {"fine": small_model("fine", 64, 360, law=law)}
+    seen = finish(compute_visibility(site, models, VisibilitySettings(0.6), ANY)).visible[0]
+    everything = finish(compute_visibility(site, {"fine": small_model("fine", 64, 360)}, VisibilitySettings(0.6), ANY))
+    assert 7.0 < reach < 11.0
+    assert not seen[away > reach + 0.6].any()
+    assert (seen == everything.visible[0])[away < reach - 0.6].all()
+    assert everything.visible[0][away > reach + 0.6].any()
+
+
+@needs_any
 def test_progress_counts_poses() -> None:
     site = random_site(1)
     seen: list[Progress] = []
@@ -350,11 +384,17 @@ def test_progress_counts_poses() -> None:
 
 
 @pytest.mark.parametrize(
-    ("delta", "min_intensity"), [(0, 0), (-1, 0), (math.nan, 0), (math.inf, 0), (1, -0.1), (1, 1.1), (1, math.nan)]
+    "values",
+    [(0,), (-1,), (math.nan,), (math.inf,), (1, -0.1), (1, 1.1), (1, math.nan), (1, 0, 0), (1, 0, 1), (1, 0, math.nan)],
 )
-def test_settings_that_mean_nothing(delta: float, min_intensity: float) -> None:
+def test_settings_that_mean_nothing(values: tuple[float, ...]) -> None:
     with pytest.raises(SeipError):
-        VisibilitySettings(delta, min_intensity)
+        VisibilitySettings(*values)
+
+
+def test_a_probability_that_a_sensor_never_reaches_is_refused_by_its_name() -> None:
+    with pytest.raises(SeipError, match=r"coarse: a probability of detection must lie above 0 and below 0\.985"):
+        VisibilitySettings(detection=0.99).least_strength(PHYSICAL["coarse"])
 
 
 @needs_any
@@ -439,7 +479,12 @@ def test_the_key_follows_from_what_the_grid_follows_from() -> None:
         visibility_key(site, MODELS, VisibilitySettings(1.1), "bvh"),
         visibility_key(site, MODELS, VisibilitySettings(1.0, 0.1), "bvh"),
         visibility_key(site, MODELS, settings, "embree"),
+        visibility_key(site, PHYSICAL, settings, "bvh"),
+        visibility_key(site, PHYSICAL, VisibilitySettings(detection=0.8), "bvh"),
+        visibility_key(replace(site, reflectivity=site.reflectivity * 0.9), PHYSICAL, settings, "bvh"),
     ]
+    darker = replace(site, reflectivity=site.reflectivity * 0.9)
+    assert visibility_key(darker, MODELS, VisibilitySettings(detection=0.8), "bvh") == key  # nothing of it matters
     assert len({key, *others}) == 1 + len(others)
 
 
