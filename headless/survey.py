@@ -27,10 +27,12 @@ from seip_addon.core.results.placement_record import Provenance, versions
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
+from seip_addon.core.site.weather import Weather
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.triangle_culling import culling_message
 from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, record_of, see
 from seip_addon.core.workflows.traffic import runs_in, traffic_folder
+from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.result_folder import write_result_folder
 
@@ -76,8 +78,13 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     add_settings(metres, SurveySettings, "grid_spacing")
     add_settings(metres, VisibilitySettings, "delta")
     add_settings(metres, CandidateSettings, "spacing", "setback", "clearance", "bracket")
+    returns = parser.add_argument_group("returns")
+    add_settings(returns, VisibilitySettings, "detection", "min_intensity")
+    returns.add_argument(
+        "--reflectivity", nargs="+", default=[], metavar="MATERIAL=SHARE", help="of materials, in place of the scene's"
+    )
+    add_settings(returns, Weather, "rain", "visibility", "wet_road")
     work = parser.add_argument_group("work")
-    add_settings(work, VisibilitySettings, "min_intensity")
     add_settings(work, SurveySettings, "engine")
     work.add_argument(
         "--scheduler",
@@ -90,7 +97,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     )
     add_settings(work, SurveySettings, "effort")
     if not in_full:
-        for group in (sensors, metres, work):
+        for group in (sensors, metres, returns, work):
             name_only(group, "see: seip place --help")
 
 
@@ -121,6 +128,7 @@ def survey(
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
 
+    set_reflectivity(options.reflectivity)
     watch = Stopwatch()
     reading = watch.time("read the scene", lambda: read_scene(bpy.context.scene))
     if refine is not None:
@@ -166,7 +174,14 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         limit = math.inf if math.isfinite(options.effort) else SurveySettings().time_limit
     candidates = read_settings(CandidateSettings, options)
     visibility = read_settings(VisibilitySettings, options)
-    return read_settings(SurveySettings, options, candidates=candidates, visibility=visibility, time_limit=limit)
+    return read_settings(
+        SurveySettings,
+        options,
+        candidates=candidates,
+        visibility=visibility,
+        weather=read_settings(Weather, options),
+        time_limit=limit,
+    )
 
 
 def _in_words(site: Site) -> str:

@@ -7,6 +7,8 @@ import math
 import bpy
 
 from ..core.lidar import LidarModel
+from ..core.visibility.road_range import road_range
+from ..core.visibility.settings import VisibilitySettings
 from ..operators.sensors import (
     SEIP_MT_survey_presets,
     SEIP_OT_add_catalogue,
@@ -14,6 +16,7 @@ from ..operators.sensors import (
     SEIP_OT_list_sensor_types,
     SEIP_OT_preview_beams,
 )
+from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
 from .sidebar import RowList, Sidebar, settings_column
@@ -95,12 +98,16 @@ class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
             draw_sentence(self.layout, f"{key} is not in the catalogue: add the file that has it, or do not use it.")
             return
         draw_sentence(self.layout, f"{model.manufacturer} {model.name}")
-        for what, value in _figures(model):
+        height = survey.preview_height
+        far = road_range(model, REFLECTIVITY["asphalt"], height, VisibilitySettings(detection=survey.detection))
+        for what, value in (*_figures(model), ("On asphalt", f"{far:.0f} m from {height:g} m height")):
             split = self.layout.split(factor=0.42)
             split.scale_y = 0.8
             split.label(text=what)
             split.label(text=value)
         draw_sentence(self.layout, f"Figures: {model.source}")
+        if model.assumed:
+            draw_sentence(self.layout, f"Assumed: {model.assumed}")
         draw_sentence(self.layout, f"Price: {model.price_source or 'no source'}")
 
 

@@ -47,9 +47,12 @@ class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
         column = layout.column(heading="Positions")
         for name in ("spacing", "setback", "clearance", "bracket", "assumed_poles"):
             column.prop(survey, name)
-        column = layout.column()
-        for name in ("min_intensity", "engine"):
+        column = layout.column(heading="Returns")
+        for name in ("detection", "min_intensity", "rain", "wet_road", "fog"):
             column.prop(survey, name)
+        if survey.fog:
+            column.prop(survey, "visibility")
+        layout.column().prop(survey, "engine")
 
 
 def _draw_state(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

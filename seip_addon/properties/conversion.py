@@ -28,9 +28,8 @@ def of_setting(kind: type, field: str, name: str, **more: Any) -> Any:  # noqa: 
     limits = {"min": about.minimum, "max": about.maximum}
     given = {name: limit for name, limit in limits.items() if limit is not None}
     description = about.help[0].upper() + about.help[1:]
-    return _KINDS[type(default)](
-        name=name, description=description, default=default, **(given | _UNITS.get(about.unit, {}) | more)
-    )
+    arguments = {"default": default} | given | _UNITS.get(about.unit, {}) | more
+    return _KINDS[type(default)](name=name, description=description, **arguments)
 
 
 def absolute(text: str) -> Path:

@@ -8,6 +8,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
+from ..core.site.weather import Weather
 from ..core.visibility.settings import VisibilitySettings
 from ..core.workflows.survey import SurveySettings
 from ..preferences import catalogue_files
@@ -52,6 +53,11 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
     delta: of_setting(VisibilitySettings, "delta", "δ", min=0.01, soft_max=5.0, step=10)
     min_intensity: of_setting(VisibilitySettings, "min_intensity", "Minimum Intensity", subtype="FACTOR")
+    detection: of_setting(VisibilitySettings, "detection", "Detection Probability", subtype="FACTOR")
+    rain: of_setting(Weather, "rain", "Rain (mm/h)", max=500.0, soft_max=50.0)
+    fog: BoolProperty(name="Fog", description="Look through fog or snow")
+    visibility: of_setting(Weather, "visibility", "Visibility", default=200.0, soft_max=2000.0)
+    wet_road: of_setting(Weather, "wet_road", "Wet Road")
     spacing: of_setting(CandidateSettings, "spacing", "Spacing", soft_max=50.0, step=50)
     setback: of_setting(CandidateSettings, "setback", "Setback", soft_max=5.0, step=10)
     clearance: of_setting(CandidateSettings, "clearance", "Clearance", soft_max=5.0, step=10)
@@ -118,7 +124,8 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 bracket=as_typed(self.bracket),
                 assumed_poles=self.assumed_poles,
             ),
-            visibility=VisibilitySettings(as_typed(self.delta), as_typed(self.min_intensity)),
+            visibility=VisibilitySettings(as_typed(self.delta), as_typed(self.min_intensity), as_typed(self.detection)),
+            weather=Weather(as_typed(self.rain), as_typed(self.visibility) if self.fog else math.inf, self.wet_road),
             grid_spacing=as_typed(self.grid),
             catalogue=catalogue_files(),
             engine=self.engine,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 
@@ -149,6 +152,30 @@ def reflectivity(of: bpy.types.Material | None) -> float:
             f"property {contract.REFLECTIVITY} of material {of.name!r} must be a number from 0 to 1, not {given!r}"
         )
     return float(given)
+
+
+def set_reflectivity(given: Sequence[str]) -> None:
+    """Give materials of the open file a reflectivity, each named as ``asphalt=0.12``.
+
+    Raises
+    ------
+    SeipError
+        There is no such material, or no share from 0 to 1 is given.
+    """
+    for one in given:
+        name, _, share = one.rpartition("=")
+        named = [each for each in bpy.data.materials if contract.NUMBER.sub("", each.name) in {name, PREFIX + name}]
+        if not named:
+            known = sorted(each.name.removeprefix(PREFIX) for each in bpy.data.materials)
+            close = difflib.get_close_matches(name, known, n=3, cutoff=0.4) or known
+            raise SeipError(f"the scene has no material {name!r}; did you mean {', '.join(close) or 'another scene'}?")
+        try:
+            value = float(share)
+        except ValueError as error:
+            raise SeipError(f"the reflectivity of {name!r} must be a number from 0 to 1, not {share!r}") from error
+        for each in named:
+            each[contract.REFLECTIVITY] = value
+            reflectivity(each)  # refuses what is no share
 
 
 def linear(colour: str) -> tuple[float, float, float, float]:

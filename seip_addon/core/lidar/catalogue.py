@@ -106,8 +106,8 @@ def _range_equation(given: Mapping[str, Any], longest: float) -> tuple[RangeEqua
         return RangeEquation(threshold, spread, ceiling), ""
     probability = given.get("detection_probability", MAKER_PROBABILITY)
     if "detection_range_m" in given:
-        low, high = given["detection_range_m"]
-        return RangeEquation.of_ranges(low, high, probability), ""
+        published = given["detection_range_m"]
+        return RangeEquation.of_ranges(published[0], [*published, published[0] * _SQRT_8][1], probability), ""
     assumed = f"its longest range, {longest:g} m, is taken to be that at 80 % reflectivity, and 1/r² for that at 10 %"
     return RangeEquation.of_ranges(longest / _SQRT_8, longest, probability), assumed
 
@@ -137,6 +137,13 @@ def _several(count: int) -> Callable[[object], list[float]]:
         return numbers
 
     return read
+
+
+def _one_or_two(value: object) -> list[float]:
+    numbers = _numbers(value)
+    if len(numbers) not in {1, 2}:
+        raise ValueError(f"must hold the range at 10 % reflectivity, and that at 80 % if it is known, not {numbers}")
+    return numbers
 
 
 def _law(value: object) -> str:
@@ -173,7 +180,7 @@ _DROPOFF = {
 _pair = _several(2)
 _OPTIONAL = Key(_number, None)
 _DETECTION = {
-    "detection_range_m": Key(_pair, None),
+    "detection_range_m": Key(_one_or_two, None),
     "detection_probability": _OPTIONAL,
     "detection_law": Key(_several(3), None),
 }

@@ -32,7 +32,7 @@ class VisibilitySettings:
     )
 
     detection: float = setting(
-        0.9, "least probability of detection of a return that sees", minimum=0.01, maximum=0.99, metavar="P"
+        0.9, "least probability of detection of a return that sees", minimum=0.01, maximum=0.98, metavar="P"
     )
 
     def __post_init__(self) -> None:

@@ -29,12 +29,14 @@ from ..site.far_objects import without_far_objects
 from ..site.obstruction import bareness_warnings
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
+from ..site.weather import Weather
 from ..storage.files import digest
 from ..visibility.estimate import Estimate, estimate_visibility
 from ..visibility.float32_precision import rounding_warnings
 from ..visibility.grid import VisibilityGrid, visibility_key
 from ..visibility.ray_casting import Engine, engine_name
 from ..visibility.ring_resolution import resolution_warnings
+from ..visibility.road_range import range_warnings, road_reflectivity
 from ..visibility.settings import VisibilitySettings
 from ..visibility.store import stored_visibility
 
@@ -66,6 +68,7 @@ class SurveySettings:
 
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
+    weather: Weather = field(default_factory=Weather)
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="TOML")
     engine: Engine = setting("auto", "ray caster")
@@ -79,16 +82,20 @@ class SurveySettings:
     spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
-        """Return the sensor types to choose from, by catalogue key.
+        """Return the sensor types to choose from as they look through the weather, by catalogue key.
 
         Raises
         ------
         SeipError
-            The solver or a type is unknown, a limit is no positive number, or a catalogue cannot be read.
+            The solver or a type is unknown, a limit is no positive number, a catalogue cannot be read, or a type
+            detects nothing with the probability that is asked for.
         """
         check_solver(self.solver)
         self.limits.clock()  # refuses what is no limit before any ray is cast
-        return find_models(load_catalogue(self.catalogue), self.candidates.sensors)
+        models = find_models(load_catalogue(self.catalogue), self.candidates.sensors)
+        for model in models.values():
+            self.visibility.least_strength(model)
+        return {key: self.weather.through(model) for key, model in models.items()}
 
     @property
     def limits(self) -> SolverLimits:
@@ -101,17 +108,23 @@ class SurveySettings:
 
     def as_record(self) -> dict[str, Any]:
         """Return the settings as records hold them: defaults included, values that JSON knows."""
-        limits = {"time_limit_s": self.time_limit, "effort": self.effort}
+        limits = _finite({"time_limit_s": self.time_limit, "effort": self.effort})
         return {
             "grid_spacing_m": self.grid_spacing,
             "candidates": _candidates_record(self.candidates),
             "visibility": asdict(self.visibility),
+            "weather": _finite(asdict(self.weather)),
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
             "solver": self.solver,
             "spacings_because": self.spacings_because,
-            **{name: limit for name, limit in limits.items() if math.isfinite(limit)},
+            **limits,
         }
+
+
+def _finite(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a record without what is infinite, which JSON does not know."""
+    return {name: value for name, value in record.items() if math.isfinite(value)}
 
 
 def _candidates_record(settings: CandidateSettings) -> dict[str, Any]:
@@ -155,6 +168,7 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
         As for `SurveySettings.models` and `make_site`.
     """
     models = settings.models()
+    geometry = settings.weather.over(geometry)
     site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach())
     near, far = without_far_objects(geometry, geometry.region, settings.reach())
     limits = (
@@ -163,6 +177,7 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
         *assumed_pole_warnings(geometry, site.candidates),
         *rounding_warnings(near),
         *resolution_warnings(site, models, settings.visibility),
+        *range_warnings(site, models, road_reflectivity(geometry.roads), settings.visibility),
     )
     return Layout(geometry, site, models, settings, (*warnings, *limits))
 

@@ -165,7 +165,7 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"model": '"range equation"', "attenuation_per_m": "0.1"}, 'no figure of the model "range equation"'),
         ({"detection_range_m": "[9.0, 20.0]", "dropoff_general_rate": "0.1"}, 'no figure of the model "carla"'),
         ({"detection_range_m": "[20.0, 9.0]"}, "the range at 80 % reflectivity"),
-        ({"detection_range_m": "[9.0]"}, "2 numbers"),
+        ({"detection_range_m": "[9.0, 8.0, 7.0]"}, "the range at 10 % reflectivity, and that at 80 %"),
         ({"detection_probability": "0.999"}, "a probability of detection"),
         ({"detection_law": "[-11.0, 0.9]"}, "3 numbers"),
         ({"detection_law": "[-11.0, 0.0, 0.9]"}, "the spread of detection"),

@@ -1,0 +1,80 @@
+"""Weather: what rain and fog take from a LiDAR's light, and what water does to roads."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import SeipError
+from ..lidar import LidarModel
+from ..settings import setting
+from .scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
+
+RAIN_EXTINCTION, RAIN_EXPONENT = 3.65e-4, 0.63
+"""Of rain of 1 mm/h, in 1/m: drops of Marshall and Palmer (1948) with the extinction efficiency 2 of large spheres."""
+
+CONTRAST_AT_VISIBILITY = 3.0
+"""Optical depth of the meteorological optical range, at which 5 % of the light is left (WMO No. 8): ln 20."""
+
+WET_FACTOR = 0.55
+"""What a film of water leaves of a rough surface's near infrared reflectivity of 0.1 to 0.2: light that leaves the
+surface is partly reflected back under the film (Lekner and Dorf 1988, refractive index 1.33)."""
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Weather that a sensor looks through; none by default.
+
+    Parameters
+    ----------
+    rain : float, mm/h
+        Rain wets the road too.
+    visibility : float, metres
+        Meteorological optical range in fog or snow.
+    wet_road : bool
+        Whether roads and ground are wet without rain.
+
+    Raises
+    ------
+    SeipError
+        There is less than no rain, or no visibility.
+    """
+
+    rain: float = setting(0.0, "rain, which wets the road too", unit="mm/h", minimum=0.0, metavar="MM/H")
+    visibility: float = setting(
+        math.inf, "visibility in fog or snow: meteorological optical range", unit="m", minimum=1.0, metavar="M"
+    )
+    wet_road: bool = setting(default=False, help="roads and ground are wet")
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.rain <= 500:
+            raise SeipError(f"rain must lie between 0 and 500 mm/h, not {self.rain:g}")
+        if not self.visibility >= 1:
+            raise SeipError(f"the visibility must be 1 m or more, not {self.visibility:g} m")
+
+    @property
+    def extinction(self) -> float:
+        """What the air takes of the light on each way, in 1/m."""
+        return float(RAIN_EXTINCTION * self.rain**RAIN_EXPONENT + CONTRAST_AT_VISIBILITY / self.visibility)
+
+    @property
+    def is_wet(self) -> bool:
+        """Whether roads and ground are wet."""
+        return self.wet_road or self.rain > 0
+
+    def through(self, model: LidarModel) -> LidarModel:
+        """Return a sensor that looks through this weather."""
+        return model.in_air(self.extinction) if self.extinction > 0 else model
+
+    def over(self, geometry: SceneGeometry) -> SceneGeometry:
+        """Return a scene in this weather: wet roads and ground return less."""
+        if not self.is_wet:
+            return geometry
+        return replace(geometry, roads=tuple(map(_wet, geometry.roads)), ground=tuple(map(_wet, geometry.ground)))
+
+
+def _wet(mesh: Mesh) -> Mesh:
+    dry = np.full(len(mesh.triangles), DEFAULT_REFLECTIVITY) if mesh.reflectivity is None else mesh.reflectivity
+    return replace(mesh, reflectivity=dry * WET_FACTOR)
