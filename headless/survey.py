@@ -27,7 +27,7 @@ from seip_addon.core.results.placement_record import Provenance, versions
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
-from seip_addon.core.site.weather import Weather
+from seip_addon.core.site.weather import weather_of
 from seip_addon.core.visibility.settings import VisibilitySettings
 from seip_addon.core.visibility.triangle_culling import culling_message
 from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, lay_out, record_of, see
@@ -83,7 +83,9 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     returns.add_argument(
         "--reflectivity", nargs="+", default=[], metavar="MATERIAL=SHARE", help="of materials, in place of the scene's"
     )
-    add_settings(returns, Weather, "rain", "visibility", "wet_road")
+    returns.add_argument(
+        "--weather", nargs="+", default=[], metavar="WHAT", help="to look through: rain=MM/H, visibility=M in fog, wet"
+    )
     work = parser.add_argument_group("work")
     add_settings(work, SurveySettings, "engine")
     work.add_argument(
@@ -179,7 +181,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         options,
         candidates=candidates,
         visibility=visibility,
-        weather=read_settings(Weather, options),
+        weather=weather_of(options.weather),
         time_limit=limit,
     )
 

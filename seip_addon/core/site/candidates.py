@@ -70,7 +70,7 @@ class CandidateSettings:
     )
     tilts: tuple[float, ...] = setting(
         (0.0,),
-        "degrees nose down towards the region, or FROM:TO:STEP; up where negative; upright if not given",
+        "degrees nose down towards the region, or FROM:TO:STEP; up where negative",
         unit="rad",
         metavar="DEG",
         read=lambda texts: tilts_of(texts),  # noqa: PLW0108 -- as above

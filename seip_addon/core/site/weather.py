@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +75,33 @@ class Weather:
         if not self.is_wet:
             return geometry
         return replace(geometry, roads=tuple(map(_wet, geometry.roads)), ground=tuple(map(_wet, geometry.ground)))
+
+
+def weather_of(words: Sequence[str]) -> Weather:
+    """Return the weather of words as commands take them: ``rain=10``, ``visibility=200``, ``wet``.
+
+    Raises
+    ------
+    SeipError
+        A word is none of these, or its number makes no sense.
+    """
+    given: dict[str, Any] = {}
+    for word in words:
+        name, _, number = word.partition("=")
+        if word == "wet":
+            given["wet_road"] = True
+        elif name in {"rain", "visibility"} and _is_number(number):
+            given[name] = float(number)
+        else:
+            raise SeipError(f"weather {word!r} is not understood: give rain=MM/H, visibility=METRES or wet")
+    return Weather(**given)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _wet(mesh: Mesh) -> Mesh:

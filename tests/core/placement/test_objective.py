@@ -90,6 +90,6 @@ def test_each_fault_has_its_sentence(example, goal, sentence):
 def test_the_weighted_problem_needs_a_weighted_region(example):
     site = example.site
     targets = type(site.targets)(site.targets.xyz, site.targets.weight, np.zeros(len(site.targets), bool), 1.0)
-    bare = type(site)(site.name, site.origin, site.region, targets, site.candidates, site.triangles)
+    bare = type(site)(site.name, site.origin, site.region, targets, site.candidates, site.triangles, site.reflectivity)
     with pytest.raises(SeipError, match="needs a weighted region"):
         target_weights(bare, Objective(central_weight=2.0))
