@@ -77,6 +77,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     given = {_FIELDS.get(name, name): value for name, value in values.items() if value is not None}
     angles = {name: np.radians(given.pop(f"{name}_deg")) for name in ("elevations", "azimuth_offsets")}
     kind = given.pop("model", (CarlaDropoff if _DROPOFF.keys() & given.keys() else RangeEquation).model)
+    beams = given.pop("assumed")
     own = {name: given.pop(name) for name in (*_DROPOFF, *_DETECTION) if name in given}
     strange = [name for name in own if name not in (_DROPOFF if kind == CarlaDropoff.model else _DETECTION)]
     if strange:
@@ -86,7 +87,14 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     try:
         law, assumed = (_dropoff(own), "") if kind == CarlaDropoff.model else _range_equation(own, high)
         return LidarModel(
-            key=key, min_range=low, max_range=high, price_range=price_range, law=law, assumed=assumed, **angles, **given
+            key=key,
+            min_range=low,
+            max_range=high,
+            price_range=price_range,
+            law=law,
+            assumed="; ".join(filter(None, (beams, assumed))),
+            **angles,
+            **given,
         )
     except SeipError as error:
         sentence = str(error)
@@ -195,6 +203,7 @@ _KEYS = {
     "rotation_rate_hz": Key(_number),
     "price_usd": Key(_pair),
     "price_source": Key(str, None),
+    "assumed": Key(str, ""),
     "azimuth_offsets_deg": Key(_numbers, ()),
     "range_noise_std_m": _OPTIONAL,
     "range_noise_growth_per_m": _OPTIONAL,
