@@ -68,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
         "--tolerance",
         type=float,
         metavar="SHARE",
-        help="pick --grid and --spacing: the coarsest whose placement covers as much but for this share",
+        help="pick the coarsest --grid and --spacing whose placement covers as much but for this share",
     )
     parser.add_argument(
         "--pose-errors",

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless import runtime
+from headless import runtime, survey
 from headless.options import add_settings, new_parser, read_settings
 
 import bpy
@@ -27,8 +28,10 @@ from seip_addon.core.progress import finish
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.scans.run_folder import Record, Run, check_run_folder
+from seip_addon.core.site.weather import weather_of
 from seip_addon.core.traffic.source import load_trajectories
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
+from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
 from seip_addon.scene.traffic import read_traffic
@@ -63,15 +66,22 @@ def _settings(options: argparse.Namespace) -> RecordingSettings:
 
 def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
     """Read what the frames follow from: the scene, its sensors, and its traffic."""
+    weather = weather_of(options.weather)
+    set_reflectivity(options.reflectivity)
     reading = read_scene(bpy.context.scene)
     runtime.warn(reading.warnings)
-    sensors = read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
+    sensors = [
+        replace(sensor, model=weather.through(sensor.model))
+        for sensor in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
+    ]
     if options.traffic is None:
         with runtime.progress_bar() as report:
             trajectories = finish(read_traffic(bpy.context.scene), report)
     else:
         trajectories = load_trajectories(options.traffic, reading.geometry)
-    return make_run(reading.geometry, sensors, trajectories, settings, versions(blender=bpy.app.version_string))
+    return make_run(
+        weather.over(reading.geometry), sensors, trajectories, settings, versions(blender=bpy.app.version_string)
+    )
 
 
 def _in_words(run: Run) -> str:
@@ -105,6 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     how = parser.add_argument_group("measurement")
     add_settings(how, ScanSettings, "seed", "rolling_shutter")
     how.add_argument("--no-noise", action="store_true", help="exact ranges, and no return is lost")
+    survey.add_optics(how)
     add_settings(how, ScanSettings, "engine")
     export = parser.add_argument_group("datasets")
     export.add_argument("--format", nargs="+", choices=tuple(FORMATS), default=[], help="also write the run in these")

@@ -80,12 +80,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     add_settings(metres, CandidateSettings, "spacing", "setback", "clearance", "bracket")
     returns = parser.add_argument_group("returns")
     add_settings(returns, VisibilitySettings, "detection", "min_intensity")
-    returns.add_argument(
-        "--reflectivity", nargs="+", default=[], metavar="MATERIAL=SHARE", help="of materials, in place of the scene's"
-    )
-    returns.add_argument(
-        "--weather", nargs="+", default=[], metavar="WHAT", help="to look through: rain=MM/H, visibility=M in fog, wet"
-    )
+    add_optics(returns)
     work = parser.add_argument_group("work")
     add_settings(work, SurveySettings, "engine")
     work.add_argument(
@@ -101,6 +96,16 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     if not in_full:
         for group in (sensors, metres, returns, work):
             name_only(group, "see: seip place --help")
+
+
+def add_optics(group: argparse._ActionsContainer) -> None:
+    """Add options of what surfaces reflect and of the weather."""
+    group.add_argument(
+        "--reflectivity", nargs="+", default=[], metavar="M=SHARE", help="of materials M, 0 to 1 (the scene's own)"
+    )
+    group.add_argument(
+        "--weather", nargs="+", default=[], metavar="WHAT", help="to look through: rain=MM/H, visibility=M in fog, wet"
+    )
 
 
 def runs_beside(scene: Path | None, kind: str = "") -> list[Path]:

@@ -9,6 +9,7 @@ from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.scene import contract
+from seip_addon.scene.materials import material, reflectivity, set_reflectivity
 from seip_addon.scene.read import read_scene
 
 
@@ -344,3 +345,17 @@ def test_faces_of_vertices_that_are_not_there_are_named(scene):
     mesh.attributes[".corner_vert"].data.foreach_set("value", [0, 1, 2, 99])
     with pytest.raises(SeipError, match=r"object 'torn' has a vertex .* repair or delete it"):
         read_scene(scene)
+
+
+def test_materials_get_the_reflectivity_that_is_asked_for(scene):
+    material("asphalt")
+    set_reflectivity(["asphalt=0.08"])
+    assert reflectivity(bpy.data.materials["SEIP asphalt"]) == 0.08
+    for asked, message in (
+        ("asfalt=0.1", "no material 'asfalt'; did you mean asphalt"),
+        ("asphalt=dark", "must be a number from 0 to 1, not 'dark'"),
+        ("asphalt=1.5", "must be a number from 0 to 1, not 1.5"),
+        ("asphalt", "no material ''"),
+    ):
+        with pytest.raises(SeipError, match=message):
+            set_reflectivity([asked])

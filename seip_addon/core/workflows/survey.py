@@ -76,7 +76,7 @@ class SurveySettings:
     time_limit: float = 60.0
     effort: float = setting(
         math.inf,
-        "for each answer, in units of counted work, each about a second of one core: the same answer every time",
+        "for each answer, in counted work, a unit about a second of a core: the same answer again",
         metavar="UNITS",
     )
     spacings_because: str = ""
