@@ -76,6 +76,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     (low, high), price_range = values.pop("range_m"), tuple(values.pop("price_usd"))
     given = {_FIELDS.get(name, name): value for name, value in values.items() if value is not None}
     angles = {name: np.radians(given.pop(f"{name}_deg")) for name in ("elevations", "azimuth_offsets")}
+    field_of_view = math.radians(given.pop("horizontal_field_of_view_deg"))
     kind = given.pop("model", (CarlaDropoff if _DROPOFF.keys() & given.keys() else RangeEquation).model)
     own = {name: given.pop(name) for name in (*_DROPOFF, *_DETECTION) if name in given}
     strange = [name for name in own if name not in (_DROPOFF if kind == CarlaDropoff.model else _DETECTION)]
@@ -86,7 +87,15 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     try:
         law, assumed = (_dropoff(own), "") if kind == CarlaDropoff.model else _range_equation(own, high)
         return LidarModel(
-            key=key, min_range=low, max_range=high, price_range=price_range, law=law, assumed=assumed, **angles, **given
+            key=key,
+            min_range=low,
+            max_range=high,
+            price_range=price_range,
+            law=law,
+            assumed=assumed,
+            field_of_view=field_of_view,
+            **angles,
+            **given,
         )
     except SeipError as error:
         sentence = str(error)
@@ -121,6 +130,12 @@ def _number(value: object) -> float:
     if not _is_number(value):
         raise ValueError(f"must be a number, not {value!r}")
     return float(value)
+
+
+def _boolean(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"must be true or false, not {value!r}")  # noqa: TRY004 -- what `read_table` takes
+    return value
 
 
 def _numbers(value: object) -> list[float]:
@@ -196,6 +211,8 @@ _KEYS = {
     "price_usd": Key(_pair),
     "price_source": Key(str, None),
     "azimuth_offsets_deg": Key(_numbers, ()),
+    "horizontal_field_of_view_deg": Key(_number, 360.0),
+    "clockwise": Key(_boolean, False),  # noqa: FBT003 -- the value where none is given
     "range_noise_std_m": _OPTIONAL,
     "range_noise_growth_per_m": _OPTIONAL,
     "model": Key(_law, None),
