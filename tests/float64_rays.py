@@ -30,15 +30,17 @@ def first_hits(origin: Float, directions: Float, triangles: Float) -> Float:
 
 
 def scan_directions(model: LidarModel, yaw: float) -> Float:
-    """One revolution from sines and cosines of each ray's own angles, (n, 3)."""
+    """One revolution or frame from sines and cosines of each ray's own angles, (n, 3)."""
+    view, count = model.field_of_view, model.azimuth_count
+    begin = 0.0 if view == 2 * math.pi else view / 2 / count - view / 2
     rays = [
         (
-            math.cos(elevation) * math.cos(yaw + offset + 2 * math.pi * step / model.azimuth_count),
-            math.cos(elevation) * math.sin(yaw + offset + 2 * math.pi * step / model.azimuth_count),
+            math.cos(elevation) * math.cos(yaw + offset + begin + view * step / count),
+            math.cos(elevation) * math.sin(yaw + offset + begin + view * step / count),
             math.sin(elevation),
         )
         for elevation, offset in zip(model.elevations, model.azimuth_offsets, strict=True)
-        for step in range(model.azimuth_count)
+        for step in range(count)
     ]
     return np.array(rays)
 

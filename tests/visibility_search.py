@@ -13,7 +13,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -74,6 +74,8 @@ def draw_case(seed: int) -> Case:
     if random.random() < 0.5:  # as Blender keeps them
         triangles = triangles.astype(np.float32).astype(np.float64)
     models = {key: _model(random, key, half) for key in ("one", "two")}
+    if random.random() < 0.6:  # one, both or none of them look one way, some of them with channels of the other
+        models = _looking_one_way(random, models)
     targets = _targets(random, triangles, delta, 60)
     return Case(
         Site(
@@ -205,6 +207,18 @@ def _model(random: np.random.Generator, key: str, half: float) -> LidarModel:
     )
 
 
+def _looking_one_way(random: np.random.Generator, models: dict[str, LidarModel]) -> dict[str, LidarModel]:
+    """Limit fields of view: at times of models whose channels are equal, or to all but a step of the circle."""
+    if random.random() < 0.3:
+        models["two"] = replace(models["one"], key="two")
+    for key, model in models.items():
+        count = max(1, round(model.points_per_second / model.rotation_rate / len(model.elevations)))
+        degrees = [random.uniform(1, 359), float(random.choice([1.0, 90.0, 120.0, 180.0, 270.0, 359.0])), 360.0]
+        degrees.append(360.0 - 360.0 / (count + 1))
+        models[key] = replace(model, field_of_view=math.radians(random.choice(degrees)))
+    return models
+
+
 def _targets(random: np.random.Generator, triangles: Float, delta: float, count: int) -> Float:
     """Points at every offset from the faces: up, down and across, some of them δ away but for rounding."""
     which = random.integers(0, len(triangles), count)
@@ -269,9 +283,12 @@ def judge(case: Case) -> Verdict:
 
 
 def _rays(model: LidarModel, yaw: float, tilt: float) -> Float:
-    """Unit directions of one revolution, each from its own angles, turned about y by the tilt and then about z."""
+    """Unit directions of one frame, each from its own angles, turned about y by the tilt and then about z."""
     count = max(1, round(model.points_per_second / model.rotation_rate / len(model.elevations)))
-    azimuth = model.azimuth_offsets[:, None] + np.arange(count) * (2 * math.pi / count)
+    column = np.arange(count) * (2 * math.pi / count)
+    if model.field_of_view < 2 * math.pi:
+        column = ((2 * np.arange(count) + 1) / (2 * count) - 0.5) * model.field_of_view
+    azimuth = model.azimuth_offsets[:, None] + column
     level = np.cos(model.elevations)[:, None]
     x, y = level * np.cos(azimuth), level * np.sin(azimuth)
     z = np.broadcast_to(np.sin(model.elevations)[:, None], x.shape)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from .model import LidarModel
 class BeamPattern:
     """The directions of a model's rays, computed alike whichever of them are asked for.
 
-    Ray (channel c, step k) points at azimuth yaw + offset[c] + 2πk/azimuth_count,
+    Ray (channel c, step k) points at azimuth yaw + offset[c] + first_azimuth + k azimuth_step,
     counter-clockwise from +x, and at elevation[c]. Sines and cosines are looked
     up and turned by the addition theorem, because products and sums of float64
     are the same bits in every batch and vectorised sines need not be.
@@ -27,7 +26,7 @@ class BeamPattern:
 
     def __init__(self, model: LidarModel, yaw: float = 0.0) -> None:
         self.shape = (model.channels, model.azimuth_count)
-        self._step_cos, self._step_sin = _turns(model.azimuth_count)
+        self._step_cos, self._step_sin = _turns(model.azimuth_count, model.azimuth_step, model.first_azimuth)
         turn = yaw + model.azimuth_offsets
         level = np.cos(model.elevations)
         self._turn_cos, self._turn_sin = np.cos(turn) * level, np.sin(turn) * level
@@ -55,14 +54,14 @@ class BeamPattern:
 
 
 @functools.cache
-def _turns(steps: int) -> tuple[Float, Float]:
-    """Cosines and sines of a revolution in equal steps."""
-    angle = 2 * math.pi / steps * np.arange(steps)
+def _turns(steps: int, step: float, first: float) -> tuple[Float, Float]:
+    """Cosines and sines of so many steps of equal size, in radians, from a first azimuth on."""
+    angle = first + step * np.arange(steps)
     return np.cos(angle), np.sin(angle)
 
 
 def beam_directions(model: LidarModel, yaw: float = 0.0) -> Float:
-    """Return the unit directions of one revolution.
+    """Return the unit directions of one revolution or frame.
 
     Parameters
     ----------

@@ -76,6 +76,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     (low, high), price_range = values.pop("range_m"), tuple(values.pop("price_usd"))
     given = {_FIELDS.get(name, name): value for name, value in values.items() if value is not None}
     angles = {name: np.radians(given.pop(f"{name}_deg")) for name in ("elevations", "azimuth_offsets")}
+    field_of_view = math.radians(given.pop("horizontal_field_of_view_deg"))
     kind = given.pop("model", (CarlaDropoff if _DROPOFF.keys() & given.keys() else RangeEquation).model)
     beams = given.pop("assumed")
     own = {name: given.pop(name) for name in (*_DROPOFF, *_DETECTION) if name in given}
@@ -93,6 +94,7 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
             price_range=price_range,
             law=law,
             assumed="; ".join(filter(None, (beams, assumed))),
+            field_of_view=field_of_view,
             **angles,
             **given,
         )
@@ -129,6 +131,12 @@ def _number(value: object) -> float:
     if not _is_number(value):
         raise ValueError(f"must be a number, not {value!r}")
     return float(value)
+
+
+def _boolean(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"must be true or false, not {value!r}")  # noqa: TRY004 -- what `read_table` takes
+    return value
 
 
 def _numbers(value: object) -> list[float]:
@@ -205,6 +213,8 @@ _KEYS = {
     "price_source": Key(str, None),
     "assumed": Key(str, ""),
     "azimuth_offsets_deg": Key(_numbers, ()),
+    "horizontal_field_of_view_deg": Key(_number, 360.0),
+    "clockwise": Key(_boolean, False),  # noqa: FBT003 -- the value where none is given
     "range_noise_std_m": _OPTIONAL,
     "range_noise_growth_per_m": _OPTIONAL,
     "model": Key(_law, None),

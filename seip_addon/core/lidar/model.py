@@ -18,7 +18,7 @@ DetectionLaw = RangeEquation | CarlaDropoff
 
 @dataclass(frozen=True, eq=False)
 class LidarModel:
-    """A spinning LiDAR.
+    """A LiDAR that turns all round, or scans a limited horizontal field of view in columns.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class LidarModel:
     points_per_second : float
         Single returns, all channels together.
     rotation_rate : float, hertz
-        Revolutions per second at which the sensor is used.
+        Revolutions per second at which the sensor is used; frames where its field of view is limited.
     price_range : tuple of two floats, US dollars
         Lowest and highest price.
     price_source : str
@@ -44,6 +44,10 @@ class LidarModel:
     azimuth_offsets : (c,) float64, radians
         What each channel's azimuth is ahead of the head's, counter-clockwise.
         Zeros when not given.
+    field_of_view : float, radians
+        Horizontal, symmetrical about azimuth zero: 2π for a sensor that turns all round.
+    clockwise : bool
+        Whether it turns clockwise, seen from above. That changes when an azimuth is looked along, and nothing else.
     range_noise_std : float, metres
         Standard deviation of the range noise (Gaussian) near the sensor.
     range_noise_growth : float, 1/m
@@ -66,6 +70,8 @@ class LidarModel:
     price_range: tuple[float, float]
     price_source: str = ""
     azimuth_offsets: Float = field(default_factory=lambda: np.zeros(0))
+    field_of_view: float = math.tau
+    clockwise: bool = False
     range_noise_std: float = 0.03
     range_noise_growth: float = 0.0
     law: DetectionLaw = field(default_factory=CarlaDropoff)
@@ -83,8 +89,23 @@ class LidarModel:
 
     @property
     def azimuth_count(self) -> int:
-        """Azimuth steps in a revolution, from points per second, rotation and channels."""
+        """Azimuth steps in a revolution or frame, from points per second, rotation and channels."""
         return max(1, round(self.points_per_second / self.rotation_rate / self.channels))
+
+    @property
+    def all_round(self) -> bool:
+        """Whether its field of view is the full circle: step 0 follows the last one."""
+        return self.field_of_view == math.tau
+
+    @property
+    def azimuth_step(self) -> float:
+        """Radians between neighbouring azimuth steps."""
+        return self.field_of_view / self.azimuth_count
+
+    @property
+    def first_azimuth(self) -> float:
+        """Azimuth of step 0, radians; the steps of a limited field of view lie symmetrically about azimuth zero."""
+        return 0.0 if self.all_round else (self.azimuth_step - self.field_of_view) / 2
 
     @property
     def price(self) -> float:
@@ -112,6 +133,7 @@ def _require_valid(model: LidarModel) -> None:
         "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
         "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
         "azimuth offsets must be finite": bool(np.isfinite(model.azimuth_offsets).all()),
+        "its horizontal field of view must be above 0 and at most 360 degrees": 0 < model.field_of_view <= math.tau,
         "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
         "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
         "the rotation rate must lie between 0.01 and 1000 Hz": 0.01 <= model.rotation_rate <= 1000,

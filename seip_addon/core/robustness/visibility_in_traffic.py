@@ -28,10 +28,11 @@ from ..progress import Progress
 from ..scans.beam_culling import BeamWindows
 from ..scans.sensor import level_orientation
 from ..site.scene_geometry import DEFAULT_REFLECTIVITY
-from ..visibility.near_surfaces import NearSurfaces, near_surfaces
-from ..visibility.ray_casting import RayCaster, engine_name, make_ray_caster
-from ..visibility.scanning import ScanPosition
+from ..visibility.near_surfaces import NearSurfaces, near_surfaces, rotated_surfaces
+from ..visibility.ray_casting import engine_name, make_ray_caster
+from ..visibility.scanning import Caster, ScanPosition
 from ..visibility.target_index import TargetIndex
+from ..visibility.visibility_model import in_sensor_axes
 from .scenario_visibility import ScenarioVisibility, each_in_threads
 from .traffic_instants import TrafficObstacles
 from .visibility_under_errors import Surroundings
@@ -84,12 +85,18 @@ def visibility_in_traffic(
         pose = int(poses[number])
         model, xyz, yaw = around.models[str(candidates.sensor[pose])], candidates.xyz[pose], candidates.yaw[pose]
         place = ScanPosition(caster, xyz, float(yaw), [model], around.sight, site.reflectivity)
-        static = _StaticScan(place, wanted)
+        points, near, found, present = wanted, surfaces, index, vehicles
+        if candidates.tilt[pose] != 0:  # in the axes of the sensor, as visibility on the empty road
+            orientation = candidates.orientation(pose)
+            present = [one.rotated(place, orientation) for one in vehicles]
+            place, near = in_sensor_axes(place, orientation), rotated_surfaces(surfaces, xyz, orientation)
+            points, found = near.xyz, TargetIndex(near.xyz, around.sight.delta)
+        static = _StaticScan(place, points)
         visibility: _LayerVisibility = (
-            _HeightVisibility(static, wanted) if layer == "height" else _RoadVisibility(static, index, surfaces)
+            _HeightVisibility(static, points) if layer == "height" else _RoadVisibility(static, found, near)
         )
-        for instant, present in enumerate(vehicles):
-            packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(present)))
+        for instant, vehicle in enumerate(present):
+            packed[instant, number] = np.packbits(visibility.seen(static.blocked_by(vehicle)))
 
     yield from each_in_threads(compute, range(len(poses)), caster.threads, "looking between vehicles")
     return ScenarioVisibility(packed, len(wanted))
@@ -99,9 +106,14 @@ def visibility_in_traffic(
 class _VehicleCaster:
     """The road users of an instant, ready to be cast against."""
 
-    caster: RayCaster
+    caster: Caster
     reflectivity: Float
     hulls: Float
+
+    def rotated(self, place: ScanPosition, orientation: Float) -> _VehicleCaster:
+        """Return them in the axes of the sensor at a place, which is so oriented."""
+        there = in_sensor_axes(replace(place, caster=self.caster), orientation)
+        return replace(self, caster=there.caster, hulls=(self.hulls - place.origin) @ orientation)
 
 
 def _vehicle_caster(around: Surroundings, present: TrafficObstacles) -> _VehicleCaster:
@@ -176,9 +188,11 @@ class _StaticScan:
         order = np.argsort(self.model.elevations, kind="stable")
         between = (self.model.elevations[order][1:] + self.model.elevations[order][:-1]) / 2
         channel = order[np.searchsorted(between, np.arctan2(z, np.hypot(x, y)))]
-        steps = self.model.azimuth_count
-        step = np.rint((np.arctan2(y, x) - self.model.azimuth_offsets[channel]) / (2 * np.pi) * steps).astype(np.int64)
-        nearest: Integer = channel * steps + step % steps
+        steps, size = self.model.azimuth_count, self.model.azimuth_step
+        middle = (steps - 1) / 2  # of the steps, to whose both sides half a turn lies
+        turn = np.arctan2(y, x) - self.model.azimuth_offsets[channel] - self.model.first_azimuth - middle * size
+        step = np.rint(((turn + np.pi) % (2 * np.pi) - np.pi) / size + middle).astype(np.int64)
+        nearest: Integer = channel * steps + np.clip(step, 0, steps - 1)
         return nearest
 
     def directions(self, ray: Integer) -> Float:

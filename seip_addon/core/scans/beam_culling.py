@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Float, Integer
 from ..lidar import LidarModel
+from ..lidar.azimuth_steps import steps_in_arcs
 
 
 class BeamWindows:
@@ -20,7 +21,8 @@ class BeamWindows:
         self._steps, self._reach = model.azimuth_count, model.max_range
         self._channel = np.argsort(model.elevations, kind="stable")
         self._slope = np.tan(model.elevations[self._channel])
-        self._zero = model.azimuth_offsets
+        self._zero = model.azimuth_offsets + model.first_azimuth
+        self._size, self._all_round = model.azimuth_step, model.all_round
 
     def rays_towards(self, points: Float) -> tuple[Integer, Integer]:
         """Find rays.
@@ -39,13 +41,15 @@ class BeamWindows:
         """
         middle, half, near = _azimuths(points)
         hull, channel = self._channels_at(points, near)
-        step = 2 * math.pi / self._steps
-        ahead = middle[hull] - self._zero[channel]
-        first = np.ceil((ahead - half[hull]) / step).astype(np.int64)
-        last = np.floor((ahead + half[hull]) / step).astype(np.int64)
-        count = np.clip(last - first + 1, 0, self._steps)
+        arc, first, count = steps_in_arcs(
+            middle[hull] - self._zero[channel],
+            half[hull],
+            np.full(len(hull), self._size),
+            np.full(len(hull), self._steps),
+            np.full(len(hull), self._all_round),
+        )
         steps = _counted(first, count) % self._steps
-        return np.repeat(hull, count), np.repeat(channel * self._steps, count) + steps
+        return np.repeat(hull[arc], count), np.repeat(channel[arc] * self._steps, count) + steps
 
     def _channels_at(self, points: Float, near: Float) -> tuple[Integer, Integer]:
         """Pairs of hulls and of channels that somewhere over the hull's distances are at its height."""

@@ -207,7 +207,10 @@ class Scanner:
     @property
     def delay(self) -> Float:
         """Seconds after the beginning of the revolution at which each azimuth step is taken, (azimuth_count,)."""
-        return np.arange(self._steps) / (self._steps * self._model.rotation_rate)
+        order = np.arange(self._steps)
+        if self._model.clockwise:  # all round it begins at azimuth zero, else at the other end of the field of view
+            order = -order % self._steps if self._model.all_round else order[::-1]
+        return order / (self._steps * self._model.rotation_rate)
 
     def scan(self, traffic: MovingTraffic, users: int) -> Scan:
         """Return what the rays end on with traffic that is one of so many road users."""

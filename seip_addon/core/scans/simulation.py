@@ -37,8 +37,8 @@ class ScanSettings:
     noise : bool
         Whether ranges are noisy and returns get lost, as the sensors' models say.
     rolling_shutter : bool
-        Whether each azimuth is looked along at its own time, counter-clockwise from azimuth zero,
-        while the traffic moves. Else a revolution takes no time.
+        Whether each azimuth is looked along at its own time (`Scanner.delay`) while the traffic moves. Else a
+        revolution takes no time.
     engine : {"auto", "bvh", "embree"}
     """
 

@@ -35,6 +35,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 from ..lidar import LidarModel
+from ..lidar.azimuth_steps import steps_in_arcs
 from ..lidar.model import DetectionLaw
 from .near_surfaces import NearSurfaces
 from .settings import VisibilitySettings
@@ -99,7 +100,11 @@ class Beams:
     zero : (c,) float64, radians
         Azimuth of step 0.
     steps : (c,) int64
-        Azimuth steps of a revolution.
+        Azimuth steps of a revolution or frame.
+    size : (c,) float64, radians
+        Of a step.
+    all_round : (c,) bool
+        Whether step 0 follows the last one.
     first_ray : (c,) int64
         Number of the ray at step 0. Rays of the same direction have the same number.
     min_range, max_range : (c,) float64, metres
@@ -113,6 +118,8 @@ class Beams:
     elevation: Float
     zero: Float
     steps: Integer
+    size: Float
+    all_round: Boolean
     first_ray: Integer
     min_range: Float
     max_range: Float
@@ -123,19 +130,22 @@ class Beams:
     def of(cls, models: Sequence[LidarModel], yaw: float, settings: VisibilitySettings) -> Beams:
         """Join the channels of models that look along the same yaw.
 
-        Channels coincide whose elevation, azimuth offset and number of steps are the same.
+        Channels coincide whose elevation, azimuth offset, number of steps and field of view are the same.
         """
         channels = [model.channels for model in models]
         elevation = np.concatenate([model.elevations for model in models])
         offset = np.concatenate([model.azimuth_offsets for model in models])
         steps = np.repeat([model.azimuth_count for model in models], channels)
-        kinds, kind = np.unique(np.column_stack([elevation, offset, steps]), axis=0, return_inverse=True)
+        view = np.repeat([model.field_of_view for model in models], channels)
+        kinds, kind = np.unique(np.column_stack([elevation, offset, steps, view]), axis=0, return_inverse=True)
         end = np.cumsum(kinds[:, 2].astype(np.int64))
         return cls(
             sensor=np.repeat(np.arange(len(models)), channels),
             elevation=elevation,
-            zero=yaw + offset,
+            zero=yaw + offset + np.repeat([model.first_azimuth for model in models], channels),
             steps=steps,
+            size=view / steps,
+            all_round=np.repeat([model.all_round for model in models], channels),
             first_ray=(end - kinds[:, 2].astype(np.int64))[kind.ravel()],
             min_range=np.repeat([model.min_range for model in models], channels),
             max_range=np.repeat([model.max_range for model in models], channels),
@@ -172,7 +182,7 @@ class NearRays:
     channel : (k,) int64
         Of the beams.
     first : (k,) int64
-        First azimuth step, possibly negative or beyond the revolution, at the end of which step 0 follows.
+        First azimuth step; where the channel goes all round possibly negative or beyond the revolution.
     width : (k,) int64
         Number of steps, at least 1.
     miss : (k,) float64, metres
@@ -290,19 +300,17 @@ def near_rays(beams: Beams, patches: Patches, planes: Planes | None = None) -> N
     arcs = _arcs(beams, patches)
     if planes is not None:
         arcs = _cut_by_planes(_cut_by_strength(arcs, beams, planes), planes)
-    step = 2 * math.pi / beams.steps[arcs.channel]
-    azimuth = arcs.azimuth - beams.zero[arcs.channel]
-    first = np.ceil((azimuth - arcs.half_width) / step).astype(np.int64)
-    last = np.floor((azimuth + arcs.half_width) / step).astype(np.int64)
-    rays = NearRays(
-        target=patches.target[arcs.patch],
-        patch=arcs.patch,
-        channel=arcs.channel,
-        first=first,
-        width=np.minimum(last - first + 1, beams.steps[arcs.channel]),
-        miss=np.abs((arcs.begin + arcs.end) / 2 - patches.distance[arcs.patch]),
+    channel = arcs.channel
+    arc, first, width = steps_in_arcs(
+        arcs.azimuth - beams.zero[channel],
+        arcs.half_width,
+        beams.size[channel],
+        beams.steps[channel],
+        beams.all_round[channel],
     )
-    return rays.pick(np.flatnonzero(rays.width > 0))
+    patch = arcs.patch[arc]
+    miss = np.abs((arcs.begin + arcs.end)[arc] / 2 - patches.distance[patch])
+    return NearRays(patches.target[patch], patch, channel[arc], first, width, miss)
 
 
 @dataclass(frozen=True, eq=False)

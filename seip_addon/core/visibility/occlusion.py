@@ -38,7 +38,7 @@ def stopped_by(origin: Float, triangles: Float, beams: Beams, rays: NearRays, pl
     (k,) bool
         True only where the triangle stops all rays of the bundle by more than the tolerance of a ray caster.
     """
-    step = 2 * math.pi / beams.steps[rays.channel]
+    step = beams.size[rays.channel]
     slope = np.tan(beams.elevation)[rays.channel]
     half_width = (rays.width - 1) / 2 * step
     azimuth = beams.zero[rays.channel] + (rays.first + (rays.width - 1) / 2) * step

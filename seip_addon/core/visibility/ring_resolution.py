@@ -95,7 +95,7 @@ def unresolved_from(model: LidarModel, height: float, delta: float, reach: float
     rings = height / np.tan(down)
     rings = np.append(rings[rings < reach], reach)
     wide = np.flatnonzero(np.diff(rings) > 2 * delta)
-    along = delta * model.azimuth_count / math.pi  # radius at which neighbours in a ring are 2δ apart
+    along = 2 * delta / model.azimuth_step  # radius at which neighbours in a ring are 2δ apart
     return float(min(rings[wide[0]] if len(wide) else reach, along, reach))
 
 

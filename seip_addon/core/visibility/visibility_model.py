@@ -70,7 +70,7 @@ class VisibilityModel:
         """
         if _is_upright(orientation):
             return self.see_upright(models, xyz, _yaw(orientation))
-        position = _in_sensor_axes(self._position(models, xyz, 0.0), orientation)
+        position = in_sensor_axes(self._position(models, xyz, 0.0), orientation)
         return seen_by_near_rays(position, rotated_surfaces(self._surfaces, xyz, orientation))
 
     def see_upright(self, models: Sequence[LidarModel], xyz: Float, yaw: float) -> tuple[Boolean, int]:
@@ -94,7 +94,7 @@ def seen_by_tilted_full_scan(position: ScanPosition, tilt: float, surfaces: Near
     if _is_upright(orientation):
         return seen_by_all_rays(replace(position, yaw=_yaw(orientation)), surfaces)
     turned = rotated_surfaces(surfaces, position.origin, orientation)
-    return seen_by_all_rays(_in_sensor_axes(position, orientation), turned)
+    return seen_by_all_rays(in_sensor_axes(position, orientation), turned)
 
 
 def _is_upright(orientation: Float) -> bool:
@@ -105,8 +105,8 @@ def _yaw(orientation: Float) -> float:
     return math.atan2(orientation[1, 0], orientation[0, 0])
 
 
-def _in_sensor_axes(position: ScanPosition, orientation: Float) -> ScanPosition:
-    """Return a position in the axes of its sensors."""
+def in_sensor_axes(position: ScanPosition, orientation: Float) -> ScanPosition:
+    """Return a position in the axes of its sensors, which are so oriented."""
     caster = _RotatedCaster(position.caster, position.origin, orientation)
     return replace(position, caster=caster, origin=np.zeros(3), yaw=0.0)
 

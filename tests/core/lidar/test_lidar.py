@@ -94,6 +94,29 @@ def test_directions_are_unit_vectors_at_the_published_angles(key: str) -> None:
     np.testing.assert_allclose(np.exp(1j * azimuth), np.exp(1j * expected), atol=1e-13)
 
 
+@pytest.mark.parametrize("degrees", [1, 120, 180, 359])
+def test_columns_of_a_limited_field_of_view_lie_evenly_and_symmetrically_about_azimuth_zero(
+    tmp_path: Path, degrees: int
+) -> None:
+    model = load_catalogue([write_model(tmp_path / "mine.toml", horizontal_field_of_view_deg=str(degrees))])["mine"]
+    rays = beam_directions(model, 0.3)
+    azimuth = np.degrees(np.arctan2(rays[0, :, 1], rays[0, :, 0]) - 0.3)
+    step = degrees / 1000
+    expected = [-degrees / 2 + (column + 0.5) * step for column in range(1000)]
+    assert (azimuth + 180) % 360 - 180 == pytest.approx(expected, abs=1e-9)
+    assert math.degrees(model.azimuth_step) == pytest.approx(step)
+    assert not model.all_round
+
+
+def test_a_sensor_turns_all_round_and_counter_clockwise_where_nothing_else_is_said(tmp_path: Path) -> None:
+    plain = load_catalogue([write_model(tmp_path / "plain.toml")])["mine"]
+    full = {"horizontal_field_of_view_deg": "360", "clockwise": "true"}
+    said = load_catalogue([write_model(tmp_path / "said.toml", **full)])["mine"]
+    assert (plain.all_round, plain.clockwise) == (True, False)
+    assert (said.all_round, said.clockwise) == (True, True)
+    assert beam_directions(plain, 0.3).tobytes() == beam_directions(said, 0.3).tobytes()
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.floats(-10, 10))
 def test_a_rays_direction_does_not_depend_on_its_company(seed: int, count: int, yaw: float) -> None:
     model = CATALOGUE["vls128"]
@@ -146,6 +169,13 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"elevations_deg": "[1.0]"}, "channels, field_of_view_deg"),
         ({"azimuth_offsets_deg": "[1.0]"}, "offset"),
         ({"azimuth_offsets_deg": "[1.0, 2.0, inf, 4.0]"}, "offset"),
+        *(
+            ({"horizontal_field_of_view_deg": view}, "horizontal field of view must be above 0 and at most 360 degrees")
+            for view in ("0", "-90.0", "360.1", "nan")
+        ),
+        ({"horizontal_field_of_view_deg": "[-60.0, 60.0]"}, "horizontal_field_of_view_deg must be a number"),
+        ({"clockwise": '"yes"'}, "clockwise must be true or false"),
+        ({"clockwise": "1"}, "clockwise must be true or false"),
         ({"range_m": "[50.0, 50.0]"}, "range"),
         ({"range_m": "[-1.0, 50.0]"}, "range"),
         ({"range_m": "[0.0, inf]"}, "range"),

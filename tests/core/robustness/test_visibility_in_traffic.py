@@ -15,7 +15,8 @@ from synthetic_junction import junction_site, make_candidates
 from traffic_by_hand import make_model, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import BeamPattern, RangeEquation
+from seip_addon.core.geometry.orientation import rotated
+from seip_addon.core.lidar import RangeEquation, beam_directions
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_instants import (
     BATCH_SECONDS,
@@ -31,8 +32,9 @@ from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.near_surfaces import near_surfaces
 from seip_addon.core.visibility.ray_casting import make_ray_caster
-from seip_addon.core.visibility.scanning import ScanPosition, seen_by_all_rays
+from seip_addon.core.visibility.scanning import ScanPosition
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.visibility_model import seen_by_tilted_full_scan
 
 pytestmark = needs_any
 
@@ -49,18 +51,20 @@ MODELS = {
     "near-blind": make_model(
         key="near-blind", min_range=6.0, max_range=45.0, azimuth_offsets=np.linspace(-0.1, 0.1, 7)
     ),
+    "one-way": make_model(key="one-way", field_of_view=np.radians(140)),
 }
 XYZ = np.array([[9.0, 9.0, 5.0], [-9.0, 12.0, 3.5], [0.0, -30.0, 6.0]])
 SITE = replace(
     junction_site(spacing=2.0),
     candidates=make_candidates(
-        np.repeat(XYZ, 2, axis=0),
-        ["coarse", "near-blind"] * 3,
-        np.repeat(XYZ[:, 2], 2),
-        np.array([0.0, 0.7, 2.0, -2.0, 3.0, -0.4]),
+        np.repeat(XYZ, 3, axis=0),
+        ["coarse", "near-blind", "one-way"] * 3,
+        np.repeat(XYZ[:, 2], 3),
+        np.array([0.0, 0.7, -2.4, 2.0, -2.0, -0.8, 3.0, -0.4, 1.6]),
+        np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.15, 0.1, 0.0, 0.0]),
     ),
 )
-POSES = np.arange(6)
+POSES = np.arange(9)
 AROUND = Surroundings(SITE, MODELS, VisibilitySettings(delta=DELTA), engine=ANY)
 
 
@@ -99,7 +103,10 @@ def by_full_scan(bodies, engine=ANY, around=AROUND):
     reflectivity = np.concatenate([SITE.reflectivity, bodies.reflectivity])
     surfaces = near_surfaces(SITE.triangles, SITE.targets.xyz, around.sight.delta, SITE.reflectivity)
     return np.concatenate(
-        [seen_by_all_rays(place_of(pose, caster, around, reflectivity), surfaces)[0] for pose in POSES]
+        [
+            seen_by_tilted_full_scan(place_of(pose, caster, around, reflectivity), tilt, surfaces)[0]
+            for pose, tilt in enumerate(SITE.candidates.tilt.tolist())
+        ]
     )
 
 
@@ -108,7 +115,9 @@ def beams_past(bodies, pose):
     caster = make_ray_caster(np.concatenate([SITE.triangles, bodies.triangles]), ANY)
     place = place_of(pose, caster, AROUND, SITE.reflectivity)
     (model,) = place.models
-    directions = BeamPattern(model, place.yaw).directions(np.arange(model.channels * model.azimuth_count))
+    directions = beam_directions(model, place.yaw).reshape(-1, 3)
+    if SITE.candidates.tilt[pose] != 0:
+        directions = rotated(beam_directions(model).reshape(-1, 3), SITE.candidates.orientation(pose))
     end = np.minimum(caster.cast(place.origin, directions, model.max_range)[0], model.max_range)
     points = SITE.targets.xyz + np.array([0.0, 0.0, LAYER_HEIGHT])
     passed = np.zeros(len(points), dtype=bool)

@@ -182,7 +182,8 @@ def test_an_edge_is_found_where_it_is() -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_windows_hold_every_ray_through_a_hull(seed) -> None:
     random = np.random.default_rng(seed)
-    model = make_model(azimuth_offsets=random.uniform(-0.3, 0.3, 7))
+    view = random.choice([math.tau, random.uniform(0.05, math.tau), math.radians(359)])
+    model = make_model(azimuth_offsets=random.uniform(-0.3, 0.3, 7), field_of_view=view)
     boxes = []
     for _ in range(4):
         size, middle = (
@@ -288,15 +289,18 @@ WAYS = {
 
 @each_engine
 @pytest.mark.parametrize("way", WAYS)
-def test_with_a_rolling_shutter_each_ray_meets_what_is_there_at_its_own_time(engine, way) -> None:
-    cars, sensor = make_trajectories(WAYS[way]), make_sensor()
+@pytest.mark.parametrize("figures", [{}, {"clockwise": True}, {"field_of_view": math.radians(300)}])
+def test_with_a_rolling_shutter_each_ray_meets_what_is_there_at_its_own_time(engine, way, figures) -> None:
+    yaw = 2.6 if way == "round the sensor" and figures.keys() == {"field_of_view"} else 0.0  # begin where the car does
+    cars, sensor = make_trajectories(WAYS[way]), make_sensor(yaw=yaw, **figures)
     made = simulation(make_static(), [sensor], cars, ScanSettings(noise=False, rolling_shutter=True, engine=engine))
     (scan,) = made.scans(cars.at(0.0))
     (scanner,) = made.scanners
     body = box_body(cars.users[0]).triangles
     expected = np.full(len(scan.distance), np.inf)
     for step in range(0, 720, 3):
-        then = cars.at(min(step / 7200, WAYS[way][-1][0]))
+        turn = (720 - step) % 720 if sensor.model.clockwise else step
+        then = cars.at(min(turn / 7200, WAYS[way][-1][0]))
         turned = rotations(then.yaw, then.pitch)[0]
         rays = np.arange(7) * 720 + step
         expected[rays] = first_hits(sensor.xyz, scanner.directions[rays], then.position + body @ turned.T)
@@ -306,6 +310,16 @@ def test_with_a_rolling_shutter_each_ray_meets_what_is_there_at_its_own_time(eng
     assert different.sum() <= 1
     both = looked[np.isfinite(expected[looked]) & np.isfinite(scan.distance[looked])]
     np.testing.assert_allclose(scan.distance[both], expected[both], atol=1e-4)
+
+
+@pytest.mark.parametrize(("degrees", "steps"), [(360.0, [0, 4, 3, 2, 1]), (120.0, [4, 3, 2, 1, 0])])
+def test_a_clockwise_sensor_looks_the_other_way_round_at_the_same_directions(degrees, steps) -> None:
+    figures = {"elevations": np.zeros(1), "points_per_second": 50.0, "field_of_view": math.radians(degrees)}
+    sensors = [make_sensor(**figures), make_sensor(**figures, clockwise=True)]
+    one, other = simulation(make_static(), sensors, parked()).scanners
+    assert one.delay == pytest.approx(np.arange(5) / 50)
+    assert other.delay == pytest.approx(np.array(steps) / 50)
+    assert one.directions.tobytes() == other.directions.tobytes()
 
 
 def test_a_rolling_shutter_moves_a_face_by_speed_times_delay() -> None:

@@ -23,7 +23,7 @@ from seip_addon.core.visibility.near_surfaces import near_surfaces
 from seip_addon.core.visibility.settings import VisibilitySettings
 
 
-def random_model(random: np.random.Generator) -> LidarModel:
+def random_model(random: np.random.Generator, field_of_view: float = math.tau) -> LidarModel:
     channels = int(random.integers(1, 12))
     return LidarModel(
         key="random",
@@ -37,6 +37,7 @@ def random_model(random: np.random.Generator) -> LidarModel:
         rotation_rate=10.0,
         price_range=(1.0, 2.0),
         azimuth_offsets=random.uniform(-7, 7, channels),
+        field_of_view=field_of_view,
     )
 
 
@@ -56,6 +57,7 @@ def hits(origin: np.ndarray, directions: np.ndarray, triangles: np.ndarray) -> n
 def rays_by_target(near: NearRays, model: LidarModel, targets: int) -> np.ndarray:
     marked = np.zeros((targets, model.channels, model.azimuth_count), dtype=bool)
     for target, channel, first, width in zip(near.target, near.channel, near.first, near.width, strict=True):
+        assert model.all_round or 0 <= first < first + width <= model.azimuth_count
         marked[target, channel, np.arange(first, first + width) % model.azimuth_count] = True
     return marked.reshape(targets, -1)
 
@@ -63,7 +65,8 @@ def rays_by_target(near: NearRays, model: LidarModel, targets: int) -> np.ndarra
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 1.0, 4.0]))
 def test_every_ray_that_returns_from_near_a_target_is_kept(seed: int, delta: float) -> None:
     random = np.random.default_rng(seed)
-    model, yaw = random_model(random), random.uniform(-7, 7)
+    view = random.choice([math.tau, random.uniform(0.02, math.tau), math.radians(359)])
+    model, yaw = random_model(random, view), random.uniform(-7, 7)
     origin = random.normal(0, 2, 3)
     level = random.random() < 0.5  # road-like, or a soup
     triangles = random.uniform(-20, 20, (40, 1, 3)) + random.normal(0, 4, (40, 3, 3)) * (1, 1, 0.05 if level else 1)
@@ -201,6 +204,14 @@ def test_sensors_share_the_rays_of_equal_channels() -> None:
     assert equal.any()
     assert beams.rays == 7500 * (32 + 128 - equal.sum())
     assert set(beams.first_ray[32:][equal]) <= set(beams.first_ray[:32])
+
+
+def test_sensors_share_rays_only_where_these_have_the_same_directions() -> None:
+    model = load_catalogue()["type1"]
+    half, third = (replace(model, field_of_view=math.tau / part) for part in (2, 3))
+    rays = model.channels * model.azimuth_count
+    for others, numbers in (([model], 1), ([half], 2), ([half, half], 2), ([half, third], 3)):
+        assert Beams.of([model, *others], 0.2, VisibilitySettings()).rays == numbers * rays
 
 
 @given(st.integers(1, 40), st.integers(-50, 50))

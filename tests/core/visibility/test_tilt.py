@@ -48,7 +48,9 @@ from seip_addon.core.workflows.survey import SurveySettings
 
 MODELS = {key: replace(model, points_per_second=model.points_per_second / 8) for key, model in load_catalogue().items()}
 PHYSICAL = {key: replace(model, law=RangeEquation.of_ranges(12.0, 30.0)) for key, model in MODELS.items()}
-STRENGTHS = st.sampled_from([(MODELS, 0.0), (MODELS, 0.2), (PHYSICAL, 0.0)])
+VIEWS = {"type1": math.radians(120), "type2": math.radians(350)}
+ONE_WAY = {key: replace(MODELS[key], field_of_view=view) for key, view in VIEWS.items()}
+STRENGTHS = st.sampled_from([(MODELS, 0.0), (MODELS, 0.2), (PHYSICAL, 0.0), (ONE_WAY, 0.0), (ONE_WAY, 0.2)])
 SIGHT = VisibilitySettings()
 NOISE = 2e-3
 """Metres from δ within which float32 and float64 may disagree."""
@@ -97,7 +99,7 @@ def tilted(site, yaw, tilt):
 @given(
     st.integers(0, 2**32 - 1),
     st.sampled_from([0.3, 1.0, 3.0]),
-    st.sampled_from([(MODELS, 0.0), (MODELS, 0.2), (PHYSICAL, 0.0)]),
+    STRENGTHS,
 )
 @cases(20, 4)
 def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, strength):
@@ -107,17 +109,17 @@ def test_same_as_the_full_scan_bit_for_bit(engine, seed, delta, strength):
     assert (finish(compute_visibility(site, models, settings, engine)).packed == full.packed).all()
 
 
-@given(st.integers(0, 2**32 - 1), st.floats(-4, 4), TILT)
+@given(st.integers(0, 2**32 - 1), st.floats(-4, 4), TILT, st.sampled_from([MODELS, ONE_WAY]))
 @cases(15, 4)
-def test_a_tilted_candidate_sees_what_an_onlooker_sees_and_what_rays_in_float64_return_from(seed, yaw, tilt):
+def test_a_tilted_candidate_sees_what_an_onlooker_sees_and_what_rays_in_float64_return_from(seed, yaw, tilt, models):
     site = tilted(patch(seed, poses=1), yaw, tilt)
-    visible, poses = grid_of(site).visible, site.candidates
+    visible, poses = finish(compute_visibility(site, models, SIGHT, ANY)).visible, site.candidates
     looks = VisibilityModel(site, SIGHT, make_ray_caster(site.triangles, ANY))
     for pose, key in enumerate(poses.sensor.tolist()):
         turn = level_orientation(yaw) @ nose_down(tilt)
-        assert (looks.see(MODELS[key], poses.xyz[pose], poses.orientation(pose)) == visible[pose]).all()
+        assert (looks.see(models[key], poses.xyz[pose], poses.orientation(pose)) == visible[pose]).all()
         triangles, targets = ((points - poses.xyz[pose]) @ turn for points in (site.triangles, site.targets.xyz))
-        nearest = nearest_return(np.zeros(3), 0.0, MODELS[key], triangles, targets)
+        nearest = nearest_return(np.zeros(3), 0.0, models[key], triangles, targets)
         clear = np.abs(nearest - SIGHT.delta) > NOISE
         assert (visible[pose] == (nearest < SIGHT.delta))[clear].all()
 
@@ -181,6 +183,9 @@ def test_the_key_of_an_upright_grid_is_as_it_was_before_there_were_tilts():
     assert visibility_key(site, MODELS, SIGHT, ANY) == known
     keys = {visibility_key(tilted(site, 0.0, tilt), MODELS, SIGHT, ANY) for tilt in (0.0, 0.1, 0.2)}
     assert len(keys) == 3
+    views = {visibility_key(site, {"type1": replace(model, field_of_view=view)}, SIGHT, ANY) for view in (1.0, 2.0)}
+    assert len({known, *views}) == 3
+    assert visibility_key(site, {"type1": replace(model, clockwise=True)}, SIGHT, ANY) == known
 
 
 CHOICE = CandidateSettings(sensors=("type1",), heights=(3.5, 8.0), spacing=12.0)

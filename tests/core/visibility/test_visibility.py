@@ -60,9 +60,16 @@ PHYSICAL = {
     "coarse": replace(MODELS["coarse"], law=RangeEquation.of_ranges(8.0, 20.0)),
     "fine": replace(MODELS["fine"], law=RangeEquation.of_ranges(15.0, 42.0)),
 }
+ONE_WAY = {
+    "coarse": replace(MODELS["coarse"], field_of_view=math.radians(100)),
+    "fine": replace(MODELS["fine"], field_of_view=math.radians(357)),
+}
 Strength = tuple[dict[str, LidarModel], tuple[float, ...]]
 STRENGTHS = st.sampled_from(
-    [(MODELS, (0.0,)), (MODELS, (0.2,)), (MODELS, (0.6,)), (PHYSICAL, ()), (PHYSICAL, (0.0, 0.5))]
+    [
+        *((MODELS, (0.0,)), (MODELS, (0.2,)), (MODELS, (0.6,))),
+        *((PHYSICAL, ()), (PHYSICAL, (0.0, 0.5)), (ONE_WAY, (0.0,)), (ONE_WAY, (0.2,))),
+    ]
 )
 
 
