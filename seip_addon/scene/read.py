@@ -223,7 +223,10 @@ def _local_faces(evaluated: bpy.types.Object) -> _Faces | None:
 
 def _reflectivity(shown: bpy.types.Object, material: Integer) -> Float:
     """Return the reflectivity of triangles (n,), given their material slots; beyond the last is the last."""
-    slots = np.array([reflectivity(slot.material) for slot in shown.material_slots] or [reflectivity(None)])
+    slots = np.array(
+        [reflectivity(slot.material and slot.material.original) for slot in shown.material_slots]
+        or [reflectivity(None)]
+    )
     shares: Float = slots[np.clip(material, 0, len(slots) - 1)]
     return shares
 

@@ -9,7 +9,7 @@ from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
 from seip_addon.scene import contract
-from seip_addon.scene.materials import material, reflectivity, set_reflectivity
+from seip_addon.scene.materials import REFLECTIVITY, material, set_reflectivity
 from seip_addon.scene.read import read_scene
 
 
@@ -349,8 +349,10 @@ def test_faces_of_vertices_that_are_not_there_are_named(scene):
 
 def test_materials_get_the_reflectivity_that_is_asked_for(scene):
     material("asphalt")
+    bpy.data.objects["road"].data.materials.append(bpy.data.materials["SEIP asphalt"])
+    assert (read_scene(scene).geometry.roads[0].reflectivity == REFLECTIVITY["asphalt"]).all()
     set_reflectivity(["asphalt=0.08"])
-    assert reflectivity(bpy.data.materials["SEIP asphalt"]) == 0.08
+    assert (read_scene(scene).geometry.roads[0].reflectivity == 0.08).all()
     for asked, message in (
         ("asfalt=0.1", "no material 'asfalt'; did you mean asphalt"),
         ("asphalt=dark", "must be a number from 0 to 1, not 'dark'"),

@@ -54,6 +54,7 @@ MAKER_PROBABILITY = 0.9
 DROPOFF_REFLECTIVITY = 0.2
 """Of the surfaces, between asphalt and walls, for which `RangeEquation.as_dropoff` is right."""
 
+_TINY = 1e-300
 _STANDARD = NormalDist()
 
 
@@ -193,8 +194,16 @@ class RangeEquation:
         height : (n,) float64, metres
             Of the sensor above each plane: cos θ is height / r there, so that p falls with r³.
         """
-        far: Float = np.cbrt(reflectivity * height / least)
-        return far
+        strength = reflectivity * height / least
+        far: Float = np.cbrt(strength)
+        if self.extinction == 0.0:
+            return far
+        # f(r) = 3 ln r + 2αr − ln strength grows ever more slowly: the zero of a tangent lies before its own, and that
+        # of the chord from there to r = ∛strength, where f is 2αr, behind it
+        begin = np.maximum(far - 2 * self.extinction * far / (3 / np.maximum(far, _TINY) + 2 * self.extinction), _TINY)
+        below = 3 * np.log(begin) + 2 * self.extinction * begin - np.log(np.maximum(strength, _TINY))
+        above = 2 * self.extinction * far
+        return np.where(below < 0, begin - below * (far - begin) / np.maximum(above - below, _TINY), far)
 
     def chance(self, distance: Float, reflected: Float, deviation: Float | float | None = None) -> Float:
         """Return the probability that each hit is detected, (n,) float64, 0 to `ceiling`.
