@@ -1,9 +1,8 @@
 """The coarsest spacings of targets and of candidates whose answer stays within a tolerance.
 
-An answer is the best placement under some settings; it is evaluated on a fine grid of
-targets, the same for all. First the spacing of the targets is sought, then that of the
-candidates: from coarse to fine until the answer is as good as that of the finest. To stop
-where two spacings in a row agree would be quicker, but they agree too easily: which of a
+An answer is the best placement under some settings; it is evaluated on a fine grid of targets, the same for all. First
+the spacing of the targets is sought, then that of the candidates: from coarse to fine until the answer is as good as
+that of the finest. To stop where two spacings in a row agree would be quicker, but they agree too easily: which of a
 few candidates is the best is a matter of luck.
 """
 
@@ -209,15 +208,7 @@ class Evaluator:
     def solve(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
         """Return the best placement on a site."""
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
-        return (
-            yield from optimise(
-                site,
-                grid.visible,
-                self._models,
-                self._objective,
-                settings.limits,
-            )
-        )
+        return (yield from optimise(site, grid.visible, self._models, self._objective, settings.limits))
 
     def evaluate(self, solution: Solution) -> float:
         """Return the share of the fine grid's weight that a placement sees."""

@@ -68,10 +68,7 @@ def main(argv: list[str]) -> None:
         results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = study.surveyed.settings.as_record() | {
-            "seeds": options.seeds,
-            "frames_every_s": options.every,
-        }
+        settings = study.surveyed.settings.as_record() | {"seeds": options.seeds, "frames_every_s": options.every}
         study_results.save_record(
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )

@@ -2,9 +2,8 @@
 
     python -m headless.lock_wheels
 
-pip names the wheel that it would take for each pin, Python and platform, and
-its digest; packages are installed, and wheels bundled in the extension, only
-where they are these. To be run after a pin has changed.
+pip names the wheel that it would take for each pin, Python and platform, and its digest; packages are installed, and
+wheels bundled in the extension, only where they are these. To be run after a pin has changed.
 """
 
 from __future__ import annotations

@@ -162,9 +162,8 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
 def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
-    A terminal sees one bar, which stays on its line and begins anew where the
-    work does (a smaller count, another total); work of unknown length shows
-    what it does and for how long. A log gets a line every ten seconds at most.
+    A terminal sees one bar, which stays on its line and begins anew where the work does (a smaller count, another
+    total); work of unknown length shows what it does and for how long. A log gets a line every ten seconds at most.
     """
     if not sys.stderr.isatty():
         yield _line_reporter()

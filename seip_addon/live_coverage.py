@@ -130,11 +130,7 @@ def _update_soon() -> None:
 
 
 def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
-    return (
-        ("depsgraph_update_post", _on_update),
-        ("undo_post", _on_undo),
-        ("redo_post", _on_undo),
-    )
+    return (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
 
 
 CLASSES: tuple[type, ...] = ()

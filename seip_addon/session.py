@@ -1,8 +1,7 @@
 """Session: all that the add-on keeps in memory of the open file, in one object.
 
-None of it is needed to go on: the file keeps what was asked and found, and the
-cache keeps visibility. Scenes are named by their session number, as undo and
-redo put another Python object in place of each.
+None of it is needed to go on: the file keeps what was asked and found, and the cache keeps visibility. Scenes are named
+by their session number, as undo and redo put another Python object in place of each.
 """
 
 from __future__ import annotations

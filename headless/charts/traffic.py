@@ -77,12 +77,7 @@ def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
     rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
-    _bars(
-        shares,
-        -1,
-        [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
-        "empty road",
-    )
+    _bars(shares, -1, [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "empty road")
     _bars(shares, 0, [empty.mean for empty, _ in rows], "in traffic")
     _bars(shares, 1, [traffic.mean for _, traffic in rows], "in traffic, placed on traffic")
     shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)

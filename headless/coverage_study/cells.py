@@ -137,10 +137,7 @@ class CoverageStudy:
 
 
 def coverage_study(
-    site: Site,
-    models: Mapping[str, LidarModel],
-    visible: NDArray[np.bool_],
-    limits: SolverLimits = DEFAULT_LIMITS,
+    site: Site, models: Mapping[str, LidarModel], visible: NDArray[np.bool_], limits: SolverLimits = DEFAULT_LIMITS
 ) -> Generator[Progress, None, CoverageStudy]:
     """Solve every cell: each type, each height alone and all together, N = 1, 2, 4; then a sweep of central weights.
 

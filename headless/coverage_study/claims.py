@@ -17,8 +17,7 @@ MIN_CHANGE = 0.01
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
     """Evaluate claims 1 to 4 and 10 of the paper on the solved cells.
 
-    Claims that compare types, heights or weights are left out where there is
-    nothing to compare.
+    Claims that compare types, heights or weights are left out where there is nothing to compare.
     """
     claims = [_four_of_the_best(study), _greedy(study)]
     if len(study.sensors) > 1:

@@ -136,9 +136,8 @@ BACKGROUND, IGNORED = -1, -2
 def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     """Return which box each anchor must find: (anchors, rows, columns) int64, or `BACKGROUND` or `IGNORED`.
 
-    An anchor belongs to the road user of its class that overlaps it most, both
-    set along the nearer axis, if that is its ``positive`` share or more. The
-    anchor that overlaps a road user most belongs to it in any case.
+    An anchor belongs to the road user of its class that overlaps it most, both set along the nearer axis, if that is
+    its ``positive`` share or more. The anchor that overlaps a road user most belongs to it in any case.
     """
     device = wanted.boxes.device
     overlap = _overlaps(wanted, grid)  # (boxes, anchors, rows, columns)

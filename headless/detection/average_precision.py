@@ -120,9 +120,8 @@ class Evaluation:
     def average_precision(self) -> float:
         """The area under the curve of the best precision at each recall or beyond; NaN where nothing had to be found.
 
-        All-point interpolation of PASCAL VOC 2010, on all detections of all
-        frames in one order. Equal scores make one point of the curve: no
-        threshold can tell them apart.
+        All-point interpolation of PASCAL VOC 2010, on all detections of all frames in one order. Equal scores make one
+        point of the curve: no threshold can tell them apart.
         """
         return float(_areas(self, np.ones((1, len(self.detections))), np.array([float(len(self.wanted))]))[0])
 
@@ -156,9 +155,8 @@ def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
 def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | None:
     """Return the 95 % interval of the average precision over other traffic like this, or None on too few blocks.
 
-    Bootstrap (Efron 1979) over blocks of `BLOCK_SECONDS` seconds of each run: frames
-    that follow each other are nearly the same, and drawn one by one they would
-    feign certainty. It says nothing about another training.
+    Bootstrap (Efron 1979) over blocks of `BLOCK_SECONDS` seconds of each run: frames that follow each other are nearly
+    the same, and drawn one by one they would feign certainty. It says nothing about another training.
 
     Parameters
     ----------
@@ -190,8 +188,7 @@ def resampled_average_precisions(evaluation: Evaluation, seed: int, resamples: i
 def balanced_score(evaluation: Evaluation) -> float:
     """Return the score with the highest F1, the harmonic mean of precision and recall; 0 without detections.
 
-    Choose it on validation frames and keep it, where false positives are
-    compared at a fixed score.
+    Choose it on validation frames and keep it, where false positives are compared at a fixed score.
     """
     curve = precision_recall(evaluation)
     if not curve.recall.any():

@@ -1,9 +1,7 @@
 """The detection study: average precision of sensor types × numbers, against price and coverage.
 
-Placements come from the integer program, clouds from simulated traffic. One
-detector learns from all placements at once (or one from each), several times
-with other seeds, and is evaluated with each placement on traffic that none has
-seen.
+Placements come from the integer program, clouds from simulated traffic. One detector learns from all placements at once
+(or one from each), several times with other seeds, and is evaluated with each placement on traffic that none has seen.
 """
 
 from __future__ import annotations

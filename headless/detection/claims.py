@@ -1,10 +1,9 @@
 """Verdicts on the paper's claims about detection, 5 to 9, for one site.
 
-Gains are in points of average precision. All figures are means over the seeds of the
-training with Student's 95 % interval; seeds are compared pair by pair. A claim
-holds where the interval lies within what is claimed, does not hold where it
-lies outside, and is undecided between the two. Where the study says "about",
-from half to twice its figure is meant.
+Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
+interval; seeds are compared pair by pair. A claim holds where the interval lies within what is claimed, does not hold
+where it lies outside, and is undecided between the two. Where the study says "about", from half to twice its figure is
+meant.
 """
 
 from __future__ import annotations

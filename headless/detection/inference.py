@@ -20,11 +20,7 @@ MAX_OVERLAP = 0.1
 
 @torch.inference_mode()
 def detect(
-    detector: Detector,
-    points: NDArray[np.float32],
-    intensity: NDArray[np.float32],
-    *,
-    least_score: float = MIN_SCORE,
+    detector: Detector, points: NDArray[np.float32], intensity: NDArray[np.float32], *, least_score: float = MIN_SCORE
 ) -> Detections:
     """Return the road users in a cloud.
 

@@ -11,14 +11,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import (
-    Frame,
-    MountedSensor,
-    ScanSettings,
-    Simulation,
-    StaticScene,
-    prepare,
-)
+from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
 from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body

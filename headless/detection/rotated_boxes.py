@@ -1,11 +1,9 @@
 """IoU of rotated boxes, vectorised over pairs, and non-maximum suppression.
 
-The overlap in plan is found in the second box's own frame, where it is a
-rectangle about the origin. The first box's outline, moved point by point to the
-nearest point of that rectangle, winds around just the points that both boxes
-hold: its area is the overlap. That is what polygon clipping after Sutherland
-and Hodgman (1974) computes, without vertices that come and go, so it needs no
-tolerance and parallel or shared edges are nothing special.
+The overlap in plan is found in the second box's own frame, where it is a rectangle about the origin. The first box's
+outline, moved point by point to the nearest point of that rectangle, winds around just the points that both boxes hold:
+its area is the overlap. That is what polygon clipping after Sutherland and Hodgman (1974) computes, without vertices
+that come and go, so it needs no tolerance and parallel or shared edges are nothing special.
 """
 
 from __future__ import annotations

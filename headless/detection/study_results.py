@@ -183,11 +183,7 @@ def _row(outcome: DetectorOutcome) -> dict[str, str]:
 
 
 def save_record(
-    path: Path,
-    results: StudyResults,
-    claims: Sequence[Claim],
-    settings: Mapping[str, Any],
-    versions: Mapping[str, str],
+    path: Path, results: StudyResults, claims: Sequence[Claim], settings: Mapping[str, Any], versions: Mapping[str, str]
 ) -> None:
     """Write settings, sensors, figures and claims as JSON."""
     correlation, interval = results.correlation

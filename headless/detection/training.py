@@ -1,8 +1,7 @@
 """Training of a detector on many configurations of sensors at once.
 
-Every step takes windows about road users, each from a configuration, a frame
-and a place drawn by the seed and the number of the step: a training that was
-stopped goes on as if it had not been.
+Every step takes windows about road users, each from a configuration, a frame and a place drawn by the seed and the
+number of the step: a training that was stopped goes on as if it had not been.
 """
 
 from __future__ import annotations

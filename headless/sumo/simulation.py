@@ -156,11 +156,7 @@ def simulate(
 
 
 def _network(
-    programs: Sumo,
-    map_path: Path,
-    network: Path,
-    signals: SignalPlan,
-    bounds: tuple[float, float, float, float] | None,
+    programs: Sumo, map_path: Path, network: Path, signals: SignalPlan, bounds: tuple[float, float, float, float] | None
 ) -> Generator[Progress, None, None]:
     """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
     road_map = read_map(map_path)

@@ -96,10 +96,9 @@ def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
 def student_reach(values: Float | Sequence[float]) -> float:
     """Return half the width of the 95 % interval of a mean (Student 1908).
 
-    Exact for values from a normal distribution however few they are. Three
-    values, as from three seeds, can be drawn with replacement in ten ways only,
-    and a bootstrap over them would hold the mean in three of four cases instead
-    of 19 of 20.
+    Exact for values from a normal distribution however few they are. Three values, as from three seeds, can be drawn
+    with replacement in ten ways only, and a bootstrap over them would hold the mean in three of four cases instead of
+    19 of 20.
 
     Parameters
     ----------
@@ -164,9 +163,8 @@ def rank_correlation(x: Float | Sequence[float], y: Float | Sequence[float]) -> 
 def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int) -> Interval | None:
     """Return the 95 % interval of the rank correlation, or None where there are too few pairs.
 
-    Bootstrap (Efron 1979) over pairs: give one pair for each configuration,
-    with the mean over its seeds, since seeds of one configuration are no new
-    evidence of a correlation.
+    Bootstrap (Efron 1979) over pairs: give one pair for each configuration, with the mean over its seeds, since seeds
+    of one configuration are no new evidence of a correlation.
 
     Parameters
     ----------
@@ -190,9 +188,8 @@ def _ranks(values: Float) -> Float:
 def quantile_of(values: Float, share: float) -> IntervalEstimate:
     """Estimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
 
-    The number of draws below the true quantile is binomial, so that the order
-    statistics between which it lies follow from n and ``share`` alone. The
-    value itself is the order statistic of rank ``ceil(share · n)``.
+    The number of draws below the true quantile is binomial, so that the order statistics between which it lies follow
+    from n and ``share`` alone. The value itself is the order statistic of rank ``ceil(share · n)``.
 
     Parameters
     ----------

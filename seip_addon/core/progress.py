@@ -1,8 +1,7 @@
 """Progress of long work, as values yielded by generators.
 
-Long loops of the core are generators that yield `Progress` and return their
-result: a modal operator steps them, a batch command shows a bar, a test
-exhausts them with `finish`.
+Long loops of the core are generators that yield `Progress` and return their result: a modal operator steps them, a
+batch command shows a bar, a test exhausts them with `finish`.
 """
 
 from __future__ import annotations

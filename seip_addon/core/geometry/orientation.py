@@ -5,9 +5,8 @@ A sensor of yaw ψ, tilt θ and roll φ is rotated as
 .. math::
     R = R_z(ψ)\, R_y(θ)\, R_x(φ):
 
-first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by θ,
-about the new y axis, so that the ray of azimuth zero and elevation zero points θ
-below the horizon; then it rolls about the new x axis.
+first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by θ, about the new y axis, so that the ray
+of azimuth zero and elevation zero points θ below the horizon; then it rolls about the new x axis.
 """
 
 from __future__ import annotations

@@ -25,8 +25,7 @@ class TransverseMercator:
     def __call__(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Return easting and northing, metres, of a place in radians.
 
-        After Krüger (1912) with four terms: within 1,000 km of the central
-        meridian exact to a millimetre.
+        After Krüger (1912) with four terms: within 1,000 km of the central meridian exact to a millimetre.
         """
         n = _FLATTENING / (2 - _FLATTENING)
         radius = _SEMI_MAJOR_AXIS / (1 + n) * (1 + n**2 / 4 + n**4 / 64)

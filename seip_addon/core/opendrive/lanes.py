@@ -77,9 +77,8 @@ class LaneSurface:
 def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...]:
     """Return the surfaces of all lanes of a road that have an area.
 
-    Elevation, superelevation, crossfall, shape, level lanes and lane heights
-    are part of them; across, a lane is straight from edge to edge. Lane
-    sections shorter than a micrometre are left out.
+    Elevation, superelevation, crossfall, shape, level lanes and lane heights are part of them; across, a lane is
+    straight from edge to edge. Lane sections shorter than a micrometre are left out.
 
     Parameters
     ----------

@@ -18,9 +18,8 @@ _MAX_IMAGINARY_PART = 1e-9
 class Profile:
     """Value ``a + b·ds + c·ds² + d·ds³`` with ``ds`` counted from the start of the record in force.
 
-    A record is in force up to the start of the next one; of two that start at
-    one place the later counts. Before the first record its first value holds,
-    and without any record the value is zero.
+    A record is in force up to the start of the next one; of two that start at one place the later counts. Before the
+    first record its first value holds, and without any record the value is zero.
 
     Parameters
     ----------

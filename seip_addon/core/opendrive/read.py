@@ -1,7 +1,6 @@
 """Read an OpenDRIVE file into a `RoadMap`.
 
-Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have
-the standard's defaults.
+Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have the standard's defaults.
 """
 
 from __future__ import annotations
@@ -60,9 +59,8 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     Raises
     ------
     SeipError
-        There is no such file, it is no well-formed or harmless XML, no
-        OpenDRIVE, has no roads, or a number in it makes no sense; the message
-        names the road and the element.
+        There is no such file, it is no well-formed or harmless XML, no OpenDRIVE, has no roads, or a number in it makes
+        no sense; the message names the road and the element.
     """
     root = read_document(path)
     if root.tag != "OpenDRIVE":

@@ -64,9 +64,8 @@ class LaneSection:
 class Corner:
     """A corner of an object's outline.
 
-    ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of
-    the object, ``up`` is dz or z, all in metres; ``height`` is None where the
-    file does not say.
+    ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of the object, ``up`` is dz or z, all in
+    metres; ``height`` is None where the file does not say.
     """
 
     on_road: bool
@@ -221,8 +220,7 @@ class Road:
 class RoadFrame:
     """The moving axes of a road at k places.
 
-    Superelevation turns the road about its reference line, which itself climbs
-    at the pitch of the elevation profile.
+    Superelevation turns the road about its reference line, which itself climbs at the pitch of the elevation profile.
 
     Parameters
     ----------

@@ -17,8 +17,7 @@ from .road_map import Road, RoadMap, RoadSignal
 class PlacedSignal:
     """A signal in map coordinates.
 
-    Maps disagree on what is given, the foot of the post or the lamp above the
-    carriageway.
+    Maps disagree on what is given, the foot of the post or the lamp above the carriageway.
 
     Parameters
     ----------

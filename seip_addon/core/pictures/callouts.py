@@ -17,10 +17,9 @@ DISTANCE_COSTS = 0.35 * np.repeat(np.array(LABEL_DISTANCES) - 1.0, LABEL_DIRECTI
 def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: float, subject: Float) -> Float:
     """Return the centre of each label's box.
 
-    Labels are set one after the other without leaving the picture or touching
-    an anchor or an earlier label: near their anchors, off the subject of the
-    picture, and outwards from the middle of all anchors. A label for which
-    there is no room goes to the nearest place inside the picture.
+    Labels are set one after the other without leaving the picture or touching an anchor or an earlier label: near their
+    anchors, off the subject of the picture, and outwards from the middle of all anchors. A label for which there is no
+    room goes to the nearest place inside the picture.
 
     Parameters
     ----------

@@ -35,8 +35,7 @@ MAX_LABELLED = 40
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
     """Write a figure as PNG; the same figure gives the same bytes.
 
-    A palette of the 256 colours that stand for all others makes a file a third
-    to a fifth as large.
+    A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
     """
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})

@@ -48,12 +48,7 @@ class PlanLegend:
         axes.axis("off")
 
     def draw(
-        self,
-        geometry: SceneGeometry,
-        site: Site,
-        deployment: Deployment,
-        heights: Normalize,
-        notes: Sequence[str],
+        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, notes: Sequence[str]
     ) -> None:
         """Write all parts, with as many sensors as there is room for.
 

@@ -49,11 +49,7 @@ SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
 def save_plan_view(
-    path: str | os.PathLike[str],
-    geometry: SceneGeometry,
-    site: Site,
-    deployment: Deployment,
-    notes: Sequence[str] = (),
+    path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = ()
 ) -> None:
     """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
 
@@ -151,8 +147,7 @@ def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
     colours = np.array(SEEN_COLOURS)[np.minimum(deployment.seen_by, SEEN_TWICE)]
     squares = list(target_squares(site.targets)[:, :, :2])
     plan.add_collection(
-        PolyCollection(squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET),
-        autolim=False,
+        PolyCollection(squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET), autolim=False
     )
 
 

@@ -52,10 +52,7 @@ def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSenso
     tall = MAP_SIDE * (top - bottom) / (right - left)
     figure = Figure((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
     palette = np.array([to_rgb(SENSOR_COLOURS[number % len(SENSOR_COLOURS)]) for number in range(len(sensors))])
-    colours = (
-        palette[frame.sensor],
-        INTENSITY_CMAP(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))[:, :3],
-    )
+    colours = (palette[frame.sensor], INTENSITY_CMAP(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))[:, :3])
     for number, colour in enumerate(colours):
         axes = _axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
         axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=BACKGROUND_COLOUR)

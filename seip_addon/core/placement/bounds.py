@@ -1,19 +1,17 @@
 r"""Upper bounds by Lagrangian relaxation, and the candidates that they rule out.
 
-Let the i-th sensor that sees target j add at most :math:`a_{ji}` to the objective,
-:math:`a_{j1} \ge a_{j2} \ge …`; for coverage :math:`a_{j1} = w_j` and the others are 0
-(`multi_cover`). Relaxing the number of sensors that see a target with multipliers
-:math:`0 \le \lambda_j \le a_{j1}` leaves
+Let the i-th sensor that sees target j add at most :math:`a_{ji}` to the objective, :math:`a_{j1} \ge a_{j2} \ge …`; for
+coverage :math:`a_{j1} = w_j` and the others are 0 (`multi_cover`). Relaxing the number of sensors that see a target
+with multipliers :math:`0 \le \lambda_j \le a_{j1}` leaves
 
 .. math::
     L(\lambda) = \sum_j \sum_i \max(0, a_{ji} - \lambda_j) + \max_{x \in X} \sum_i s_i x_i,
     \qquad s_i = \sum_j V_{ij} \lambda_j,
 
-where X keeps the number of sensors and a partition into cliques (one sensor at
-most in each), and the budget and the mandatory groups are relaxed with
-multipliers of their own. Every L is an upper bound; subgradients lead to the
-smallest, which equals that of the linear relaxation (Galvão and ReVelle 1996;
-deflected steps: Camerini, Fratta and Maffioli 1975).
+where X keeps the number of sensors and a partition into cliques (one sensor at most in each), and the budget and the
+mandatory groups are relaxed with multipliers of their own. Every L is an upper bound; subgradients lead to the
+smallest, which equals that of the linear relaxation (Galvão and ReVelle 1996; deflected steps: Camerini, Fratta and
+Maffioli 1975).
 """
 
 from __future__ import annotations
@@ -104,8 +102,7 @@ class Bound:
 def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
     """Choose the candidates of largest scores, one per clique, within the number and the budget.
 
-    The budget is relaxed; its multiplier minimises the bound, by bisection,
-    or is the best of a few near the one given.
+    The budget is relaxed; its multiplier minimises the bound, by bisection, or is the best of a few near the one given.
     """
     free = _select(instance, score, 0.0)
     if instance.affordable(float(instance.price[free.picked].sum())):
@@ -270,8 +267,7 @@ def lagrangian_bound(
         seen = instance.visible[picked].sum(axis=0)
         # the subgradient nearest to zero: where a multiplier meets layers any number of these may count
         slope = np.maximum(
-            seen - (layers >= current.targets).sum(axis=0),
-            np.minimum(seen - (layers > current.targets).sum(axis=0), 0),
+            seen - (layers >= current.targets).sum(axis=0), np.minimum(seen - (layers > current.targets).sum(axis=0), 0)
         )
         group_slope = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0)
         change = descent.move(np.concatenate([slope, group_slope]), goal)
@@ -291,9 +287,8 @@ def lagrangian_bound(
 def least_price(instance: Instance, bound: Bound, goal: float) -> float:
     r"""Return a price below which no placement covers ``goal``.
 
-    With the bound's multipliers and a multiplier :math:`\mu > 0` of the
-    price, a placement of price C covers at most :math:`L(\lambda, \mu) +
-    \mu C`, so that :math:`C \ge (goal - L(\lambda, \mu)) / \mu`.
+    With the bound's multipliers and a multiplier :math:`\mu > 0` of the price, a placement of price C covers at most
+    :math:`L(\lambda, \mu) + \mu C`, so that :math:`C \ge (goal - L(\lambda, \mu)) / \mu`.
     """
     score = bound.selection.net + bound.selection.multiplier * instance.price
     fixed = bound.value - bound.selection.value
@@ -310,9 +305,8 @@ def least_price(instance: Instance, bound: Bound, goal: float) -> float:
 def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     """Return the candidates that some placement reaching ``goal`` may contain, (k,) int64.
 
-    A candidate is ruled out when the bound, with that candidate forced into
-    the selection, falls short of the goal by more than `TIE_TOLERANCE`: all optimal
-    placements survive, ties included.
+    A candidate is ruled out when the bound, with that candidate forced into the selection, falls short of the goal by
+    more than `TIE_TOLERANCE`: all optimal placements survive, ties included.
     """
     picked, net = bound.selection.picked, bound.selection.net
     in_clique = np.zeros(int(instance.clique.max()) + 1)

@@ -30,10 +30,9 @@ def cheapest_for_coverage(
 ) -> Generator[Progress, None, Placement]:
     """Choose the cheapest placement that covers a share of all weight.
 
-    Among the cheapest the one that covers most is returned, and among those
-    the one that `solve` prefers. Where all prices are equal, zero included,
-    the number of sensors stands for the price: the placement has the fewest
-    that suffice. The result's objective, bound and gap are prices.
+    Among the cheapest the one that covers most is returned, and among those the one that `solve` prefers. Where all
+    prices are equal, zero included, the number of sensors stands for the price: the placement has the fewest that
+    suffice. The result's objective, bound and gap are prices.
 
     Parameters
     ----------

@@ -27,8 +27,7 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     Raises
     ------
     SeipError
-        The groups cannot all be served; the limit that prevents it is
-        named. Or the time was too short to tell.
+        The groups cannot all be served; the limit that prevents it is named. Or the time was too short to tell.
     """
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)

@@ -112,8 +112,7 @@ def tabu_search(
 ) -> Generator[Progress, None, Integer]:
     """Make the best swap again and again, even for the worse, and return the best choice met (Glover 1989).
 
-    Who went cannot come back for a while, and who came cannot go, unless that
-    leads to a choice better than any before.
+    Who went cannot come back for a while, and who came cannot go, unless that leads to a choice better than any before.
     """
     best, end = chosen, clock.elapsed + seconds
     covered = most = instance.value(chosen)

@@ -72,9 +72,8 @@ class Outcome:
 class CoverProgram:
     """The integer program of an instance, to which requirements are added stage by stage.
 
-    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z``
-    of each target are continuous: at an optimum they are integral by themselves.
-    ``z`` is right wherever the covered weight is required to be the largest
+    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z`` of each target are continuous: at an
+    optimum they are integral by themselves. ``z`` is right wherever the covered weight is required to be the largest
     possible.
     """
 

@@ -24,9 +24,8 @@ class PlacementProblem:
         \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad
         x_i \in \{0, 1\},\; 0 \le y_j \le 1,
 
-    with at most one pose per position, at least one pose of each mandatory
-    group, and no two poses closer than the minimum distance. The vanilla
-    problem has unit weights.
+    with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
+    minimum distance. The vanilla problem has unit weights.
 
     Parameters
     ----------
@@ -41,9 +40,8 @@ class PlacementProblem:
     xyz : (c, 3) float64, metres
         Position of each pose's sensor.
     labels : (c,) str
-        Sensor type of each pose. Poses are put into the order of x, y, z and
-        label before anything else, so that the order in which they are given
-        never matters.
+        Sensor type of each pose. Poses are put into the order of x, y, z and label before anything else, so that the
+        order in which they are given never matters.
     mandatory : (g, c) bool, optional
         Each row is a group of poses of which at least one must be chosen.
     mandatory_names : (g,) str, optional

@@ -47,8 +47,7 @@ class Instance:
     visible : (c, t) bool
         No column is empty and no two are equal.
     weight : (t,) float64
-        Weights of the merged targets: whole numbers, so that sums are exact and
-        ties are ties on every machine.
+        Weights of the merged targets: whole numbers, so that sums are exact and ties are ties on every machine.
     step : float
         Smallest difference between two covered weights that counts.
     slack : float
@@ -287,11 +286,10 @@ def _cliques(conflict: Boolean) -> Integer:
 def _superfluous(instance: Instance, positions: Integer) -> Boolean:
     """Mark candidates that no canonical optimum contains.
 
-    A candidate that sees nothing and serves no mandatory group only adds to
-    the number of sensors. A candidate at the same position as another that
-    sees all it sees, is in all its groups, excludes nothing more and is
-    cheaper (or costs the same and comes first) can always give way to it:
-    coverage, number, price, double coverage and order all stay or improve.
+    A candidate that sees nothing and serves no mandatory group only adds to the number of sensors. A candidate at the
+    same position as another that sees all it sees, is in all its groups, excludes nothing more and is cheaper (or costs
+    the same and comes first) can always give way to it: coverage, number, price, double coverage and order all stay or
+    improve.
     """
     superfluous: Boolean = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
     excluded = instance.conflict | np.eye(len(instance), dtype=bool)

@@ -71,23 +71,19 @@ class Proof:
 def solve(problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS) -> Generator[Progress, None, Placement]:
     """Choose the placement that covers most.
 
-    Among optimal placements the one with fewest sensors is returned, then the
-    cheapest, then the one with the largest doubly covered weight, then the
-    first in the canonical order of candidates: always the same one, however
-    candidates and targets are ordered.
+    Among optimal placements the one with fewest sensors is returned, then the cheapest, then the one with the largest
+    doubly covered weight, then the first in the canonical order of candidates: always the same one, however candidates
+    and targets are ordered.
 
-    Reductions that lose nothing come first; a greedy choice improved by
-    swaps gives an incumbent, a Lagrangian relaxation a bound; candidates
-    that the bound rules out are dropped. Among the rest branch and bound
-    decides; where it does not soon, a tabu search improves the incumbent,
-    decomposition and an integer program the bound where they can, and branch and
-    bound goes on with the time that is left, its bound falling all the while.
+    Reductions that lose nothing come first; a greedy choice improved by swaps gives an incumbent, a Lagrangian
+    relaxation a bound; candidates that the bound rules out are dropped. Among the rest branch and bound decides; where
+    it does not soon, a tabu search improves the incumbent, decomposition and an integer program the bound where they
+    can, and branch and bound goes on with the time that is left, its bound falling all the while.
 
     Raises
     ------
     SeipError
-        The constraints cannot be met together, no candidate sees any target,
-        or the solver is not available.
+        The constraints cannot be met together, no candidate sees any target, or the solver is not available.
     """
     return (yield from solve_within(problem, limits.solver, limits.clock()))
 
@@ -131,12 +127,10 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
 def solve_greedy(problem: PlacementProblem) -> Placement:
     """Choose greedily, with a certificate.
 
-    With the number of sensors alone and one pose per position, greedy covers
-    at least 1 - 1/e (63 %) of the optimum (Nemhauser, Wolsey and Fisher
-    1978); with several poses per position at least a half (Fisher, Nemhauser
-    and Wolsey 1978); the better of gain and gain per price, under a budget
-    alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor 1999). The bound of
-    the result is computed from the data and is usually far closer.
+    With the number of sensors alone and one pose per position, greedy covers at least 1 - 1/e (63 %) of the optimum
+    (Nemhauser, Wolsey and Fisher 1978); with several poses per position at least a half (Fisher, Nemhauser and Wolsey
+    1978); the better of gain and gain per price, under a budget alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor
+    1999). The bound of the result is computed from the data and is usually far closer.
 
     Raises
     ------

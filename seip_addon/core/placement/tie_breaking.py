@@ -1,8 +1,7 @@
 """Tie-breaking: the canonical one among equally good placements.
 
-Stages, each within the optima of those before: largest coverage, fewest
-sensors, lowest price, largest doubly covered weight, and first in the
-canonical order of candidates.
+Stages, each within the optima of those before: largest coverage, fewest sensors, lowest price, largest doubly covered
+weight, and first in the canonical order of candidates.
 """
 
 from __future__ import annotations

@@ -55,12 +55,7 @@ class PoseErrors:
         0.3, "as of the position if not given", unit="m", maximum=MAX_OFFSET_STD, option="height-error", metavar="M"
     )
     yaw: float = setting(
-        math.radians(2.0),
-        "as of the tilt if not given",
-        unit="rad",
-        maximum=math.pi,
-        option="yaw-error",
-        metavar="DEG",
+        math.radians(2.0), "as of the tilt if not given", unit="rad", maximum=math.pi, option="yaw-error", metavar="DEG"
     )
     tilt: float = setting(
         math.radians(2.0),
@@ -129,9 +124,8 @@ def require_draws(draws: int) -> None:
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
     """Draw random pose errors of sensors.
 
-    What is drawn for a sensor follows from the seed, the number of the draw and
-    the sensor's position alone: whichever type hangs there at whichever height,
-    whatever hangs elsewhere, and however many draws there are. Errors of other
+    What is drawn for a sensor follows from the seed, the number of the draw and the sensor's position alone: whichever
+    type hangs there at whichever height, whatever hangs elsewhere, and however many draws there are. Errors of other
     sizes are the same draws, scaled.
 
     Parameters

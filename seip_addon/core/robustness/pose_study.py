@@ -1,9 +1,8 @@
 """Coverage of a placement under pose errors, jointly, per sensor and per kind of error.
 
-All sensors err in each draw. The same draws tell what comes of it when one
-sensor alone errs: a first-order effect, that of its own row of V beside the
-planned rows of the others. Draws with one kind of error alone, scaled from the
-same standard ones, tell which kind hurts most.
+All sensors err in each draw. The same draws tell what comes of it when one sensor alone errs: a first-order effect,
+that of its own row of V beside the planned rows of the others. Draws with one kind of error alone, scaled from the same
+standard ones, tell which kind hurts most.
 """
 
 from __future__ import annotations
@@ -120,9 +119,7 @@ class PoseStudy:
 
 
 def pose_study(
-    around: Surroundings,
-    deployment: Deployment,
-    settings: PoseStudySettings,
+    around: Surroundings, deployment: Deployment, settings: PoseStudySettings
 ) -> Generator[Progress, None, PoseStudy]:
     """Compute the coverage of a placement under draws of pose errors.
 

@@ -6,9 +6,8 @@ outcome of the scenario is the weight of the targets seen often enough,
 .. math::
     f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge κ],
 
-or what is left of it after one of the sensors failed: at worst
-:math:`\min_{i \in S} f_k(S \setminus i)`, or on average, each of the N sensors
-that are allowed failing alike (had the chosen alone part in it, a sensor that sees
+or what is left of it after one of the sensors failed: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
+average, each of the N sensors that are allowed failing alike (had the chosen alone part in it, a sensor that sees
 nothing would be worth adding). Of K outcomes the mean of the m smallest counts, :math:`m = \lceil αK \rceil`:
 
 .. math::
@@ -136,9 +135,8 @@ class Risk:
     def cover(self, sensors: int) -> MultiCover:
         r"""Return the value of a target by the sensors that see it: on average, or more than at worst.
 
-        A target seen n times is worth 1 from n = κ on. After a failure among N
-        sensors it is worth :math:`1 - κ/N` on average at n = κ and 1 from
-        :math:`κ + 1` on, which no failure of the worst kind exceeds.
+        A target seen n times is worth 1 from n = κ on. After a failure among N sensors it is worth :math:`1 - κ/N` on
+        average at n = κ and 1 from :math:`κ + 1` on, which no failure of the worst kind exceeds.
 
         Parameters
         ----------

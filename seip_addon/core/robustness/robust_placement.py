@@ -7,19 +7,17 @@ With K scenarios of pose errors, V of each known for every candidate,
     \quad\text{subject to}\quad
     κ\, y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
 
-X being the placements of the problem (number, budget, one sensor per position,
-mandatory and forbidden places, least distance) and P that of `risk`. The
-expectation is the maximal covering location problem of K × t targets. Any p in P
+X being the placements of the problem (number, budget, one sensor per position, mandatory and forbidden places, least
+distance) and P that of `risk`. The expectation is the maximal covering location problem of K × t targets. Any p in P
 gives an upper bound,
 
 .. math::
     \max_{x \in X} T(x) \le \max_{x \in X} F_p(x),
 
-of which p = 1/K says that nothing exceeds the largest expectation. A p with a
-small bound comes of fictitious play (Brown 1951): placements answer the mean of
-the scenarios that were worst for the placements before. Branch and bound on F_p
-then proves the best T (`robust_search`), where it comes to an end. Another bound
-knows each scenario beforehand (Madansky 1960), and takes K problems of t targets:
+of which p = 1/K says that nothing exceeds the largest expectation. A p with a small bound comes of fictitious play
+(Brown 1951): placements answer the mean of the scenarios that were worst for the placements before. Branch and bound on
+F_p then proves the best T (`robust_search`), where it comes to an end. Another bound knows each scenario beforehand
+(Madansky 1960), and takes K problems of t targets:
 
 .. math::
     \max_{x \in X} T(x) \le \min_{p \in P} \sum_k p_k \max_{x \in X} f_k(x),

@@ -132,8 +132,7 @@ class ArrayFile:
     def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:
         """Yield the header and the arrays; what a block trips over in them is the file's fault.
 
-        Sizes are compared with the rules and with each other before any array
-        is read.
+        Sizes are compared with the rules and with each other before any array is read.
 
         Raises
         ------

@@ -25,10 +25,9 @@ from ..errors import SeipError
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary name beside ``path`` that becomes ``path`` once all is written.
 
-    The temporary name keeps the suffix of ``path``, so that libraries which
-    choose a format by suffix do the same for both. Nothing is left behind when
-    the block raises, `KeyboardInterrupt` included; what a killed process left
-    in the folder is removed.
+    The temporary name keeps the suffix of ``path``, so that libraries which choose a format by suffix do the same for
+    both. Nothing is left behind when the block raises, `KeyboardInterrupt` included; what a killed process left in the
+    folder is removed.
 
     Parameters
     ----------

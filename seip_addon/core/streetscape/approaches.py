@@ -48,8 +48,7 @@ class _ApproachRoad:
 def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: float) -> tuple[LaneSurface, ...]:
     """Return the driving lanes of a junction, and of its approaches up to a distance.
 
-    An approach goes on over the roads that join on to it, and straight on
-    through other junctions.
+    An approach goes on over the roads that join on to it, and straight on through other junctions.
 
     Parameters
     ----------

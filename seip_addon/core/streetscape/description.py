@@ -118,9 +118,8 @@ class SiteDescription:
     radius : float or None, metres
         The region of interest is the driving surface this near to the middle.
     approaches : float or None, metres
-        Instead of the radius: the driving surface of the junction, and of its
-        approaches this far along the roads. Without either a junction has
-        approaches of `DEFAULT_RADIUS`, and another place that radius.
+        Instead of the radius: the driving surface of the junction, and of its approaches this far along the roads.
+        Without either a junction has approaches of `DEFAULT_RADIUS`, and another place that radius.
     region : shapely geometry or None
         Instead of both: the driving surface within this area.
     level : tuple of str

@@ -33,8 +33,7 @@ def in_metres(
     Raises
     ------
     SeipError
-        The numbers are latitude and longitude by all looks, and the map has no
-        projection to convert them with.
+        The numbers are latitude and longitude by all looks, and the map has no projection to convert them with.
     """
     if description.near is None or not looks_like_degrees(description.near):
         return description, ()

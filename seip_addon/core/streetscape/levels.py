@@ -62,16 +62,12 @@ class Levels:
 
 
 def split_levels(
-    surfaces: Sequence[LaneSurface],
-    around: BaseGeometry,
-    anchors: Iterable[str],
-    level: Sequence[str] = (),
+    surfaces: Sequence[LaneSurface], around: BaseGeometry, anchors: Iterable[str], level: Sequence[str] = ()
 ) -> Levels:
     """Divide lanes into those on the level of a place and those that cross above or below.
 
-    Of two crossing roads the one that is fewer joints away from the anchors in
-    the graph of roads is on the studied level. Each other road takes the level of
-    the crossing road that is fewer joints away; ties are decided by height.
+    Of two crossing roads the one that is fewer joints away from the anchors in the graph of roads is on the studied
+    level. Each other road takes the level of the crossing road that is fewer joints away; ties are decided by height.
 
     Parameters
     ----------
@@ -87,8 +83,7 @@ def split_levels(
     Raises
     ------
     SeipError
-        Roads cross and neither is nearer to the place (both are named), or a
-        road of ``level`` is not here.
+        Roads cross and neither is nearer to the place (both are named), or a road of ``level`` is not here.
     """
     shapely.prepare(around)
     near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]

@@ -12,14 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.plan import outline, signed_area, without
-from ..opendrive import (
-    LaneSurface,
-    PlacedObject,
-    RoadMap,
-    lane_surfaces,
-    placed_objects,
-    placed_signals,
-)
+from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.scene_geometry import ASSUMED, DESCRIBED
@@ -368,10 +361,7 @@ def _weighted_parts(
 
 
 def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
-    kinds = (
-        (description.forbidden_areas, Role.FORBIDDEN_AREAS),
-        (description.mandatory_areas, Role.MANDATORY_AREAS),
-    )
+    kinds = ((description.forbidden_areas, Role.FORBIDDEN_AREAS), (description.mandatory_areas, Role.MANDATORY_AREAS))
     return [
         _area_part(area.name, shifted(area.polygon, -street.origin), role, street)
         for areas, role in kinds

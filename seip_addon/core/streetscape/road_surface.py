@@ -210,10 +210,9 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
 def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
     """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
 
-    Lanes that cross each other in a junction differ in height by some
-    centimetres: there the group is laid anew as one layer at their mean
-    height, and groups other than driving lanes give way to these. Elsewhere
-    lanes meet edge to edge and stay as they are.
+    Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as one
+    layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge to edge
+    and stay as they are.
     """
     lanes = in_groups(surfaces, [name])
     pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
@@ -243,10 +242,9 @@ def kerb_faces(pavement: Float) -> Float:
 def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriageway: BaseGeometry) -> Float:
     """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
 
-    Many maps end the pavements where the junction begins. A notch between the
-    ends of two pavements and the carriageway is filled at the pavements' height,
-    unless the map has a pavement of its own there: within the junction, or
-    beside the carriageway, beyond a verge. A median is no corner either.
+    Many maps end the pavements where the junction begins. A notch between the ends of two pavements and the carriageway
+    is filled at the pavements' height, unless the map has a pavement of its own there: within the junction, or beside
+    the carriageway, beyond a verge. A median is no corner either.
     """
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:

@@ -76,10 +76,9 @@ def signal_parts(
 ) -> tuple[Part, ...]:
     """Return the posts of traffic lights, with their heads and arms.
 
-    A post of the map stands where the map has it. Without one a signal beside
-    the carriageway is its post, and one over it hangs on a mast arm from the
-    nearest place beside. Heights of signals in the map are not used, as maps
-    give posts below the road and lamps above it.
+    A post of the map stands where the map has it. Without one a signal beside the carriageway is its post, and one over
+    it hangs on a mast arm from the nearest place beside. Heights of signals in the map are not used, as maps give posts
+    below the road and lamps above it.
 
     Parameters
     ----------

@@ -1,7 +1,6 @@
 """Procedural street furniture as plain arrays: few faces, true outlines.
 
-Every solid stands with its foot in the origin and z up; what has an arm
-reaches along +x. Sizes are in metres.
+Every solid stands with its foot in the origin and z up; what has an arm reaches along +x. Sizes are in metres.
 """
 
 from __future__ import annotations

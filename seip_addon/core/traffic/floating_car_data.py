@@ -1,9 +1,8 @@
 """SUMO's floating car data (FCD): where each road user was at each step of a simulation.
 
-A vehicle's position is the middle of its front bumper, its angle is counted
-clockwise from north in degrees, and coordinates are those of the network: the
-map's plus the network's offset (SUMO's documentation, "FCDOutput"). A person's
-position is taken as the person's middle, as SUMO draws it.
+A vehicle's position is the middle of its front bumper, its angle is counted clockwise from north in degrees, and
+coordinates are those of the network: the map's plus the network's offset (SUMO's documentation, "FCDOutput"). A
+person's position is taken as the person's middle, as SUMO draws it.
 """
 
 from __future__ import annotations

@@ -89,9 +89,7 @@ BUILT_IN = {
 """Types that SUMO knows without a file."""
 
 
-def read_vehicle_types(
-    paths: Sequence[str | os.PathLike[str]],
-) -> Generator[Progress, None, dict[str, VehicleType]]:
+def read_vehicle_types(paths: Sequence[str | os.PathLike[str]]) -> Generator[Progress, None, dict[str, VehicleType]]:
     """Read the types from route and additional files, those within distributions included.
 
     Parameters
