@@ -43,8 +43,7 @@ NETWORKS = {
 }
 """Networks compared, by family and name of the setting."""
 
-TIMED_RUNS = 5
-"""Timed inferences per frame, of which the median is taken."""
+TIMED_RUNS = 5  # timed inferences per frame, of which the median is taken
 
 
 def main(argv: list[str]) -> None:

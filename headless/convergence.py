@@ -27,17 +27,10 @@ from seip_addon.core.workflows.survey import SurveySettings
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 """Metres between targets, from coarse to fine: each halves the square that a target stands for."""
 
-CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)
-"""Metres between posts on the pavement, from coarse to fine."""
-
-COARSE_CANDIDATE_SPACING = 8.0
-"""Metres between posts while the spacing of the targets is sought."""
-
-EVALUATION_SPACING = 0.35
-"""Metres between the targets on which answers are evaluated."""
-
-MAX_EVALUATION_TARGETS = 400_000
-"""Targets to evaluate on; a larger place is evaluated on a coarser grid."""
+CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)  # metres between posts on the pavement, from coarse to fine
+COARSE_CANDIDATE_SPACING = 8.0  # metres between posts while the spacing of the targets is sought
+EVALUATION_SPACING = 0.35  # metres between the targets on which answers are evaluated
+MAX_EVALUATION_TARGETS = 400_000  # targets to evaluate on; a larger place is evaluated on a coarser grid
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from packaging.requirements import Requirement
 GROUPS = ("installer", "development", "traffic", "detection", "second-opinion")
 """What `headless.set_up` installs; the groups ``benchmark`` and ``readers`` are tried out apart from the rest."""
 
-MAX_GLIBC_MINOR = 36
-"""Of Debian 12, the oldest system that is tried: 2.36."""
+MAX_GLIBC_MINOR = 36  # of Debian 12, the oldest system that is tried: 2.36
 
 
 def main() -> None:

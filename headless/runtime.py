@@ -57,8 +57,7 @@ ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
 LOG = logging.getLogger("headless")
 """Progress and warnings of commands and their modules; results go through `print_line`."""
 
-_LOCKS: dict[Path, int] = {}
-"""Folders that this process has locked, and what holds each lock."""
+_LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
 
 
 def in_blender() -> bool:

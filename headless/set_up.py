@@ -29,8 +29,7 @@ LOCK = ROOT / "wheels.lock"
 UNLOCKED = {"torch"}
 """Packages of many builds, of which pip's settings choose: those for graphics cards bring packages of their own."""
 
-SEPARATE_GROUPS = {"second-opinion"}
-"""Groups of packages that ask for others which are not used here."""
+SEPARATE_GROUPS = {"second-opinion"}  # groups of packages that ask for others which are not used here
 
 
 def main(arguments: list[str]) -> str | None:

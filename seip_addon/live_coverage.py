@@ -24,8 +24,7 @@ from .scene.write import show_seen_by
 from .sensor_edits import same_pose
 from .session import FollowedSensors, SceneState, scene_of, session
 
-DELAY = 0.02
-"""Seconds from a movement to the look at it: a drag reports many."""
+DELAY = 0.02  # seconds from a movement to the look at it: a drag reports many
 
 
 def start(scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel) -> None:

@@ -14,8 +14,7 @@ Colour = tuple[float, float, float, float]
 
 Kind = Literal["POINTS", "LINES", "TRIS"]
 
-POINT_SIZE = 2.0
-"""Pixels, at the interface's usual scale."""
+POINT_SIZE = 2.0  # pixels, at the interface's usual scale
 
 
 @dataclass(frozen=True)

@@ -280,8 +280,7 @@ class Session:
         return self.scans.get(scene.session_uid)
 
 
-session = Session()
-"""There is one Blender, and one file open in it."""
+session = Session()  # there is one Blender, and one file open in it
 
 
 def scene_of(number: int) -> bpy.types.Scene:

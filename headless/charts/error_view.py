@@ -28,9 +28,7 @@ TRUTH_FILL = TRUTH_COLOUR + "22"
 HIT_COLOUR, GROUND_COLOUR = "#9aa3ab", "#f1f3f4"
 PICTURE_SIDE, DPI = 5.6, 200  # inches
 MARGIN_SHARE = 0.03  # of the region's size, shown around it
-MAX_POINTS = 150_000
-"""Returns that are drawn of each cloud, evenly chosen: more hide each other."""
-
+MAX_POINTS = 150_000  # returns that are drawn of each cloud, evenly chosen: more hide each other
 RING_RADIUS = 4.0  # metres, radius of the rings about errors
 MIN_NOSE_LENGTH = 0.3  # metres, of the stroke that shows where a box's front is
 

@@ -19,12 +19,8 @@ from seip_addon.core.site.site import Site
 
 COUNTS = (1, 2, 4)
 CENTRAL_WEIGHTS = (2.0, 4.0, 8.0, 16.0)
-CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]
-"""Central weight of the plans that stand beside the vanilla ones."""
-
-
-Span = tuple[float, float]
-"""Least and largest possible value of something that the solver may not have settled."""
+CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]  # central weight of the plans that stand beside the vanilla ones
+Span = tuple[float, float]  # least and largest possible value of something that the solver may not have settled
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, verdict, worst_verdi
 
 from .cells import CENTRAL_WEIGHTS, COUNTS, Case, CoverageStudy, Span
 
-MIN_CHANGE = 0.01
-"""Share of the region below which a gain or loss of coverage is negligible."""
+MIN_CHANGE = 0.01  # share of the region below which a gain or loss of coverage is negligible
 
 
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:

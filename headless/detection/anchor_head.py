@@ -19,20 +19,14 @@ from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid
 from .settings import CLASSES, GROUND_ABOVE_BOTTOM
 
-ANCHOR_CHANNELS = 10
-"""Of an anchor: score, seven of its box, two of its direction."""
+ANCHOR_CHANNELS = 10  # of an anchor: score, seven of its box, two of its direction
 
 DIRECTION_FROM = math.pi / 4
 """Yaw at which the first of the two directions begins: no street of a crossing along the axes runs there."""
 
-SMOOTH_L1_BETA = 1 / 9
-"""Where the smooth L1 loss turns from a square into a line."""
-
-INITIAL_SCORE = 0.01
-"""Score of every anchor before training."""
-
-MAX_BOXES = 500
-"""Boxes of a cloud before suppression, the best first."""
+SMOOTH_L1_BETA = 1 / 9  # where the smooth L1 loss turns from a square into a line
+INITIAL_SCORE = 0.01  # score of every anchor before training
+MAX_BOXES = 500  # boxes of a cloud before suppression, the best first
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,13 @@ from .matching import Match, Rule, match
 BLOCK_SECONDS = 10.0
 """Seconds of a run whose frames are drawn together: they show much the same vehicles in much the same places."""
 
-MIN_BLOCKS = 5
-"""Blocks below which an interval would say more about chance than about the traffic."""
+MIN_BLOCKS = 5  # blocks below which an interval would say more about chance than about the traffic
 
 RESAMPLES, RESAMPLES_AT_ONCE = 1000, 50
 
 Table = TypeVar("Table", "EvaluatedDetections", "CountedTruth")
 
-MISSED_SCORE = -np.inf
-"""The score at which a road user is found that none finds."""
+MISSED_SCORE = -np.inf  # the score at which a road user is found that none finds
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,7 @@ import numpy as np
 
 from seip_addon.core.estimates import Interval, mean_interval
 
-FACTOR = 2.0
-"""Factor up to which a figure is about another."""
-
+FACTOR = 2.0  # factor up to which a figure is about another
 MIN_SEEDS = 3  # seeds below which nothing is decided
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))

@@ -14,8 +14,7 @@ from seip_addon.core.scans.frame import Frame
 
 from .cloud_in_plan import CloudInPlan
 
-DENSITY_RADIUS = 3.0
-"""Radius in metres of the circle around a box in which the density of returns is taken."""
+DENSITY_RADIUS = 3.0  # radius in metres of the circle around a box in which the density of returns is taken
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,11 +24,8 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from .frame_results import FrameResult
 from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
 
-VEHICLES = ("car", "van", "truck", "bus")
-"""Categories whose average precision the study compares."""
-
-NO_MATCH = -1
-"""Index that stands for no match, of a detection and of a road user."""
+VEHICLES = ("car", "van", "truck", "bus")  # categories whose average precision the study compares
+NO_MATCH = -1  # index that stands for no match, of a detection and of a road user
 
 
 @dataclass(frozen=True)

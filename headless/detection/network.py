@@ -13,8 +13,7 @@ from torch import Tensor, nn
 from .pillars import POINT_FEATURES
 from .settings import NetworkSettings
 
-OUTPUT_STRIDE = 2
-"""Pillars along a side of a cell of the feature map."""
+OUTPUT_STRIDE = 2  # pillars along a side of a cell of the feature map
 
 NORMALISATION_EPSILON, NORMALISATION_MOMENTUM = 1e-3, 0.03
 """Of batch normalisation: as published, but with running means that keep up with a short training."""

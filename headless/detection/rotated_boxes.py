@@ -12,8 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))
-"""Of a unit square, counter-clockwise."""
+CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))  # of a unit square, counter-clockwise
 
 PAIRS_AT_ONCE = 2000
 """Pairs that stay in a core's cache; spread over threads, small steps like these take ten times as long."""

@@ -25,12 +25,8 @@ from seip_addon.core.traffic.source import TrafficFiles
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
-STEP_SECONDS = 0.1
-"""Seconds between two steps of the simulation."""
-
-SAMPLING_SECONDS = 0.2
-"""Seconds between two samples of the trajectories."""
-
+STEP_SECONDS = 0.1  # seconds between two steps of the simulation
+SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
 _MAX_SIGNAL_DISTANCE = 60.0  # metres: a crosswalk further from any traffic light belongs to none
 _PAVEMENT_REACH = 6.0  # metres that pavements reach beyond the ends of a crosswalk

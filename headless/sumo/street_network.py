@@ -12,9 +12,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.traffic.sumo_files import Attributes, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes
-
-PARKED_CLASS = "custom1"
-"""The vClass that alone may stand in a parking lane."""
+PARKED_CLASS = "custom1"  # the vClass that alone may stand in a parking lane
 
 
 @dataclass(frozen=True, eq=False)

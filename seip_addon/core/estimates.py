@@ -11,19 +11,11 @@ import numpy as np
 from .arrays import Float, Integer
 from .errors import SeipError
 
-Interval = tuple[float, float]
-"""Least and largest value that a 95 % interval holds."""
-
-TAIL_PROBABILITY = 0.025
-"""Probability on either side of an interval."""
-
-NORMAL_QUANTILE = 1.959963984540054
-"""Value that a standard normal variable exceeds with a probability of 2.5 %."""
-
+Interval = tuple[float, float]  # least and largest value that a 95 % interval holds
+TAIL_PROBABILITY = 0.025  # probability on either side of an interval
+NORMAL_QUANTILE = 1.959963984540054  # value that a standard normal variable exceeds with a probability of 2.5 %
 RESAMPLES = 2000  # of a bootstrap
-
-MIN_BATCHES = 4
-"""With fewer, no interval is given for a mean."""
+MIN_BATCHES = 4  # with fewer, no interval is given for a mean
 
 
 @dataclass(frozen=True)

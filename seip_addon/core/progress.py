@@ -15,8 +15,7 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
-REPORT_INTERVAL = 0.1
-"""Seconds between the reports of work in a thread."""
+REPORT_INTERVAL = 0.1  # seconds between the reports of work in a thread
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,9 @@ from ..session import session
 
 DENSE, WIDE, CONE = (0.30, 0.75, 1.0, 0.9), (1.0, 0.55, 0.10, 0.9), (1.0, 1.0, 1.0, 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
-WIDTH = 1.5
-"""Pixels."""
-UPRIGHT = 1e-5
-"""Radians."""
-LIFT = 0.05
-"""Metres of the rings above the road."""
+WIDTH = 1.5  # pixels
+UPRIGHT = 1e-5  # radians
+LIFT = 0.05  # metres of the rings above the road
 
 
 @dataclass(frozen=True, eq=False)

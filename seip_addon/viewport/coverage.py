@@ -9,8 +9,7 @@ from ..overlay import Block, Entry, Overlay
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
 
 NAME = "coverage"
-SHOWN_BY = {"MATERIAL", "VERTEX"}
-"""Ways to colour Solid shading that show the coverage."""
+SHOWN_BY = {"MATERIAL", "VERTEX"}  # ways to colour Solid shading that show the coverage
 
 
 def coverage_overlay() -> Overlay:

@@ -9,8 +9,7 @@ import bpy
 
 from ..overlay import Block, Colour, Entry
 
-TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0
-"""Pixels at the interface's usual scale."""
+TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0  # pixels at the interface's usual scale
 PAPER: Colour = (0.06, 0.08, 0.10, 0.82)
 INK: Colour = (0.95, 0.96, 0.97, 1.0)
 EDGE: Colour = (0.55, 0.58, 0.62, 1.0)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from .legend import MARGIN, draw_legend_at
 from .overlays import draw_overlays, legend_blocks
 
-WIDTH = 1920
-"""Pixels."""
+WIDTH = 1920  # pixels
 
 
 def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint8]:

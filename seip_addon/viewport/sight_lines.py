@@ -13,8 +13,7 @@ from ..scene.write import LIFT
 NAME = "sight lines"
 LINE_COLOUR: Colour = (1.0, 0.85, 0.25, 0.30)
 SHADOW_COLOUR: Colour = (*rgb(INK), 0.80)
-ABOVE = LIFT + 0.02
-"""Metres of the shadows over the road: on the coverage, not in it."""
+ABOVE = LIFT + 0.02  # metres of the shadows over the road: on the coverage, not in it
 
 
 def sight_overlay(sight: SightLines, label: str) -> Overlay:

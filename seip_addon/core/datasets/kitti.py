@@ -35,11 +35,8 @@ CLASSES = {
 }
 """KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
 
-NO_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"
-"""The label of a frame without any."""
-
-PIXELS = 100
-"""Width and height of the empty picture and of each box in it."""
+NO_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
+PIXELS = 100  # width and height of the empty picture and of each box in it
 
 _IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0"
 CALIBRATION = "".join(

@@ -36,9 +36,7 @@ KITTI_CLASS = {
 """As which of KITTI's classes each is evaluated, which is all that OpenPCDet evaluates a custom dataset by."""
 
 NO_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
-
-PLAN_STEP = 6.4
-"""What the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m."""
+PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
 
 HEIGHT_STEP = 2.0
 """What the range is a multiple of in height, metres: 40 voxels, as networks of voxels ask for, of 0.05 m each."""

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..arrays import Float
 
-VERTICAL_SINE = 1 - 1e-12
-"""Sine of the tilt from which a sensor looks straight down, or up."""
+VERTICAL_SINE = 1 - 1e-12  # sine of the tilt from which a sensor looks straight down, or up
 
 
 def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:

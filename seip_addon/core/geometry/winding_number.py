@@ -9,8 +9,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 
-_COORDINATE_BITS = 16
-"""Of each coordinate, for the order of triangles in space."""
+_COORDINATE_BITS = 16  # of each coordinate, for the order of triangles in space
 _MIN_BLOCK_TRIANGLES = 16  # triangles of a block at least
 _TOLERANCES = (0.1, 0.01, 0.001, 0.0)
 """Of the errors of all far blocks together; a point that is undecided by the first is computed with the next."""

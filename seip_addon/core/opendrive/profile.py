@@ -8,10 +8,8 @@ import numpy as np
 
 from ..arrays import Float
 
-_MIN_TERM = 1e-12
-"""Terms of a cubic smaller than this, in relation to the largest, move no zero that can be told."""
-_MAX_IMAGINARY_PART = 1e-9
-"""Imaginary parts below this come from rounding."""
+_MIN_TERM = 1e-12  # terms of a cubic smaller than this, in relation to the largest, move no zero that can be told
+_MAX_IMAGINARY_PART = 1e-9  # imaginary parts below this come from rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +75,7 @@ def profile(records: list[tuple[float, tuple[float, float, float, float]]]) -> P
     )
 
 
-ZERO_PROFILE = profile([])
-"""The profile without records: zero everywhere."""
+ZERO_PROFILE = profile([])  # the profile without records: zero everywhere
 
 
 @dataclass(frozen=True, eq=False)

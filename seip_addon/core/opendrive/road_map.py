@@ -10,8 +10,7 @@ from ..arrays import Float
 from .profile import LateralShape, Profile
 from .reference_line import ReferenceLine
 
-MIDDLE_STEP = 10.0
-"""Metres along a road between the places that may be a map's middle."""
+MIDDLE_STEP = 10.0  # metres along a road between the places that may be a map's middle
 
 
 @dataclass(frozen=True)

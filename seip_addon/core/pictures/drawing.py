@@ -28,8 +28,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
 HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
-MAX_LABELLED = 40
-"""More sensors than these get no labels on the picture."""
+MAX_LABELLED = 40  # more sensors than these get no labels on the picture
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:

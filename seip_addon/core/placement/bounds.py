@@ -37,14 +37,9 @@ MIN_STEP = 1e-3
 REDUCTION_INTERVAL, MAX_KEPT_SHARE = 25, 0.8
 """Every so many steps candidates are ruled out, where no more than such a share of them would be left."""
 
-MAX_LISTED_CHOICES = 10_000
-"""The search ends when no more choices than these are left."""
-
-FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)
-"""Factors by which the budget's multiplier may change in a step."""
-
-PRICES_TRIED = 200
-"""Multipliers of the price that are tried for a bound on it."""
+MAX_LISTED_CHOICES = 10_000  # the search ends when no more choices than these are left
+FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)  # factors by which the budget's multiplier may change in a step
+PRICES_TRIED = 200  # multipliers of the price that are tried for a bound on it
 
 
 class HasValue(Protocol):

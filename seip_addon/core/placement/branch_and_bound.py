@@ -39,8 +39,7 @@ from .problem import TIE_TOLERANCE
 from .reduced_problem import MAX_EXACT_DOUBLE, Instance, Numbers
 from .search_limits import Clock
 
-MIN_SENSORS = 3
-"""With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""
+MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
 
 MIN_CHILDREN = 60
 """... where at least so many children are left, and each sensor adds no more than the one before it ...
@@ -57,8 +56,7 @@ FIRST_STEPS, LATER_STEPS = 300, 100
 MAX_ENTRIES = 30_000_000
 """Entries of V up to which the search keeps V as numbers: 240 MB, or twice that where weights are uneven."""
 
-OPERATIONS_PER_FETCH = 8
-"""Multiplications that take as long as fetching an entry of V."""
+OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
 
 MAX_WAITING_FOLLOWERS = 16_000_000
 """Followers of nodes that wait to be taken by their bounds: 200 MB. With so many, new nodes are searched first."""

@@ -21,8 +21,7 @@ from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
 from .tie_breaking import fewest
 
-MIN_TIE_BREAKING_LIMIT = 1.0
-"""Seconds, or units of work, that choosing among equally cheap placements may always take."""
+MIN_TIE_BREAKING_LIMIT = 1.0  # seconds, or units of work, that choosing among equally cheap placements may always take
 
 
 def cheapest_for_coverage(

@@ -29,8 +29,7 @@ from .search_limits import Clock
 
 MAX_ITERATIONS = 2000
 
-SENSORS_PER_PART = 1.8
-"""Sensors of a placement for each part; about two, as the overlap of pairs is computed exactly."""
+SENSORS_PER_PART = 1.8  # sensors of a placement for each part; about two, as the overlap of pairs is computed exactly
 
 
 @dataclass(frozen=True, eq=False)

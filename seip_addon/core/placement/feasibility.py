@@ -17,8 +17,7 @@ from .problem import PlacementProblem
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-TIME_LIMIT = 20.0
-"""Time for a program without targets: far more than it takes, and apart from the user's time limit."""
+TIME_LIMIT = 20.0  # time for a program without targets: far more than it takes, and apart from the user's time limit
 
 
 def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) -> Generator[Progress, None, Integer]:

@@ -14,11 +14,8 @@ from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-GREEDY_STARTS = 8
-"""Candidates to begin a greedy choice with, before swaps."""
-
-TABU_STEPS_PER_CANDIDATE = 2
-"""Swaps of a tabu search for each candidate."""
+GREEDY_STARTS = 8  # candidates to begin a greedy choice with, before swaps
+TABU_STEPS_PER_CANDIDATE = 2  # swaps of a tabu search for each candidate
 
 ADDED_TENURE, DROPPED_TENURE = 4, 12
 """A candidate added stays for fewer steps than the first; one dropped stays out for one to two times the second."""

@@ -17,9 +17,7 @@ from .reduced_problem import Instance, make_instance
 from .search_limits import Clock
 
 MAX_LISTED = 10_000  # placements that are listed at most
-
-MAX_BRANCHES = 300
-"""Branches that are searched at most: no clock decides what is found."""
+MAX_BRANCHES = 300  # branches that are searched at most: no clock decides what is found
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,12 +20,8 @@ from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_g
 from .deployment import Deployment, deploy
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 
-DEFAULT_COUNT = 4
-"""Sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four."""
-
-
-MOVED = "moved by hand"
-"""Status of a placement whose sensors hang where a hand has put them."""
+DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
+MOVED = "moved by hand"  # status of a placement whose sensors hang where a hand has put them
 MOVED_MESSAGE = "Moved by hand: evaluated where the sensors hang; nothing is proven of it."
 CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
 

@@ -16,8 +16,7 @@ from ..errors import SeipError
 from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
-MAX_EXACT_DOUBLE = 2**53
-"""Sums of whole numbers up to here are exact in double precision."""
+MAX_EXACT_DOUBLE = 2**53  # sums of whole numbers up to here are exact in double precision
 
 MAX_EXACT_SINGLE = 2**24
 """Sums of whole numbers up to here are exact in single precision, whatever the order of summation."""
@@ -28,11 +27,8 @@ INCOMMENSURABLE_TOTAL = 2**50
 MICROMETRE = 1e-6
 """Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
 
-WHOLE_SLACK = 0.25
-"""Whole weights differ by one or not at all."""
-
-DENOMINATORS = range(1, 13)
-"""A common unit of all weights is sought among these parts of the smallest one."""
+WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
+DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
 Numbers = NDArray[np.floating[Any]]

@@ -30,8 +30,7 @@ TABU_SEARCH_SHARE, FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.1, 0.
 MIN_BOUND_GAIN = 0.05
 """Share of the gap that the first bound by decomposition must close for the full one to be worth its time."""
 
-PROGRAM_SHARE = 0.5
-"""Share for the integer program, beside branch and bound."""
+PROGRAM_SHARE = 0.5  # share for the integer program, beside branch and bound
 
 MAX_RELAXATION_GAP = 0.01
 """Gap of the linear relaxation up to which the integer program is tried beside branch and bound."""
@@ -39,8 +38,7 @@ MAX_RELAXATION_GAP = 0.01
 MIN_TIE_BREAKING_WORK = 2.0
 """Units of work that the choice among equally good placements may take, or as many as their proof took."""
 
-MIN_GAP_PROGRESS = 0.02
-"""Share of the gap that closes in the second half of the time where more time is of use."""
+MIN_GAP_PROGRESS = 0.02  # share of the gap that closes in the second half of the time where more time is of use
 
 MAX_PROGRAM_ENTRIES = 1_000_000
 """Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""

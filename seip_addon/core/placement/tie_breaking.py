@@ -22,11 +22,8 @@ from .integer_program import reaching
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-MAX_SEARCHED_TIES = 2_000
-"""Ties that branch and bound lists; of more it looks for the first in order."""
-
-MAX_LISTED_TIES = 12
-"""Ties that are listed by one program each; beyond, each stage is a program of its own."""
+MAX_SEARCHED_TIES = 2_000  # ties that branch and bound lists; of more it looks for the first in order
+MAX_LISTED_TIES = 12  # ties that are listed by one program each; beyond, each stage is a program of its own
 
 BLOCK_SIZE = 10
 """Candidates whose order is settled by one program: powers of two up to 512 stay far above all tolerances."""

@@ -28,10 +28,7 @@ from ..site.scene_geometry import Mesh
 
 _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
-
-
-MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0
-"""Metres and radians; larger standard deviations are taken for typing errors."""
+MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0  # metres and radians; larger standard deviations are taken for typing errors
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from .visibility_under_errors import Surroundings, draws_for, visibility_under_e
 
 QUANTILES = (0.05, 0.5, 0.95)
 
-NOTABLE_LOSS = 0.01
-"""Share of the targets whose loss, in one of twenty draws, is worth a warning."""
+NOTABLE_LOSS = 0.01  # share of the targets whose loss, in one of twenty draws, is worth a warning
 
 
 @dataclass(frozen=True)

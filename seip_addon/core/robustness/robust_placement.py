@@ -48,15 +48,9 @@ from .risk import Risk
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .scenario_visibility import ScenarioVisibility
 
-ROUNDS = 16
-"""Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
-
-
-SCENARIO_SHARE = 0.5
-"""Share of the time for the problems of single scenarios."""
-
-MIN_SECONDS = 1.0
-"""Or units of work, for what comes after them, however slow they were."""
+ROUNDS = 16  # of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
+SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
+MIN_SECONDS = 1.0  # or units of work, for what comes after them, however slow they were
 
 
 UNPROVEN_MESSAGE = "the time was too short to prove this placement the best: the gap says how far"

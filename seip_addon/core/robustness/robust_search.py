@@ -31,8 +31,7 @@ from ..progress import Progress
 STARTING_PAIRS, MAX_FIRST_CANDIDATES = 8, 100
 """Starting pairs where a single sensor gains nothing, and candidates that may be the first of a pair."""
 
-SWAPS_TRIED = 24
-"""Swaps of a sensor for which T is computed, those with the largest F."""
+SWAPS_TRIED = 24  # swaps of a sensor for which T is computed, those with the largest F
 
 
 def swap_search_from_pairs(

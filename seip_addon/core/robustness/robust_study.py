@@ -19,11 +19,8 @@ from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
-LOW_QUANTILE = 0.05
-"""Quantile of coverage by which placements are compared."""
-
-COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
-"""Compared by default."""
+LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
+COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default
 
 
 @dataclass(frozen=True)

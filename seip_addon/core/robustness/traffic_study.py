@@ -24,13 +24,9 @@ from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
 from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_traffic
 from .visibility_under_errors import Surroundings
 
-NOTABLE_LOSS = 0.01
-"""Share of the targets' weight whose loss in traffic is worth a warning."""
-
+NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
-
-MOSTLY_SEEN_SHARE = 0.9
-"""Share of time from which on a target counts as mostly seen."""
+MOSTLY_SEEN_SHARE = 0.9  # share of time from which on a target counts as mostly seen
 
 LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
 """For messages and charts."""

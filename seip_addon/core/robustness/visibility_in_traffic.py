@@ -36,9 +36,7 @@ from .visibility_under_errors import Surroundings
 
 TrafficLayer = Literal["road", "height"]
 
-LAYER_HEIGHT = 1.5
-"""Metres above its target at which a car has its roof, and a van or a truck its side."""
-
+LAYER_HEIGHT = 1.5  # metres above its target at which a car has its roof, and a van or a truck its side
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
 _POINTS_AT_ONCE = 128  # bounds that of the rays past points
 _CUBE_SLACK = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out

@@ -21,20 +21,11 @@ from numpy.typing import NDArray
 from ..errors import SeipError
 from .files import digest, whole_file
 
-MAX_BYTES = 1 << 32
-"""Bytes of all arrays of a file together at most: 4 GiB."""
-
-MAX_HEADER_BYTES = 1 << 27
-"""Bytes of the header, four for each of its characters: 128 MiB."""
-
-MAX_TEXT_LENGTH = 256
-"""Characters of an entry of an array of text at most."""
-
-_OLD_VERSION = 1
-"""The version of files that hold no digest."""
-
-_MAX_DEFLATE_RATIO = 1032
-"""Bytes that one byte of DEFLATE can stand for (RFC 1951)."""
+MAX_BYTES = 1 << 32  # bytes of all arrays of a file together at most: 4 GiB
+MAX_HEADER_BYTES = 1 << 27  # bytes of the header, four for each of its characters: 128 MiB
+MAX_TEXT_LENGTH = 256  # characters of an entry of an array of text at most
+_OLD_VERSION = 1  # the version of files that hold no digest
+_MAX_DEFLATE_RATIO = 1032  # bytes that one byte of DEFLATE can stand for (RFC 1951)
 
 _NPY = re.compile(
     rb"\x93NUMPY\x01\x00.."

@@ -24,16 +24,10 @@ from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, rea
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
 
-MAX_SIZE = 100_000.0
-"""Metres (or degrees, or a weight) that nothing described may exceed."""
-
+MAX_SIZE = 100_000.0  # metres (or degrees, or a weight) that nothing described may exceed
 MAX_HEIGHT = 1_000.0  # metres that nothing described is high
-
-MAX_RADIUS = 5_000.0
-"""Metres from the middle of the place to the end of its region at most."""
-
-MAX_ROW_LENGTH = 10_000
-"""Limit on the trees or lights of a row."""
+MAX_RADIUS = 5_000.0  # metres from the middle of the place to the end of its region at most
+MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,12 +14,10 @@ from ..opendrive import LaneSurface, RoadMap
 from ..opendrive.geo_reference import middle_of_reference, projection
 from .description import SiteDescription
 
-MAX_ROAD_DISTANCE = 1000.0
-"""Metres beyond the roads of a map within which a place may be meant."""
+MAX_ROAD_DISTANCE = 1000.0  # metres beyond the roads of a map within which a place may be meant
 ALTERNATIVE_DISTANCE = 10.0
 """A pair of numbers that is the same place in degrees and in metres, but for so much (metres), is meant in metres."""
-MAX_ORIGIN_OFFSET = 0.05
-"""Degrees from the origin of a map's reference within which its roads lie."""
+MAX_ORIGIN_OFFSET = 0.05  # degrees from the origin of a map's reference within which its roads lie
 
 
 def in_metres(

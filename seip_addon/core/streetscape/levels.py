@@ -17,12 +17,9 @@ from ..opendrive import LaneSurface
 from .road_surface import MAX_SEAM, by_road, group, is_near
 from .terrain import Terrain
 
-MAX_JOINT_STEP = 1.0
-"""Roads that meet within so many metres of height lead into each other."""
-MIN_LEVEL_HEIGHT = 2.0
-"""A road that lies more than this (metres) above another one crosses it on a level of its own."""
-MIN_OVERLAP = 1.0
-"""Square metres in plan: roads that overlap less do not cross."""
+MAX_JOINT_STEP = 1.0  # roads that meet within so many metres of height lead into each other
+MIN_LEVEL_HEIGHT = 2.0  # a road that lies more than this (metres) above another one crosses it on a level of its own
+MIN_OVERLAP = 1.0  # square metres in plan: roads that overlap less do not cross
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,20 +18,17 @@ from .object_kinds import MAX_POST_THICKNESS, SIGN_WORDS, VAGUE_TYPES, Kind, Pos
 from .parts import Part, Role
 from .street_furniture import Solid
 
-MIN_HEIGHT = 0.2
-"""Outlines lower than this (metres) hide nothing that matters."""
+MIN_HEIGHT = 0.2  # outlines lower than this (metres) hide nothing that matters
 POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
 """Posts from this height and thickness up (metres) can carry a sensor: a traffic sign's of 5 to 6 cm cannot."""
 
 TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
-MIN_CROWN_SHARE = 0.15
-"""A tree that is more slender than this is given by its trunk: its crown follows from its height."""
+MIN_CROWN_SHARE = 0.15  # a tree that is more slender than this is given by its trunk: its crown follows from its height
 LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
 POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
 """Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
 
-MAX_FACADE_AREA = 200_000.0
-"""Square metres of walls beyond which a building has no windows: there would be too many."""
+MAX_FACADE_AREA = 200_000.0  # square metres of walls beyond which a building has no windows: there would be too many
 FACADES = ("facade brick", "facade plaster", "facade sand", "facade grey")
 
 

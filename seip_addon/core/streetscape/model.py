@@ -36,16 +36,12 @@ from .road_surface import Roadside
 from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
 
-STAGES = 6
-"""Pieces of work that a model is made in once the map's lanes are known."""
+STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
-CANDIDATE_MARGIN = 15.0
-"""How far outside the region of interest (metres) a new post may stand."""
-VERGE_STRIP = (0.8, 2.3)
-"""Where new posts may stand beside a road without pavements: metres from the carriageway."""
+CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
+VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
 VERGE_BELOW = 0.03
-GROUND_MARGIN = 5.0
-"""How far the ground goes on around what stands outside the extent (metres)."""
+GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
 MAX_GROUND_DISTANCE = 300.0
 """How far from the extent (metres) it goes on at most: a wall may run on along the whole map."""
 VERGE_SPACING = 12.0

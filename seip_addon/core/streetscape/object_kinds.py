@@ -35,8 +35,7 @@ KIND_OF_TYPE = {
     "streetlamp": Kind.LAMP,
     "building": Kind.BUILDING,
 }
-UNTYPED = {"-1", "none", ""}
-"""Types that say nothing: name and shape decide."""
+UNTYPED = {"-1", "none", ""}  # types that say nothing: name and shape decide
 VAGUE_TYPES = UNTYPED | {"obstacle"}  # types of which name and shape say more
 
 WORDS_OF_KIND = {

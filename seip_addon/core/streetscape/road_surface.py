@@ -33,8 +33,7 @@ GROUPS = {
 
 CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
 MAX_STEP = 10.0
-CORNER_NOTCH = 3.0
-"""Notches up to twice this (metres) at the corners of a junction are pavement."""
+CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junction are pavement
 MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
@@ -45,17 +44,11 @@ MARKING_ABOVE = 0.012
 DASH_LENGTH, DASH_GAP = 3.0, 6.0
 STOP_LINE_WIDTH = 0.4
 STOP_LINE_SETBACK = 1.0
-SNAP_GRID = 1e-4
-"""Grid (metres) that plans snap to when they are joined."""
-MIN_MARKED_WIDTH = 1.0
-"""Lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them."""
-MAX_SEAM = 0.05
-"""Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
-
-MAX_ISLAND_AREA = 400.0
-"""Holes of the carriageway smaller than this (m²) are islands, on which no post is assumed."""
-MAX_MEDIAN_WIDTH = 12.0
-"""Holes narrower than this (metres) are medians: likewise."""
+SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
+MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
+MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
+MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
+MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
 MAX_OPEN_MEDIAN_WIDTH = 6.0
 """Gaps between carriageways narrower than this (metres) are medians though no junction closes them."""
 

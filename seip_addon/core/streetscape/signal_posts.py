@@ -19,16 +19,13 @@ from .parts import Part, Role
 from .road_surface import Roadside
 from .terrain import Terrain
 
-DEFAULT_HEIGHT = 6.0
-"""Of a post (metres) whose height the map does not give."""
+DEFAULT_HEIGHT = 6.0  # of a post (metres) whose height the map does not give
 MAST_ARM, MAX_ARM = 4.5, 12.0
-MIN_HEIGHT_FOR_ARM = 4.5
-"""A lower post (metres) has no arm over traffic."""
+MIN_HEIGHT_FOR_ARM = 4.5  # a lower post (metres) has no arm over traffic
 KERB_CLEARANCE = 0.6
 SAME_POLE_DISTANCE = 3.0
 """Signals whose poles would stand nearer than this (metres) share one; a post of any kind so near carries a signal."""
-MAST_REACH = 12.0
-"""A post whose name tells of signals carries one up to so far away (metres)."""
+MAST_REACH = 12.0  # a post whose name tells of signals carries one up to so far away (metres)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,7 @@ POST_SIDES = 6
 TRUNK_SIDES = 6
 STOREY_HEIGHT = 3.2
 WINDOW_SPACING = 3.4
-WINDOW_OFFSET = 0.03
-"""How far window panes stand before the wall, so that they are drawn before it."""
+WINDOW_OFFSET = 0.03  # how far window panes stand before the wall, so that they are drawn before it
 
 
 @dataclass(frozen=True, eq=False)

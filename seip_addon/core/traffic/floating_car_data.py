@@ -27,9 +27,7 @@ from .sumo_files import MAX_COORDINATE, Attributes, opened, quoted, read_tags, s
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
-_MAX_NAMED = 5
-"""As many road users a message names; the others it counts."""
-
+_MAX_NAMED = 5  # as many road users a message names; the others it counts
 _LINES_PER_REPORT = 20_000  # of csv between two reports of progress
 
 

@@ -12,8 +12,7 @@ from ..arrays import Float, Integer
 from ..progress import Progress
 from .trajectories import Snapshot, Trajectories
 
-MIN_OVERLAP = 0.02
-"""Square metres of two footprints in one place below which they only touch."""
+MIN_OVERLAP = 0.02  # square metres of two footprints in one place below which they only touch
 
 
 @dataclass(frozen=True, eq=False)

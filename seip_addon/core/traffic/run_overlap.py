@@ -12,8 +12,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from .trajectories import Trajectories
 
-MATCH_RADIUS = 1.0
-"""Metres in plan within which two vehicles are in one place."""
+MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are in one place
 
 MAX_OVERLAP = 0.5
 """Share of the vehicles beyond which two runs are held to be copies. Independent runs queue in the same places."""

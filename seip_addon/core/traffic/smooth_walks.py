@@ -9,8 +9,7 @@ import numpy as np
 from ..arrays import Boolean, Float
 from .trajectories import Trajectories
 
-WINDOW_SECONDS = 1.8
-"""Seconds over which a pedestrian's position and heading are averaged."""
+WINDOW_SECONDS = 1.8  # seconds over which a pedestrian's position and heading are averaged
 
 MAX_LEAP = 4.0
 """Metres beyond what its speed explains: who moves further than that between two samples was put somewhere else."""

@@ -30,11 +30,8 @@ class VehicleType:
     height: float
 
 
-CAR = VehicleType("car", 5.0, 1.8, 1.5)
-"""What SUMO drives where nothing else is said."""
-
-PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)
-"""What SUMO lets walk where nothing else is said."""
+CAR = VehicleType("car", 5.0, 1.8, 1.5)  # what SUMO drives where nothing else is said
+PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)  # what SUMO lets walk where nothing else is said
 
 _CLASSES = {
     "pedestrian": PERSON,
