@@ -34,7 +34,6 @@ class SensorEdits:
     added: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Return whether there are any edits."""
         return bool(self.moved or self.deleted or self.added)
 
     def describe(self) -> str:

@@ -81,8 +81,6 @@ class SceneState:
         As the preferences were when this was asked for last.
     catalogues : tuple
         The user's catalogue files and when each was last written.
-    warnings : tuple of str
-        Of the scene's reading.
     estimate : Estimate or None
         Of what the visibility grid will take.
     solution : Solution or None
@@ -90,7 +88,6 @@ class SceneState:
     record : str
         The result that the solution was taken from.
     durations : mapping of str to float, seconds
-        How long each step took.
     """
 
     layout: Layout
@@ -148,8 +145,6 @@ class RunningWork:
         Reading of `time.monotonic`.
     timer : bpy.types.Timer or None
         Has somebody look at it from time to time.
-    stop : bool
-        Whether somebody asked to stop it.
     """
 
     operator: str
@@ -176,7 +171,6 @@ class FollowedSensors:
     moved : tuple of str
         Labels of those that are not where the placement put them.
     seconds : float
-        How long the last update took.
     problem : str
         Why nothing is followed at the moment.
     """
@@ -217,7 +211,6 @@ class LastScan:
     run : Run
         What the scans follow from.
     seconds : float
-        That the scan took.
     facts : tuple of str
         What came of it, one sentence each.
     """

@@ -41,12 +41,8 @@ class ErrorView:
 
     Parameters
     ----------
-    name : str
-        Heads the panel.
     cloud : (n, 2) float array, metres
         Returns in plan.
-    region : shapely geometry
-        Region of interest in plan.
     sensors : (s, 2) float64, metres
     truth : (g, 5) float64
         Road users in plan: x, y of the middle, length, width (metres), yaw (radians, counter-clockwise from +x).
@@ -70,13 +66,7 @@ class ErrorView:
 
 
 def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], title: str) -> None:
-    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG.
-
-    Parameters
-    ----------
-    views : sequence of ErrorView
-        Side by side.
-    """
+    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG."""
     if not views:
         raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")
     left, bottom, right, top = shapely.total_bounds([view.region for view in views])

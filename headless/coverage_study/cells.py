@@ -53,8 +53,6 @@ class Case(Cell):
     ----------
     placement, greedy : Placement
         The integer program's and the greedy algorithm's answer.
-    deployment : Deployment
-        What the integer program's sensors see.
     """
 
     placement: Placement
@@ -145,9 +143,6 @@ def coverage_study(
     site : Site
         With poses of every type and height to be studied.
     visible : (c, t) bool
-        The visibility grid.
-    limits : SolverLimits
-        For each cell.
 
     Raises
     ------

@@ -37,9 +37,7 @@ class EvaluatedDetections:
     hit : (d,) bool
         Whether it found a road user; false otherwise.
     frame : (d,) int64
-        The frame it is from.
     density : (d,) float64, per square metre
-        Of the returns around it.
     points : (d,) int64
         Returns from the road user that it found; in the box itself where it is false.
     distance : (d,) float64, metres
@@ -54,7 +52,6 @@ class EvaluatedDetections:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of detections."""
         return len(self.score)
 
 
@@ -67,7 +64,6 @@ class CountedTruth:
     score : (t,) float64
         Of the detection that found it, `MISSED_SCORE` where none did.
     frame : (t,) int64
-        The frame it is in.
     category, points, visibility, distance
         As in `GroundTruth`.
     """
@@ -80,7 +76,6 @@ class CountedTruth:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.score)
 
 

@@ -93,7 +93,6 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     Parameters
     ----------
     origin : (3,) float64, metres
-        Of the scene's local axes.
     every : float, seconds
         From frame to frame.
 
@@ -148,8 +147,6 @@ class DetectorOutcome:
 
     Parameters
     ----------
-    evaluation : Evaluation
-        By the study's rule.
     score : float
         From which on false positives are counted: the best balance of precision and recall on validation frames.
     """
@@ -284,15 +281,7 @@ def training(
 def train_all(
     models: Sequence[ModelConfiguration], training_set: TrainingSet, folder: Path, *, device: str
 ) -> Generator[Progress, None, list[TrainedDetector]]:
-    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again.
-
-    Parameters
-    ----------
-    folder : path
-        Of the detectors' files.
-    device : str
-        Of torch.
-    """
+    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again."""
     trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
     at_once = PARALLEL_TRAININGS if device == "cpu" else 1
     with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads

@@ -37,12 +37,9 @@ class SeedResult:
         Catalogue key.
     count : int
         N, the number of sensors that were allowed.
-    seed : int
-        Of the training.
     average_precision : float, 0 to 1
         Of vehicles at an intersection over union of 0.7 in plan.
     price : float, US dollars
-        Of all sensors.
     coverage : float, 0 to 1
         Share of targets that the placement sees.
     false_positives : float

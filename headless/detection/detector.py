@@ -43,8 +43,6 @@ class TrainingRecord:
     ----------
     sensors : tuple of str
         Catalogue keys of the types whose clouds it has seen, in alphabetical order; none where it is not known.
-    sites : tuple of str
-        Names of the scenes.
     """
 
     sensors: tuple[str, ...] = ()

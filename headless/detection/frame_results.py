@@ -35,7 +35,6 @@ class Detections:
     category: Integer
 
     def __len__(self) -> int:
-        """Return the number of boxes."""
         return len(self.score)
 
 
@@ -66,7 +65,6 @@ class GroundTruth:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.boxes)
 
 
@@ -98,7 +96,6 @@ class EvaluatedBoxes:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of detections."""
         return len(self.boxes)
 
 
@@ -108,8 +105,6 @@ class FrameResult:
 
     Parameters
     ----------
-    run : str
-        The traffic run it is from.
     time : float, seconds
         In that run.
     """
@@ -139,11 +134,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     classes : sequence of sequence of str
         Categories of road users in each of the detector's classes.
     region : shapely geometry, metres
-        Region of interest in plan.
     sensors : (s, 3) float64, metres
-        Where the sensors are.
-    run : str
-        The traffic run that the frame is from.
     """
     labels, boxes = frame.labels, detections.boxes
     first = np.array([members[0] for members in classes], dtype=np.str_)

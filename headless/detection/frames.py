@@ -77,7 +77,6 @@ class LazyFrames(Sequence[Frame]):
         self._numbers, self._load = range(count), load
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self._numbers)
 
     @overload
@@ -85,7 +84,6 @@ class LazyFrames(Sequence[Frame]):
     @overload
     def __getitem__(self, index: slice) -> list[Frame]: ...
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        """Load one frame or several."""
         if isinstance(index, slice):
             return [self._load(number) for number in self._numbers[index]]
         return self._load(self._numbers[index])
@@ -141,7 +139,6 @@ class SampledRecording:
         self.get = functools.cache(self._sample)
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.recording.frames)
 
     def _sample(self, frame: int) -> TrainingSample:

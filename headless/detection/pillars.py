@@ -51,7 +51,6 @@ class PillarGrid:
     pillar: float
 
     def __len__(self) -> int:
-        """Return the number of pillars."""
         return self.columns * self.rows
 
     @property

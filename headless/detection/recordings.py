@@ -70,11 +70,6 @@ class Simulator:
 
     What stands still is cast against once for a configuration and a run, and
     kept until another is asked for: ask for the frames of one after the other.
-
-    Parameters
-    ----------
-    site : str
-        The scene's name.
     """
 
     def __init__(self, static: StaticScene, settings: ScanSettings, site: str = "") -> None:

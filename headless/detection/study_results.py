@@ -46,15 +46,7 @@ SCHEMA = "seip-evaluation/1"
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """All that was found on one site.
-
-    Parameters
-    ----------
-    name : str
-        Of the site.
-    simulator : Simulator
-        To draw frames with.
-    """
+    """All that was found on one site."""
 
     name: str
     simulator: Simulator

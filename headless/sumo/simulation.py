@@ -60,7 +60,6 @@ class SignalPlan:
     all_red: int = 2
 
     def __post_init__(self) -> None:
-        """Raise SeipError where a duration cannot be meant."""
         if min(self.green, self.amber) < 1 or self.all_red < 0:
             raise SeipError("a signal plan needs green and amber of at least 1 s, and no negative times")
 
@@ -82,7 +81,6 @@ class Scenario:
     duration: float
 
     def __post_init__(self) -> None:
-        """Raise SeipError where the scenario cannot be simulated."""
         if not 0 <= self.seed < 2**31:
             raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
         if not 0.0 < self.duration <= 86400.0:
@@ -114,10 +112,6 @@ def simulate(
 
     Parameters
     ----------
-    map_path : path
-        The ``.xodr``.
-    folder : path
-        For SUMO's files.
     bounds : (4,) float, metres, optional
         Only roads that reach into this rectangle of the map are kept: left, low, right, high.
 

@@ -65,8 +65,6 @@ def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator
     ----------
     work : callable
         Called with an event; once that is set nobody waits for the result, and the sooner it returns the better.
-    what : str
-        What is being worked on.
 
     Yields
     ------

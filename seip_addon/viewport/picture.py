@@ -14,13 +14,7 @@ WIDTH = 1920  # pixels
 
 
 def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint8]:
-    """Return a viewport as it stands, without its panels and handles, (h, w, 4), the uppermost row first.
-
-    Parameters
-    ----------
-    area : bpy.types.Area
-        A 3D viewport.
-    """
+    """Return a viewport as it stands, without its panels and handles, (h, w, 4), the uppermost row first."""
     import gpu  # noqa: PLC0415  # not available in background mode
 
     region = next(region for region in area.regions if region.type == "WINDOW")

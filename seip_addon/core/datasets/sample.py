@@ -105,8 +105,6 @@ class Sample:
         With all its labels.
     fates : tuple of str
         What becomes of each of them, one of `OUTCOMES`.
-    boxes : Labels
-        Those that are to be written.
     classes : tuple of str
         Of each box, in the words of the format.
     """

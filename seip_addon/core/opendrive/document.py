@@ -25,8 +25,6 @@ class Node:
 
     Parameters
     ----------
-    element : Element
-        The element itself.
     place : str
         Where it stands, such as ``town.xodr, road 17``.
     """

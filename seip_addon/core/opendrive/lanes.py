@@ -26,16 +26,12 @@ class LaneSurface:
 
     Parameters
     ----------
-    junction_id : str or None
-        The junction that the road belongs to.
     section : int
         Number of the lane section along the road, from 0.
     lane_id : int
         Positive to the left of the centre lane, negative to the right.
     lane_type : str
         As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
-    keeps_left : bool
-        Whether traffic on the road keeps to the left.
     s : (n,) float64, metres
         Where along the road the points of the edges are.
     left, right : (n, 3) float64, metres

@@ -31,7 +31,6 @@ class Profile:
     coefficients: Float
 
     def __len__(self) -> int:
-        """Return the number of records."""
         return len(self.start)
 
     def __call__(self, s: Float) -> Float:

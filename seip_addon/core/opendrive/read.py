@@ -47,11 +47,6 @@ _MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 def read_map(path: str | os.PathLike[str]) -> RoadMap:
     """Read an OpenDRIVE file.
 
-    Parameters
-    ----------
-    path : path-like
-        The ``.xodr`` file.
-
     Returns
     -------
     RoadMap

@@ -162,8 +162,6 @@ class ReferenceLine:
         Length of each piece.
     start : (n, 3) float64
         x, y in metres and heading in radians of each piece's start.
-    pieces : tuple of Piece
-        The curves.
     """
 
     s: Float

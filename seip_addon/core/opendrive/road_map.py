@@ -163,10 +163,6 @@ class Road:
     ----------
     id, name : str
         As in the file; the name may be empty.
-    junction_id : str or None
-        The junction it belongs to.
-    keeps_left : bool
-        Whether traffic on it keeps to the left.
     elevation, lane_offset : Profile
         Metres over metres along the road.
     superelevation, left_crossfall, right_crossfall : Profile

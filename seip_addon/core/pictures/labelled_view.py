@@ -52,14 +52,8 @@ def save_labelled_view(
 
     Parameters
     ----------
-    path : path-like
-        The picture to write.
     picture : path-like
         The rendered PNG, transparent where there is nothing.
-    deployment : Deployment
-        The chosen sensors and what they see.
-    sight : Sight
-        Where they are on the picture.
     """
     pixels = imread(str(picture))
     height, width = pixels.shape[0] / DPI, pixels.shape[1] / DPI

@@ -57,14 +57,6 @@ def save_plan_view(
 
     Parameters
     ----------
-    path : path-like
-        The picture to write.
-    geometry : SceneGeometry
-        What the scene holds; drawn in plan.
-    site : Site
-        Targets and candidates made from it.
-    deployment : Deployment
-        The chosen sensors and what they see.
     notes : sequence of str
         Notes for the reader of the plan, one sentence each.
     """

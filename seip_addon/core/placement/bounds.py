@@ -84,8 +84,6 @@ class Bound:
         Multipliers of the targets.
     groups : (g,) float64
         Multipliers of the mandatory groups.
-    selection : Selection
-        The relaxed problem's solution.
     """
 
     value: float
@@ -219,12 +217,8 @@ def lagrangian_bound(
     ----------
     goal : float
         Objective value to reach; the search ends when the bound falls below.
-    clock : Clock
-        Ends the search when the time is up.
     start : (t,) float64, optional
         Multipliers of the targets to begin from.
-    iterations : int
-        At most so many steps.
     layers : (top, t) float64, optional
         As for `bound_from`.
 

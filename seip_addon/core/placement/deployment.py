@@ -87,7 +87,6 @@ class Deployment:
     weighted : float
         Share of the targets' weight that is seen.
     price : float, dollars
-        Of all sensors together.
     """
 
     sensors: tuple[Sensor, ...]
@@ -106,10 +105,7 @@ def deploy(
 
     Parameters
     ----------
-    models : mapping of str to LidarModel
-        The sensor types by catalogue key.
     visible : (c, t) bool
-        Which pose sees which target.
     chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
     """

@@ -49,7 +49,6 @@ class NearOptimalSet:
     positions: int
 
     def __len__(self) -> int:
-        """Return how many were found."""
         return len(self.placements)
 
     @property

@@ -94,12 +94,8 @@ class Solution:
     ----------
     objective : Objective
         With the number of sensors filled in where none was asked for.
-    placement : Placement
-        With its certificate.
     greedy : Placement or None
         The greedy answer to the same question; None for the reverse problem.
-    deployment : Deployment
-        The chosen sensors and what they see.
     """
 
     objective: Objective
@@ -123,12 +119,8 @@ def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
 
     Parameters
     ----------
-    status : str
-        Of the placement.
     gap : float or None
         Between bound and objective, as a share of the objective; None or infinite where nothing bounds it.
-    cheapest : bool
-        Whether the least price was sought.
     """
     if status == MOVED:
         return MOVED_MESSAGE
@@ -158,9 +150,6 @@ def placement_problem(
     Parameters
     ----------
     visible : (c, t) bool
-        The visibility grid.
-    models : mapping of str to LidarModel
-        By catalogue key.
 
     Raises
     ------
@@ -207,9 +196,6 @@ def optimise(
     Parameters
     ----------
     visible : (c, t) bool
-        The visibility grid.
-    models : mapping of str to LidarModel
-        By catalogue key.
 
     Raises
     ------

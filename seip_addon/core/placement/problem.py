@@ -44,8 +44,6 @@ class PlacementProblem:
         order in which they are given never matters.
     mandatory : (g, c) bool, optional
         Each row is a group of poses of which at least one must be chosen.
-    mandatory_names : (g,) str, optional
-        Names of those groups.
     forbidden : (c,) bool, optional
         Poses that must not be chosen.
     count : int, optional
@@ -75,7 +73,6 @@ class PlacementProblem:
     min_distance: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise SeipError on contradictions that can be told without solving."""
         self._check_values()
         self._check_limits()
         for group, name in zip(self.mandatory_groups & self.allowed, self.group_names, strict=True):
@@ -170,12 +167,8 @@ class Placement:
         ``optimal`` (proven) or ``feasible``.
     solver : str
         Name and version of what solved it.
-    seconds : float
-        Time it took.
     covered : float
         Weight of the targets that some chosen sensor sees.
-    price : float
-        Total price.
     notes : tuple of str
         Notes on the solution, one sentence each.
     """

@@ -82,7 +82,6 @@ class Instance:
     cover: MultiCover = COVERAGE
 
     def __len__(self) -> int:
-        """Return the number of candidates."""
         return len(self.visible)
 
     @cached_property

@@ -50,12 +50,7 @@ def save_candidate_table(
 
     Parameters
     ----------
-    path : path-like
-        The file to write.
-    models : mapping of str to LidarModel
-        The sensor types by catalogue key.
     visible : (c, t) bool
-        Which pose sees which target.
     deployment : Deployment
         The chosen sensors; their labels stand in the column ``chosen``.
     """

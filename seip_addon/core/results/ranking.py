@@ -32,8 +32,6 @@ def rank_alone(visible: Boolean, weight: Float, most: int) -> list[Ranked]:
     ----------
     visible : (c, t) bool
     weight : (t,) float64
-    most : int
-        How many to return.
     """
     return _ranked(visible, weight, np.zeros(visible.shape[1], dtype=bool), most)
 
@@ -49,8 +47,6 @@ def rank_added(visible: Boolean, weight: Float, seen: Boolean, free: Boolean, mo
         What the placement sees.
     free : (c,) bool
         Poses at positions that it leaves free.
-    most : int
-        How many to return.
     """
     return [one for one in _ranked(visible, weight, seen, len(visible)) if free[one.pose]][:most]
 

@@ -99,7 +99,6 @@ class PoseDraws:
     roll: Float
 
     def __len__(self) -> int:
-        """Return the number of draws."""
         return len(self.shift)
 
     def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:

@@ -66,8 +66,6 @@ class PoseStudy:
 
     Parameters
     ----------
-    labels : (s,) tuple of str
-        Of the sensors.
     planned : Coverages
         Of the poses as planned: n = 1.
     together : Coverages

@@ -71,8 +71,6 @@ def solve_robust(
         With the visibility of the poses as planned.
     scenarios : ScenarioVisibility
         Of all candidates.
-    risk : Risk
-        The risk measure to maximise.
     foreseen : sequence of Placement, optional
         See `foresee`; found within the time limit if not given, and only of use where one look is enough.
 

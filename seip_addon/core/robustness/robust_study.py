@@ -29,10 +29,6 @@ class RobustnessSettings:
 
     Parameters
     ----------
-    risk : Risk
-        The risk measure to maximise.
-    errors : PoseErrors
-        Of the sensors' poses.
     scenarios : int
         Draws to choose on.
     draws : int
@@ -152,8 +148,6 @@ def robust_study(
         Of all candidates of the site.
     risks : sequence of Risk
         A risk measure for each placement that is compared.
-    limits : SolverLimits
-        For each placement.
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)

@@ -62,7 +62,6 @@ class Instants:
     batch: Integer
 
     def __len__(self) -> int:
-        """Return n."""
         return len(self.time)
 
     def obstacles(self) -> list[TrafficObstacles]:

@@ -132,10 +132,6 @@ class TrafficStudy:
         Number of instants that the traffic-aware placement was optimised on.
     road_users : float
         Mean number of road users at the evaluated instants.
-    empty : TrafficEvaluation
-        Optimised for the empty road.
-    traffic : TrafficEvaluation
-        Optimised on traffic.
     """
 
     layer: TrafficLayer
@@ -181,8 +177,6 @@ def traffic_study(
         Of all candidates of the site; what they see is taken from the scenarios.
     evaluation : Instants
         Of runs that are not those of the scenarios.
-    limits : SolverLimits
-        For each placement.
     """
     problem = replace(problem, visible=scenarios.empty)
     empty = yield from solve(problem, limits)

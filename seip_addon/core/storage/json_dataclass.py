@@ -32,8 +32,6 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
 
     Parameters
     ----------
-    kind : type
-        The dataclass.
     where : str
         What stands before the names of fields in messages.
 

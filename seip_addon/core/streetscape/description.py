@@ -103,8 +103,6 @@ class SiteDescription:
     ----------
     name : str
         Title of the place; empty: the map's name.
-    map : Path or None
-        The OpenDRIVE file.
     near : (x, y) or None
         Middle of the place, map coordinates.
     junction : str or None

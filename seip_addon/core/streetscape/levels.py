@@ -32,7 +32,6 @@ class Crossing:
     place: tuple[float, float]
 
     def __str__(self) -> str:
-        """Return the crossing in words."""
         x, y = (round(value) + 0 for value in self.place)
         return f"road {self.above} lies {self.height:.1f} m above road {self.below} at ({x}, {y})"
 

@@ -65,7 +65,6 @@ class Roadside:
     Parameters
     ----------
     carriageway : shapely geometry
-        In plan.
     filled : shapely geometry
         The carriageway with its islands and medians: holes between the lanes of
         a junction, small ones and narrow ones, and narrow gaps.

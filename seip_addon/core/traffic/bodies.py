@@ -67,7 +67,6 @@ class Body:
     material: Text
 
     def __len__(self) -> int:
-        """Return the number of triangles."""
         return len(self.triangles)
 
 

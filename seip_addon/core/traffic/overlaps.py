@@ -26,7 +26,6 @@ class Overlaps:
     area : (k,) float64, square metres
         The largest overlap of their footprints at any of the instants.
     time : (k,) float64, seconds
-        When that is.
     """
 
     pair: Integer
@@ -34,7 +33,6 @@ class Overlaps:
     time: Float
 
     def __len__(self) -> int:
-        """Return the number of pairs."""
         return len(self.pair)
 
 

@@ -83,7 +83,6 @@ class Snapshot:
     speed: Float
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.user)
 
 
@@ -121,7 +120,6 @@ class Trajectories:
     source: str = ""
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.users)
 
     @cached_property
