@@ -5,8 +5,6 @@
 The wheels are the group ``extension`` of the pins in ``pyproject.toml``, in `wheels/`, checked against ``wheels.lock``.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import importlib.util

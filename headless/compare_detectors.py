@@ -6,8 +6,6 @@ Every setting is trained for the same number of steps on all placements, and eva
 CPU times of one thread, independent of other load.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Generator

@@ -6,8 +6,6 @@ that of the finest. To stop where two spacings in a row agree would be quicker, 
 few candidates is the best is a matter of luck.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace

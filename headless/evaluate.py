@@ -6,8 +6,6 @@ blender -b --python-exit-code 1 site.blend -P headless/evaluate.py -- --traffic 
 Needs torch (make detection). An evaluation that was stopped goes on where it was.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import dataclass

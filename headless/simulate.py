@@ -7,8 +7,6 @@ The merged cloud of a frame is the array ``points``; that of a sensor are those 
 that was stopped goes on where it was when it is started again.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -9,8 +9,6 @@ or as plain Python on the bpy module::
     python -m headless.traffic site.blend --simulate site.xodr --flow 600 --seed 1 --duration 120 -o traffic.npz
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -7,8 +7,6 @@ on several configurations of sensors works with all of them. A training that was
 is started again.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

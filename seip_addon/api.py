@@ -25,8 +25,6 @@ Examples
 (dtype('float32'), 3, 50)
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

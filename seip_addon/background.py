@@ -1,7 +1,5 @@
 """Background thread for long work, polled from Blender's event loop."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Generator

@@ -4,8 +4,6 @@ A handler notes that something moved; a timer, a moment later, casts the rays of
 those sensors alone and colours the road anew. Neither is there while this is off.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Live scans: the last frame of each scene, shown as a point cloud and scanned again as the timeline moves."""
 
-from __future__ import annotations
-
 import time
 
 import bpy

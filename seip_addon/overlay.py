@@ -1,7 +1,5 @@
 """Overlays: points, lines and faces drawn over a viewport, with the legend that explains them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal

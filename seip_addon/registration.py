@@ -1,7 +1,5 @@
 """Registration of the add-on's classes, in order."""
 
-from __future__ import annotations
-
 import importlib
 from types import ModuleType
 

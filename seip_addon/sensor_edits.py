@@ -1,7 +1,5 @@
 """Manual edits of placed sensors in the scene: moved, rotated, of another type, deleted or added."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import bpy

@@ -1,7 +1,5 @@
 """Sensor types: the catalogue in the session, for panels that only look, and each scene's list of keys."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import preferences

@@ -4,8 +4,6 @@ None of it is needed to go on: the file keeps what was asked and found, and the 
 by their session number, as undo and redo put another Python object in place of each.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Charts of average precision against number, price, coverage and time."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Plan view of one frame with road users, detections and errors."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Style of all charts: colours, marks, axes, legends and titles."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Charts of the coverage that traffic leaves, for nominal and for traffic-aware placements."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The cells of the study: the best placement for each type, height, number and central weight."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Charts of a coverage study."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

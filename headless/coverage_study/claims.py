@@ -1,7 +1,5 @@
 """Verdicts on the paper's claims about coverage, for one site."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Table of a coverage study: every cell as CSV."""
 
-from __future__ import annotations
-
 import csv
 import os
 

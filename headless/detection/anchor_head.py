@@ -4,8 +4,6 @@ After A. H. Lang et al.: PointPillars. CVPR 2019, and Y. Yan, Y. Mao, B. Li:
 SECOND: Sparsely Embedded Convolutional Detection. Sensors 18 (2018).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

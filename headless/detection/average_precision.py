@@ -1,7 +1,5 @@
 """Average precision over many frames, with confidence intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar

@@ -4,8 +4,6 @@ Placements come from the integer program, clouds from simulated traffic. One det
 (or one from each), several times with other seeds, and is evaluated with each placement on traffic that none has seen.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -12,8 +12,6 @@ Tracking. CVPR 2021, with three changes for few training steps on sparse clouds:
   score, so that suppression keeps the best placed boxes.
 """
 
-from __future__ import annotations
-
 import math
 
 import torch

@@ -6,8 +6,6 @@ where it lies outside, and is undecided between the two. Where the study says "a
 meant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

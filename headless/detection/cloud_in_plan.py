@@ -1,7 +1,5 @@
 """Spatial index of a cloud in plan."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Ground truth and detections of one frame, with the attributes by which errors are broken down."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Frames of recorded runs as training samples, and checks that splits are independent."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Detection in one cloud."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from numpy.typing import NDArray

@@ -8,8 +8,6 @@ recall does not reach. AP40 leaves out the threshold at recall 0, AP11 takes eve
 there are fewer thresholds, and even a perfect detector scores less than 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

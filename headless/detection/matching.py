@@ -10,8 +10,6 @@ overlap each other alone. Road users count that are of the categories asked for,
 return enough points. All others neither count nor punish, as the neighbouring classes of KITTI (Geiger et al. 2012).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

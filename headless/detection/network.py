@@ -3,8 +3,6 @@
 A. H. Lang et al.: PointPillars: Fast Encoders for Object Detection from Point Clouds. CVPR 2019.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import torch

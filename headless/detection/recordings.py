@@ -1,7 +1,5 @@
 """Simulated recordings of traffic for each sensor configuration, made on demand."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ its area is the overlap. That is what polygon clipping after Sutherland and Hodg
 that come and go, so it needs no tolerance and parallel or shared edges are nothing special.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor

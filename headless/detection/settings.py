@@ -1,7 +1,5 @@
 """Settings of the detection network and its training, their limits, and the detector's classes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

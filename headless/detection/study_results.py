@@ -1,7 +1,5 @@
 """Charts, tables and records of the detection study."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Traffic demand, departures and routes of vehicles and pedestrians, as a route file for SUMO."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Traffic from SUMO (Simulation of Urban MObility, Eclipse) on an OpenDRIVE map; SUMO itself is an optional extra."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shutil

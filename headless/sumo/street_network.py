@@ -1,7 +1,5 @@
 """A street network as SUMO drives on it: edges, their lanes, and how one leads to the next."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Long loops of the core are generators that yield `Progress` and return their res
 batch command shows a bar, a test exhausts them with `finish`.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait

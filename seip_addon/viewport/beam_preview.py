@@ -1,7 +1,5 @@
 """A sensor's beams in the viewport: rings on a flat road, and the edges of the vertical field of view."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

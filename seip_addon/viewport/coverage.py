@@ -1,7 +1,5 @@
 """The coverage on the road: its legend, and whether a view shows its colours."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..core.pictures.palette import rgb

@@ -1,7 +1,5 @@
 """The legend in the lower right corner of a viewport: what is drawn there, and in which colours."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

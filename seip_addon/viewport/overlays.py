@@ -3,8 +3,6 @@
 Blender's draw handlers are registered only while there is an overlay.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy

@@ -1,7 +1,5 @@
 """What a viewport shows, as an array of pixels: the scene, what is drawn over it, and the legend."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 from mathutils import Matrix

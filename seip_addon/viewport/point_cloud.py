@@ -1,7 +1,5 @@
 """The points that all sensors measure of one frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import bpy

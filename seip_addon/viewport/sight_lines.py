@@ -1,7 +1,5 @@
 """Sight lines and shadows of one sensor."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

@@ -1,7 +1,5 @@
 """A dataset's folder: samples run by run, and ``manifest.json`` with settings, counts and digests."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter

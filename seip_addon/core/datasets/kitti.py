@@ -9,8 +9,6 @@ back in LiDAR axes is exact. Evaluators leave out objects less than 25 or 40 pix
    2012; readme of the object development kit.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

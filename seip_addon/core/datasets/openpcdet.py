@@ -8,8 +8,6 @@ these, and stays in its split, where a detection in it is a false one.
 .. [2] OpenPCDet, pcdet/datasets/custom/custom_dataset.py.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math

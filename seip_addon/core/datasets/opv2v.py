@@ -17,8 +17,6 @@ indices of the sensors, from 0: OpenCOOD takes negative numbers for roadside uni
    Communication", ICRA 2022; OpenCOOD, opencood/utils/transformation_utils.py.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

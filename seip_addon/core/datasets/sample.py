@@ -1,7 +1,5 @@
 """Samples of a dataset: frames of traffic runs with their labels."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Mapping

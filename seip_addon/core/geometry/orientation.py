@@ -9,8 +9,6 @@ first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by �
 of azimuth zero and elevation zero points θ below the horizon; then it rolls about the new x axis.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

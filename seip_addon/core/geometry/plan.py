@@ -1,7 +1,5 @@
 """Triangles seen in plan: their areas, their outline, and heights on them."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry

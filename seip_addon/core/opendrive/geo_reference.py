@@ -1,7 +1,5 @@
 """From latitude and longitude to the metres of a map, where its reference is a transverse Mercator projection."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Junctions: their area, by their id or name, and by where they are."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

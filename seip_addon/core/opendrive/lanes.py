@@ -1,7 +1,5 @@
 """The surfaces of lanes as strips between a left and a right edge."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial

@@ -1,7 +1,5 @@
 """Piecewise cubic profiles of OpenDRIVE: elevation, offsets and widths along a road."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

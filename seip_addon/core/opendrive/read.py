@@ -3,8 +3,6 @@
 Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have the standard's defaults.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace

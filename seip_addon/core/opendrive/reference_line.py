@@ -4,8 +4,6 @@ All follow ASAM OpenDRIVE 1.8, section "Geometry". A piece of any kind is
 evaluated at distances along itself, to well below a nanometre.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

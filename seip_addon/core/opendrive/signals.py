@@ -1,7 +1,5 @@
 """Signals of the map in map coordinates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Placement of labels without overlaps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Float

@@ -1,7 +1,5 @@
 """Colours of the points of a cloud, on a dark ground or on a street, and what they mean."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

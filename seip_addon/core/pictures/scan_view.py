@@ -1,7 +1,5 @@
 """A bird's-eye view of a frame of scans: which sensor measured what, and how strong the returns are."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A view and the plan side by side, for a report."""
 
-from __future__ import annotations
-
 import os
 
 from PIL import Image

@@ -1,7 +1,5 @@
 """Camera position that frames a set of points, and their pixel coordinates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -14,8 +14,6 @@ smallest, which equals that of the linear relaxation (Galvão and ReVelle 1996; 
 Maffioli 1975).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import dataclass

@@ -23,8 +23,6 @@ goes on, and a search that is stopped can be continued.
 Weights are whole numbers, so a search meets the same placements in the same order on every machine.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, replace

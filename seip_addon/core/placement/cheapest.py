@@ -1,7 +1,5 @@
 """The cheapest placement that reaches a coverage: partial set covering."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import replace

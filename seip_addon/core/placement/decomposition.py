@@ -12,8 +12,6 @@ targets of the part. This is Lagrangian decomposition (Guignard and Kim 1987) wi
 subproblem.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A deployment: the chosen sensors with their coverage and price."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

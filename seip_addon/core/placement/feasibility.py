@@ -1,7 +1,5 @@
 """A first feasible choice for mandatory groups, or the reason why there is none."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import replace

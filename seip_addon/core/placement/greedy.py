@@ -1,7 +1,5 @@
 """Greedy selection with its certificate, and swap local search."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Iterable, Iterator
 

@@ -1,7 +1,5 @@
 """The integer program in PuLP, and the solvers it can be given to by name."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import math
 import os

@@ -1,7 +1,5 @@
 """The near-optimal set: all placements whose coverage is within a share of the best."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass

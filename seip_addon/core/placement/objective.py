@@ -1,7 +1,5 @@
 """Objective and constraints of a placement, and the problem that they make of a site."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Generator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The placement problem and its solution."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Maximal covering: an optimal placement, or the best found with a bound."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, replace

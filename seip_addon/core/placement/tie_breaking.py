@@ -4,8 +4,6 @@ Stages, each within the optima of those before: largest coverage, fewest sensors
 weight, and first in the canonical order of candidates.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """``candidates.csv``: every candidate pose with what it sees, for a spreadsheet."""
 
-from __future__ import annotations
-
 import csv
 import os
 from collections.abc import Mapping

@@ -11,8 +11,6 @@ turn [2]_.
 .. [3] CARLA documentation, class ``carla::geom::RightHandedRotation``.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from typing import Any

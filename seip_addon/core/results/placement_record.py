@@ -1,7 +1,5 @@
 """``placement.json``: a placement with all that it takes to read it, check it and make it again."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import math

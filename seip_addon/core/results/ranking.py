@@ -1,7 +1,5 @@
 """Candidates ranked by coverage, alone or added to a placement."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

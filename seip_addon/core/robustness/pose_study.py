@@ -5,8 +5,6 @@ that of its own row of V beside the planned rows of the others. Draws with one k
 standard ones, tell which kind hurts most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 

@@ -25,8 +25,6 @@ F_p then proves the best T (`robust_search`), where it comes to an end. Another 
 the mean of the m smallest of the K largest coverages.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import replace

@@ -13,8 +13,6 @@ An instance is here one of all scenarios' targets, whose weights are whole numbe
 value is F in whole units.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator
 

@@ -1,7 +1,5 @@
 """Price and benefit of robust placements, evaluated on unseen draws."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, astuple, dataclass, field, replace
 

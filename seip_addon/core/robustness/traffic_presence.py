@@ -1,7 +1,5 @@
 """Time that road users spend on each target's square."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 
 import numpy as np

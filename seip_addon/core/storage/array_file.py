@@ -1,7 +1,5 @@
 """Files of named arrays with a header, validated before use."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Atomic file writes, folder locks and digests."""
 
-from __future__ import annotations
-
 import errno
 import functools
 import hashlib

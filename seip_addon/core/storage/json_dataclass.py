@@ -1,7 +1,5 @@
 """Dataclasses from JSON, each value held to the type of its field."""
 
-from __future__ import annotations
-
 import reprlib
 import sys
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Digests of program code, as part of the keys of stored results."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import importlib.util

@@ -1,7 +1,5 @@
 """TOML files of users, checked against the keys that their tables may have."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import tomllib

@@ -1,7 +1,5 @@
 """The approaches of a junction: its streets, as far as a distance along the road."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -4,8 +4,6 @@ The keys are explained in docs/site-description.md. Coordinates are map
 coordinates in metres; headings are degrees in the file and radians here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A place that is given as latitude and longitude, on a map that counts in metres."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Grade separation: the roads on the studied level of a place, from their connections and heights."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Objects of a map as parts of the site: buildings, trees, walls, posts and street lights."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable

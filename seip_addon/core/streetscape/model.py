@@ -1,7 +1,5 @@
 """From a map and a site description to the parts of a scene, in local axes."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Classification of a map's objects: by type where there is one, else by name and shape."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from enum import Enum

@@ -1,7 +1,5 @@
 """The place of a map that is studied: its middle, its region of interest and its level, in map coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

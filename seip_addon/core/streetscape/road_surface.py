@@ -1,7 +1,5 @@
 """Lanes of a map as the surfaces of a street: carriageways, pavements, kerbs and lane markings."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

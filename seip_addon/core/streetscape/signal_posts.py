@@ -1,7 +1,5 @@
 """The posts of a map's traffic lights: the map's own where it has them, else assumed ones beside the carriageway."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

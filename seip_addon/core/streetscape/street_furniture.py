@@ -3,8 +3,6 @@
 Every solid stands with its foot in the origin and z up; what has an arm reaches along +x. Sizes are in metres.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

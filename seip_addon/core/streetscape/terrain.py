@@ -1,7 +1,5 @@
 """The height of the ground: looked up on triangles, and areas in plan laid on them."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray

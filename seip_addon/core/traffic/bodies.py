@@ -1,7 +1,5 @@
 """Bodies of road users: closed meshes of few triangles, stretched to a road user's size."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ coordinates are those of the network: the map's plus the network's offset (SUMO'
 person's position is taken as the person's middle, as SUMO draws it.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

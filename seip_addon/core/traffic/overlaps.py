@@ -1,7 +1,5 @@
 """Removal of overlapping road users from simulated traffic."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

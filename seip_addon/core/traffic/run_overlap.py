@@ -1,7 +1,5 @@
 """Overlap of two runs of traffic: share of vehicles at the same place at the same instant."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Smoothing of SUMO's pedestrians, who leap by a metre or two where a crossing begins, and turn on the spot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Traffic for a scene, out of a user's files: trajectories, or SUMO's floating car data put on the road."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Generator

@@ -1,7 +1,5 @@
 """SUMO's XML files, read as they stream by: they may be larger than memory, and nothing in them is trusted."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import os

@@ -1,7 +1,5 @@
 """Category and size of SUMO's vehicle types."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Generator, Sequence
