@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import bpy
+import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
 Colour = tuple[float, float, float, float]
@@ -51,9 +53,6 @@ class Layer:
 
     def draw(self, scale: float) -> None:
         """Draw it into the framebuffer that is bound."""
-        import gpu  # noqa: PLC0415  # not available in background mode
-        from gpu_extras.batch import batch_for_shader  # noqa: PLC0415  # as above
-
         single = isinstance(self.colours, tuple)
         prefix = "POINT_" if self.kind == "POINTS" else ""
         shader = gpu.shader.from_builtin(f"{prefix}{'UNIFORM' if single else 'FLAT'}_COLOR")

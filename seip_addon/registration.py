@@ -37,7 +37,7 @@ PARTS = (
     "panels.view",
     "panels.traffic",
 )
-"""Modules with ``CLASSES``.
+"""Modules of the add-on; most have ``CLASSES``.
 
 Some have ``attach`` and ``detach`` for what is no class: handlers, properties,
 menus; and some ``forget``, for what must not outlive the open file.
@@ -53,7 +53,7 @@ def register() -> None:
     except ImportError as error:
         parts = [_incomplete(error)]
     for part in parts:
-        for one in part.CLASSES:
+        for one in getattr(part, "CLASSES", ()):
             bpy.utils.register_class(one)
         _registered.append(part)
         if hasattr(part, "attach"):
@@ -69,7 +69,7 @@ def unregister() -> None:
         part = _registered.pop()
         if hasattr(part, "detach"):
             part.detach()
-        for one in reversed(part.CLASSES):
+        for one in reversed(getattr(part, "CLASSES", ())):
             bpy.utils.unregister_class(one)
 
 

@@ -288,9 +288,6 @@ def scene_of(number: int) -> bpy.types.Scene:
     raise SeipError("the scene that this was computed for is gone: nothing was written")
 
 
-CLASSES: tuple[type, ...] = ()
-
-
 def forget() -> None:
     """Let go of what is known of the open file, and have work that is under way end."""
     for kept in (session.states, session.checks, session.traffic, session.scans):

@@ -14,6 +14,7 @@ from ..core.lidar.rings import BeamRings, beam_rings
 from ..core.visibility.ring_resolution import unresolved_from
 from ..scene import contract
 from ..session import session
+from .overlays import redraw
 
 DENSE, WIDE, CONE = (0.30, 0.75, 1.0, 0.9), (1.0, 0.55, 0.10, 0.9), (1.0, 1.0, 1.0, 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
@@ -91,15 +92,6 @@ def hide() -> None:
     redraw()
 
 
-def redraw() -> None:
-    """Have all 3D views drawn anew."""
-    for manager in bpy.data.window_managers:
-        for window in manager.windows:
-            for area in window.screen.areas:
-                if area.type == "VIEW_3D":
-                    area.tag_redraw()
-
-
 def preview_of(context: bpy.types.Context) -> Preview | None:
     """Return whose beams to show: the active sensor's, else the active type's at the 3D cursor; None if unknown."""
     scene = context.scene
@@ -146,9 +138,6 @@ def _draw() -> None:
         batch.draw(shader)
     gpu.state.blend_set(before[0])
     gpu.state.depth_test_set(before[1])
-
-
-CLASSES: tuple[type, ...] = ()
 
 
 def forget() -> None:

@@ -1,6 +1,7 @@
 """What a viewport shows, as an array of pixels: the scene, what is drawn over it, and the legend."""
 
 import bpy
+import gpu
 import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
@@ -13,8 +14,6 @@ WIDTH = 1920  # pixels
 
 def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint8]:
     """Return a viewport as it stands, without its panels and handles, (h, w, 4), the uppermost row first."""
-    import gpu  # noqa: PLC0415  # not available in background mode
-
     region = next(region for region in area.regions if region.type == "WINDOW")
     space = area.spaces.active
     view, projection = space.region_3d.view_matrix, space.region_3d.window_matrix
@@ -33,8 +32,6 @@ def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint
 
 def _draw_over(scene: bpy.types.Scene, view: Matrix, projection: Matrix, height: int) -> None:
     """Draw the layers in the view's matrices and the legend in pixels."""
-    import gpu  # noqa: PLC0415  # as above
-
     scale = WIDTH / 1200.0  # a report's reader sees it smaller than its maker
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_matrix(view)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import bpy
 import numpy as np
 
 from ..core.pictures.cloud_colours import STATIC_COLOUR, By, cloud_colours, sensor_colour, strength_ramp
@@ -18,11 +17,7 @@ def cloud_overlay(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> Ove
     """Return a frame's points, coloured by sensor, intensity or instance."""
     layer = Layer("POINTS", np.ascontiguousarray(frame.points), cloud_colours(frame, by))
     block = Block(f"{len(frame):,} points at {frame.time:.2f} s", _entries(frame, sensors, by))
-
-    def legend(_scene: bpy.types.Scene) -> Block:
-        return block
-
-    return Overlay((layer,), legend, by)
+    return Overlay((layer,), lambda _scene: block, by)
 
 
 def _entries(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> tuple[Entry, ...]:

@@ -1,6 +1,5 @@
 """Sight lines and shadows of one sensor."""
 
-import bpy
 import numpy as np
 
 from ..core.pictures.palette import INK, rgb
@@ -32,8 +31,4 @@ def sight_overlay(sight: SightLines, label: str) -> Overlay:
             Entry(f"{sight.in_range - sight.seen:,} in its shadows", ((*SHADOW_COLOUR[:3], 1.0),)),
         ),
     )
-
-    def legend(_scene: bpy.types.Scene) -> Block:
-        return block
-
-    return Overlay(layers, legend, label)
+    return Overlay(layers, lambda _scene: block, label)
