@@ -87,33 +87,20 @@ def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...
     Raises
     ------
     SeipError
-        The tolerance is not above zero, or the road cannot be followed within it.
+        The road cannot be followed within the tolerance.
     """
-    if not tolerance > 0.0:
-        raise SeipError(f"a tolerance of {tolerance:g} m cannot be met; choose one above zero, such as 0.02")
-    return tuple(_surfaces(road, tolerance))
-
-
-def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
+    surfaces = []
     for number, section in enumerate(road.sections):
-        lanes = (*section.left[::-1], *section.right)
+        lanes, place = (*section.left[::-1], *section.right), f"road {road.id}, lane section at s={section.start:g}"
         if not lanes:
             continue
-        s, points = sample(
-            partial(_edges, road, section),
-            _knots(road, section),
-            tolerance,
-            f"road {road.id}, lane section at s={section.start:g}",
-        )
+        s, points = sample(partial(_edges, road, section), _knots(road, section), tolerance, place)
         points = points.reshape(-1, len(lanes), 2, 3)
-        _check_size(points, f"road {road.id}, lane section at s={section.start:g}")
-        for index, lane in enumerate(lanes):
-            left, right = points[:, index, 0], points[:, index, 1]
-            surface = LaneSurface(
-                road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, s, left, right
-            )
-            if len(surface.triangles):
-                yield surface
+        _check_size(points, place)
+        for lane, edges in zip(lanes, np.moveaxis(points, 1, 0), strict=True):
+            of_road = (road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left)
+            surfaces.append(LaneSurface(*of_road, s, edges[:, 0], edges[:, 1]))
+    return tuple(surface for surface in surfaces if len(surface.triangles))
 
 
 def _check_size(points: Float, place: str) -> None:

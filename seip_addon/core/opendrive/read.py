@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
-from .profile import ZERO_PROFILE, LateralShape, Profile, lateral_shape, profile
+from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
     Junction,
     Lane,
     LaneSection,
-    MapPlace,
     ObjectOutline,
     Repeat,
     Road,
@@ -95,7 +94,9 @@ def _road(node: Node) -> Road:
         superelevation=_profile(node, "lateralProfile", "superelevation"),
         left_crossfall=_crossfall(node, "left"),
         right_crossfall=_crossfall(node, "right"),
-        shape=_shape(node),
+        shape=lateral_shape(
+            [(each.number("s"), each.number("t"), _cubic(each)) for each in node.children("lateralProfile", "shape")]
+        ),
         lane_offset=_profile(node, "lanes", "laneOffset"),
         sections=_sections(node, line.end),
         objects=tuple(
@@ -171,11 +172,6 @@ def _profile(road: Node, *path: str) -> Profile:
 def _crossfall(road: Node, side: str) -> Profile:
     nodes = road.children("lateralProfile", "crossfall")
     return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
-
-
-def _shape(road: Node) -> LateralShape:
-    nodes = road.children("lateralProfile", "shape")
-    return lateral_shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
 
 
 def _cubic(node: Node) -> tuple[float, float, float, float]:
@@ -315,9 +311,7 @@ def _signal(node: Node, road_id: str) -> RoadSignal:
         t=stands.number("t"),
         z_offset=stands.number("zOffset", 0.0),
         heading=turned + stands.number("hOffset", 0.0),
-        place=_map_place(on_map) if on_map else None,
+        place=None
+        if on_map is None
+        else (on_map.number("x"), on_map.number("y"), on_map.number("z"), on_map.number("hdg", 0.0)),
     )
-
-
-def _map_place(node: Node) -> MapPlace:
-    return MapPlace(node.number("x"), node.number("y"), node.number("z"), node.number("hdg", 0.0))

@@ -122,16 +122,6 @@ class RoadObject:
 
 
 @dataclass(frozen=True)
-class MapPlace:
-    """Position and heading of a signal in map coordinates (metres, radians)."""
-
-    x: float
-    y: float
-    z: float
-    heading: float
-
-
-@dataclass(frozen=True)
 class RoadSignal:
     """A signal as the file gives it, in the coordinates of the road on which it stands (metres, radians).
 
@@ -139,7 +129,7 @@ class RoadSignal:
     ----------
     road_id : str
         The road on which it stands, which need not be the one that it applies to.
-    place : MapPlace or None
+    place : (x, y, z, heading) or None
         Where it stands, if the file says that in map coordinates.
     """
 
@@ -152,7 +142,7 @@ class RoadSignal:
     t: float
     z_offset: float
     heading: float
-    place: MapPlace | None
+    place: tuple[float, float, float, float] | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ def _placed(owner: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSi
             f"road {owner.id}: signal {signal.id} stands on road {signal.road_id}, which is not there; correct the map"
         )
     if signal.place is not None:
-        position, yaw = np.array([signal.place.x, signal.place.y, signal.place.z]), signal.place.heading
+        position, yaw = np.array(signal.place[:3]), signal.place[3]
     else:
         road, s = roads[signal.road_id], np.array([signal.s])
         position = road.place(s, np.array([signal.t]))[0] + np.array([0.0, 0.0, signal.z_offset])

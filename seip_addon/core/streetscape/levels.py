@@ -82,7 +82,9 @@ def split_levels(
     shapely.prepare(around)
     near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]
     roads = _roads(near, around)
-    _check_level(level, roads)
+    for road in level:
+        if road not in roads:
+            raise SeipError(f"no road {road!r} at this place: the level is named by the id of a road that lies on it")
     crossings = _crossings(roads) if roads else ()
     if not crossings:
         return Levels(tuple(surfaces), (), ())
@@ -130,12 +132,6 @@ def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _Roa
             heights = (float(triangles[:, :, 2].min()), float(triangles[:, :, 2].max()))
             roads[road] = _RoadArea(outline, heights, Terrain(triangles))
     return roads
-
-
-def _check_level(level: Sequence[str], roads: Mapping[str, _RoadArea]) -> None:
-    for road in level:
-        if road not in roads:
-            raise SeipError(f"no road {road!r} at this place: the level is named by the id of a road that lies on it")
 
 
 def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, str]]:

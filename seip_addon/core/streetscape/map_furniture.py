@@ -111,7 +111,10 @@ def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tup
         return _post(name, placed, post, carriageway)
     if placed.outlines:
         return tuple(part for outline in placed.outlines for part in _outlined(placed, outline, name, number))
-    return _boxed(placed, name, number) if size > 0 and placed.height >= MIN_HEIGHT else ()
+    if size <= 0 or placed.height < MIN_HEIGHT:
+        return ()
+    base = _footprint(placed) + placed.position
+    return _block(placed, name, number, base, np.full(len(base), placed.height))
 
 
 def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
@@ -119,11 +122,6 @@ def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
     if kind is Kind.TREE:
         return size <= (height or TREE_HEIGHT)
     return kind is Kind.PLANTS and size <= max(height, 1.0)
-
-
-def _boxed(placed: PlacedObject, name: str, number: int) -> tuple[Part, ...]:
-    base = _footprint(placed) + placed.position
-    return _block(placed, name, number, base, np.full(len(base), placed.height))
 
 
 def _outlined(placed: PlacedObject, outline: Outline, name: str, number: int) -> tuple[Part, ...]:

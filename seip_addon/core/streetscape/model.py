@@ -170,10 +170,11 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
-        _region_part(street),
+        _area_part("Region of interest", street.region, Role.REGION, street),
         *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
         *_area_parts(description, street),
     ]
+    occluders = [part for part in (*furniture, *other_levels) if Role.OCCLUDERS in part.roles]
     yield next(stages)
     return SiteModel(
         name=description.name or road_map.name,
@@ -183,12 +184,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
         notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
-        warnings=() if any(_hides(part) for part in (*furniture, *other_levels)) else (NO_OBSTACLES_MESSAGE,),
+        warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
     )
-
-
-def _hides(part: Part) -> bool:
-    return Role.OCCLUDERS in part.roles and can_hide(part.solid.vertices)
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
@@ -335,10 +332,6 @@ def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
         quads = np.concatenate([quads, road_surface.stop_lines(street.lanes)])
     quads = quads[shapely.contains_xy(street.extent, quads[:, :, :2].mean(axis=1))]
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
-
-
-def _region_part(street: _Surroundings) -> Part:
-    return _area_part("Region of interest", street.region, Role.REGION, street)
 
 
 def _weighted_parts(

@@ -157,9 +157,7 @@ def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | No
     known = np.arange(len(surface.s))
     inside = known[(surface.s > low) & (surface.s < high)]
     ends = np.interp([low, high], surface.s, known)
-    rows = np.concatenate([ends[:1], inside, ends[1:]])
-    s = np.interp(rows, known, surface.s)
-    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+    return _at_rows(surface, np.concatenate([ends[:1], inside, ends[1:]]))
 
 
 def group(surface: LaneSurface) -> str | None:
@@ -334,13 +332,13 @@ def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
 def _densified(surface: LaneSurface) -> LaneSurface:
     steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
     pieces = np.maximum(1, np.ceil(steps / MAX_STEP).astype(int))
-    rows = np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))])
-    s = np.interp(rows, np.arange(len(surface.s)), surface.s)
-    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+    return _at_rows(surface, np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))]))
 
 
-def _at_rows(points: Float, rows: Float) -> Float:
-    return _interpolated(rows, np.arange(len(points)), points)
+def _at_rows(surface: LaneSurface, rows: Float) -> LaneSurface:
+    known = np.arange(len(surface.s))
+    left, right = (_interpolated(rows, known, edge) for edge in (surface.left, surface.right))
+    return dataclasses.replace(surface, s=np.interp(rows, known, surface.s), left=left, right=right)
 
 
 def _interpolated(at: Float, known: Float | Integer, points: Float) -> Float:

@@ -1,7 +1,7 @@
 """The posts of a map's traffic lights: the map's own where it has them, else assumed ones beside the carriageway."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,17 +85,15 @@ def signal_parts(
         pole = _post_for(signal, own, roadside)
         if all(np.hypot(*(pole.foot - other.foot)) > SAME_POLE_DISTANCE for other in poles):
             poles.append(pole)
-    return tuple(_parts(poles, terrain))
-
-
-def _parts(poles: Sequence[_SignalPost], terrain: Terrain) -> Iterator[Part]:
+    parts = []
     for number, pole in enumerate(poles, start=1):
         shape = street_furniture.signal_pole(pole.height, pole.arm, faces_left=pole.faces_left)
         x, y = pole.foot.tolist()
         z = float(terrain.height(pole.foot[None])[0])
         role = Role.POLES if pole.carries else Role.OCCLUDERS
         name = f"{'Assumed signal' if pole.source == ASSUMED else 'Signal'} pole {number}"
-        yield Part(name, shape, (role,), (x, y, z), pole.heading, source=pole.source)
+        parts.append(Part(name, shape, (role,), (x, y, z), pole.heading, source=pole.source))
+    return tuple(parts)
 
 
 def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside: Roadside) -> tuple[int, Post | None]:
