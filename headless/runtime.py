@@ -4,15 +4,15 @@ The same file runs as ``blender -b … -P headless/x.py -- arguments`` in the
 real program and as ``python -m headless.x arguments`` on the bpy module.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import signal
 import sys
 import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NoReturn
+from pathlib import Path
+from typing import NoReturn, TypeVar
 
 # Before numpy is loaded: products shared out to threads depend on their number in the last digit, and take many times
 # as long where other work is on the same cores.
@@ -21,13 +21,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.storage import files as storage
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-    from pathlib import Path
-
-    from seip_addon.core.progress import Progress
 
 try:
     import bpy
@@ -49,6 +44,8 @@ except ImportError:
     if not missing:
         raise
     sys.exit(f"error: {complaint(missing)}")
+
+Result = TypeVar("Result")
 
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
@@ -155,6 +152,12 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     except KeyboardInterrupt as stop:
         _end(EXIT_STOPPED, str(stop) or "stopped, no result written")
     _end(0)
+
+
+def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:
+    """Run work to its end under a bar of its own, and return its result."""
+    with progress_bar() as report:
+        return finish(steps, report)
 
 
 @contextmanager
