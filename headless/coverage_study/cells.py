@@ -105,20 +105,6 @@ class CoverageStudy:
         wanted = (sensor, count, height, weight)
         return next((c for c in self.cases if (c.sensor, c.count, c.height, c.weight) == wanted), None)
 
-    def case(self, sensor: str, count: int, height: float | None = None, weight: float = 1.0) -> Case:
-        """Return one cell that has a placement.
-
-        Raises
-        ------
-        SeipError
-            It has none.
-        """
-        found = self.find(sensor, count, height, weight)
-        if found is None:
-            at = "any height" if height is None else f"{height:g} m"
-            raise SeipError(f"the study has no placement of {sensor} at {at}, N = {count}, central weight {weight:g}")
-        return found
-
     def possible(self, sensor: str, count: int, height: float | None = None) -> Span | None:
         """Return the least and largest possible best coverage of a vanilla cell, or None where it has no placement."""
         found = self.find(sensor, count, height)

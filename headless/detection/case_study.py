@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 from headless.coverage_study.cells import COUNTS, Case, Cell, solve_cell
 
@@ -19,7 +20,6 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, side_by_side, within
-from seip_addon.core.scans import Frame
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
@@ -29,7 +29,7 @@ from .breakdown import false_positives
 from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
 from .detector import Detector
-from .frame_results import Detections, FrameResult, frame_result
+from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
 from .kitti_precision import kitti
@@ -301,6 +301,8 @@ def evaluate_all(
             for model, detector in zip(models, detectors, strict=True)
             if configuration in model.configurations
         ]
+        known: dict[str, Any] = {"region": simulator.static.region, "sensors": configuration.places}
+        known["classes"] = tuple(CLASS_CATEGORIES.values())
         for results, runs in ((validated, traffic.validation), (tested, traffic.test)):
             for run in runs:
                 for number in range(len(run.times)):
@@ -311,7 +313,7 @@ def evaluate_all(
                     for model, detector in asked:
                         with deterministic(model.training.threads):
                             found = detect(detector, frame.points, frame.intensity)
-                        result = _result(simulator, configuration, run, frame, cloud, found)
+                        result = frame_result(frame, cloud, found, run=run.name, **known)
                         results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "evaluated")
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
@@ -340,22 +342,3 @@ def _outcomes(
     for configuration in model.configurations:
         frames = tuple(tested[model.name, configuration.name])
         yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN_RULE), score)
-
-
-def _result(
-    simulator: Simulator,
-    configuration: SensorConfiguration,
-    run: SampledRun,
-    frame: Frame,
-    cloud: CloudInPlan,
-    found: Detections,
-) -> FrameResult:
-    return frame_result(
-        frame,
-        cloud,
-        found,
-        classes=tuple(CLASS_CATEGORIES.values()),
-        region=simulator.static.region,
-        sensors=configuration.places,
-        run=run.name,
-    )

@@ -14,27 +14,10 @@ from ..storage.files import whole_file
 from .headings import degrees, tilt_degrees
 
 COLUMNS = (
-    "pose",
-    "position",
-    "on_pole",
-    "pole_source",
-    "sensor",
-    "height_m",
-    "x_m",
-    "y_m",
-    "z_m",
-    "map_x_m",
-    "map_y_m",
-    "map_z_m",
-    "yaw_deg",
-    "tilt_deg",
-    "price_usd",
-    "targets_seen",
-    "coverage",
-    "weighted_coverage",
-    "rank",
-    "chosen",
-)
+    "pose", "position", "on_pole", "pole_source", "sensor", "height_m", "x_m", "y_m", "z_m",
+    "map_x_m", "map_y_m", "map_z_m", "yaw_deg", "tilt_deg", "price_usd",
+    "targets_seen", "coverage", "weighted_coverage", "rank", "chosen",
+)  # fmt: skip
 
 
 def save_candidate_table(

@@ -131,20 +131,18 @@ class ArrayFile:
         try:
             with Path(path).open("rb") as file, _archive(file) as archive:
                 header = _read_header(archive)
-                known = header["schema"] == self.schema and header["version"] in self._versions()
+                versions = (_OLD_VERSION, self.version) if self.undigested else (self.version,)
+                known = header["schema"] == self.schema and header["version"] in versions
                 if known:
                     yield header, self._read_arrays(archive, header)
         except FileNotFoundError as error:
             raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
         except ContentError as error:
             raise SeipError(f"{path} is no {self.what}, or is damaged: {error}; {self.remedy}") from error
-        except _READ_ERRORS as error:
+        except READ_ERRORS as error:
             raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
         if not known:
             raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
-
-    def _versions(self) -> tuple[int, ...]:
-        return (_OLD_VERSION, self.version) if self.undigested else (self.version,)
 
     def _read_arrays(self, archive: zipfile.ZipFile, header: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         members = {f"{name}.npy": name for name in self.arrays}
@@ -228,17 +226,8 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ContentError(f"its header holds the number {name}")
 
 
-_READ_ERRORS = (
-    OSError,
-    EOFError,
-    ArithmeticError,
-    AttributeError,
-    ValueError,
-    LookupError,
-    TypeError,
-    RuntimeError,
-    MemoryError,
-    zipfile.BadZipFile,
-    zlib.error,
+READ_ERRORS = (
+    *(OSError, EOFError, ArithmeticError, AttributeError, ValueError, LookupError, TypeError, RuntimeError),
+    *(MemoryError, zipfile.BadZipFile, zlib.error),
 )
 """What reading an npz, or taking from it what should be there, raises where the file is not what it should be."""

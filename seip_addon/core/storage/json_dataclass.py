@@ -2,7 +2,7 @@
 
 import reprlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
@@ -103,6 +103,4 @@ def _at(where: str, name: str) -> str:
     return f"{where}.{name}" if where else name
 
 
-@cache
-def _hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind)
+_hints: Callable[[type], dict[str, Any]] = cache(get_type_hints)

@@ -30,12 +30,7 @@ REFLECTIVITY: Mapping[str, float] = {
 """Share of near infrared (905 nm) that each material sends back, assumed; paint and clothes have the road user's."""
 
 PAINT_COLOURS = (
-    (0.12, "black"),
-    (0.24, "blue"),
-    (0.34, "green"),
-    (0.44, "red"),
-    (0.56, "grey"),
-    (0.70, "silver"),
+    *((0.12, "black"), (0.24, "blue"), (0.34, "green"), (0.44, "red"), (0.56, "grey"), (0.70, "silver")),
     (1.00, "white"),
 )
 """Up to which reflectivity paint and clothes are shown in which colour."""

@@ -48,32 +48,18 @@ _CLASSES = {
 }
 """Sizes that a vClass brings with it (SUMO's "Vehicle Type Parameter Defaults"); all others are cars."""
 
-_SHAPES = {
-    "pedestrian": "pedestrian",
-    "bicycle": "bicycle",
-    "scooter": "bicycle",
-    "moped": "motorcycle",
-    "motorcycle": "motorcycle",
-    "passenger": "car",
-    "passenger/sedan": "car",
-    "passenger/hatchback": "car",
-    "passenger/wagon": "car",
-    "passenger/van": "van",
-    "taxi": "car",
-    "evehicle": "car",
-    "police": "car",
-    "delivery": "van",
-    "emergency": "van",
-    "firebrigade": "truck",
-    "truck": "truck",
-    "truck/semitrailer": "truck",
-    "truck/trailer": "truck",
-    "bus": "bus",
-    "bus/coach": "bus",
-    "bus/flexible": "bus",
-    "bus/trolley": "bus",
+_SHAPES_OF = {
+    "pedestrian": ("pedestrian",),
+    "bicycle": ("bicycle", "scooter"),
+    "motorcycle": ("moped", "motorcycle"),
+    "car": ("passenger", "passenger/sedan", "passenger/hatchback", "passenger/wagon", "taxi", "evehicle", "police"),
+    "van": ("passenger/van", "delivery", "emergency"),
+    "truck": ("firebrigade", "truck", "truck/semitrailer", "truck/trailer"),
+    "bus": ("bus", "bus/coach", "bus/flexible", "bus/trolley"),
 }
-"""Categories by guiShape, which says more than the vClass where both are given."""
+"""Values of guiShape, which says more than the vClass where both are given, by category."""
+
+_SHAPES = {shape: category for category, shapes in _SHAPES_OF.items() for shape in shapes}
 
 BUILT_IN = {
     "DEFAULT_VEHTYPE": CAR,
