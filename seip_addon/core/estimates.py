@@ -57,9 +57,8 @@ def mean_of(values: Float) -> IntervalEstimate:
         Independent draws.
     """
     mean = math.fsum(values) / len(values)
-    if len(values) < 2:
-        return IntervalEstimate(mean, -math.inf, math.inf)
-    reach = NORMAL_QUANTILE * float(values.std(ddof=1)) / math.sqrt(len(values))
+    several = len(values) > 1
+    reach = NORMAL_QUANTILE * float(values.std(ddof=1)) / math.sqrt(len(values)) if several else math.inf
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
@@ -79,9 +78,7 @@ def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
     many = np.bincount(which)
     means = np.bincount(which, values) / many
     mean, number = math.fsum(values) / len(values), len(many)
-    if number < MIN_BATCHES:
-        return IntervalEstimate(mean, -math.inf, math.inf)
-    reach = student_reach(means)
+    reach = student_reach(means) if number >= MIN_BATCHES else math.inf
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
@@ -62,23 +61,16 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     if not roads:
         raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")
     header = root.child("header")
+    offset, reference = (header and header.child(name) for name in ("offset", "geoReference"))
     return RoadMap(
         name=(header.text("name", "") if header else "") or Path(path).stem,
-        header_offset=_header_offset(header.child("offset") if header else None),
-        geo_reference=_geo_reference(header.child("geoReference") if header else None),
+        header_offset=np.array([offset.number(name, 0.0) for name in ("x", "y", "z", "hdg")])
+        if offset
+        else np.zeros(4),
+        geo_reference=((reference.element.text or "").strip() or None) if reference else None,
         roads=roads,
         junctions=tuple(Junction(node.text("id"), node.text("name", "")) for node in root.children("junction")),
     )
-
-
-def _header_offset(node: Node | None) -> NDArray[np.float64]:
-    if node is None:
-        return np.zeros(4)
-    return np.array([node.number(name, 0.0) for name in ("x", "y", "z", "hdg")])
-
-
-def _geo_reference(node: Node | None) -> str | None:
-    return ((node.element.text or "").strip() or None) if node else None
 
 
 def _road(node: Node) -> Road:

@@ -20,7 +20,16 @@ GOLDEN_RATIO = 0.618033988749895
 def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:
     """Return red, green, blue and opacity (n, 4) of each point, sRGB."""
     colours = np.ones((len(frame), 4), dtype=np.float32)
-    colours[:, :3] = _BY[by](frame)
+    if by == "sensor":
+        palette = np.array([rgb(colour) for colour in SENSOR_COLOURS])
+        colours[:, :3] = palette[frame.sensor % len(palette)]
+    elif by == "intensity":
+        colours[:, :3] = strength_ramp(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))
+    else:
+        hue = (frame.instance * GOLDEN_RATIO) % 1.0
+        wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, saturated
+        bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
+        colours[:, :3] = np.where((frame.instance == STATIC_INSTANCE)[:, None], np.array(rgb(STATIC_COLOUR)), bright)
     return colours
 
 
@@ -34,24 +43,3 @@ def strength_ramp(share: Float) -> Float:
 def sensor_colour(number: int) -> str:
     """Return the web colour of a sensor's points."""
     return SENSOR_COLOURS[number % len(SENSOR_COLOURS)]
-
-
-def _by_sensor(frame: Frame) -> Float:
-    palette = np.array([rgb(colour) for colour in SENSOR_COLOURS])
-    coloured: Float = palette[frame.sensor % len(palette)]
-    return coloured
-
-
-def _by_intensity(frame: Frame) -> Float:
-    return strength_ramp(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))
-
-
-def _by_instance(frame: Frame) -> Float:
-    hue = (frame.instance * GOLDEN_RATIO) % 1.0
-    wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, full saturation
-    bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
-    coloured: Float = np.where((frame.instance == STATIC_INSTANCE)[:, None], np.array(rgb(STATIC_COLOUR)), bright)
-    return coloured
-
-
-_BY = {"sensor": _by_sensor, "intensity": _by_intensity, "instance": _by_instance}

@@ -243,7 +243,7 @@ def lagrangian_bound(
         due = iteration % REDUCTION_INTERVAL == REDUCTION_INTERVAL - 1
         if due and len(can_reach(instance, best, goal)) <= MAX_KEPT_SHARE * len(keep):
             within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)
-            if _few(instance, within):
+            if math.comb(len(within), min(instance.count, len(within) // 2)) <= MAX_LISTED_CHOICES:
                 break
             keep, instance = keep[within], instance.of(within)
             descent.restart(bound_from(instance, best.targets, best.groups, layers, exact=False))
@@ -302,10 +302,6 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     in_clique[instance.clique[picked]] = net[picked]
     forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
     return np.flatnonzero(forced >= goal - instance.margin)
-
-
-def _few(instance: Instance, candidates: Integer) -> bool:
-    return math.comb(len(candidates), min(instance.count, len(candidates) // 2)) <= MAX_LISTED_CHOICES
 
 
 def _select(instance: Instance, score: Float, multiplier: float) -> Selection:

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Generator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from .integer_program import CoverProgram
+from .integer_program import CoverProgram, Expression
 from .problem import PlacementProblem
 from .reduced_problem import Instance
 from .search_limits import Clock
@@ -69,10 +68,7 @@ def _least(
 
 
 def _decide(
-    problem: PlacementProblem,
-    program: CoverProgram,
-    objective: Any,  # noqa: ANN401 -- PuLP's expressions are untyped
-    solver: str,
+    problem: PlacementProblem, program: CoverProgram, objective: Expression, solver: str
 ) -> Generator[Progress, None, Integer | None]:
     """Return the choice of largest objective, or None where there is none."""
     outcome = yield from program.maximise(objective, solver, Clock(TIME_LIMIT))

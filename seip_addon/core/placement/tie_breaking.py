@@ -7,7 +7,6 @@ weight, and first in the canonical order of candidates.
 import math
 from collections.abc import Generator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..progress import Progress
 from .bounds import lagrangian_bound
 from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
 from .greedy import drop_redundant, drop_weakest, swap_search
-from .integer_program import reaching
+from .integer_program import Expression, reaching
 from .reduced_problem import Instance
 from .search_limits import Clock
 
@@ -128,7 +127,7 @@ class _Stages:
         self._solver = solver
         self._clock = clock
 
-    def maximise(self, objective: Any) -> Generator[Progress, None, None]:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def maximise(self, objective: Expression) -> Generator[Progress, None, None]:
         if self.settled:
             outcome = yield from self.program.maximise(objective, self._solver, self._clock)
             self.settled = outcome.finished and outcome.chosen is not None

@@ -163,15 +163,10 @@ def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tup
         Which draws would have put a sensor inside an object.
     """
     shift = draws.shift.copy()
-    blocked = _inside(xyz + shift, objects)
+    blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
     shift[blocked] *= -1
     still = np.zeros_like(blocked)
     where = np.broadcast_to(xyz, shift.shape)
     still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
     shift[still] = 0.0
     return replace(draws, shift=shift), blocked
-
-
-def _inside(points: Float, objects: Sequence[Mesh]) -> Boolean:
-    inside: Boolean = inside_any(points.reshape(-1, 3), objects).reshape(points.shape[:-1])
-    return inside

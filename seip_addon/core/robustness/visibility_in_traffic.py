@@ -140,7 +140,8 @@ class _StaticScan:
         self._matters[self.through(np.where(_CORNERS > 0, high, low)[None])[1]] = True
         self.distance = np.full(self.rays, np.inf)
         self.counts = np.zeros(self.rays, dtype=bool)
-        for ray in self._in_parts(np.flatnonzero(self._matters)):
+        matters = np.flatnonzero(self._matters)
+        for ray in np.array_split(matters, max(1, -(-len(matters) // _RAYS_AT_ONCE))):
             directions = self.directions(ray)
             self.distance[ray], triangle = place.caster.cast(place.origin, directions, self.model.max_range)
             self.counts[ray] = place.counting(self.model, directions, self.distance[ray], triangle)
@@ -190,10 +191,6 @@ class _StaticScan:
     def _ends(self, ray: Integer, distance: Float) -> Float:
         ends: Float = self.place.origin + distance[:, None] * self.directions(ray)
         return ends
-
-    @staticmethod
-    def _in_parts(ray: Integer) -> list[Integer]:
-        return np.array_split(ray, max(1, -(-len(ray) // _RAYS_AT_ONCE)))
 
 
 class _LayerVisibility(Protocol):
