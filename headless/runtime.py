@@ -50,10 +50,7 @@ Result = TypeVar("Result")
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
 ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
-
-LOG = logging.getLogger("headless")
-"""Progress and warnings of commands and their modules; results go through `print_line`."""
-
+LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
 _LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
 
 

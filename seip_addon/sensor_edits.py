@@ -12,8 +12,7 @@ from .core.workflows.moved_sensors import BY_HAND
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of
 
-POSE_TOLERANCE = 1e-5
-"""Rounding errors of a pose in single precision: of rotations absolute, of positions relative beyond a metre."""
+POSE_TOLERANCE = 1e-5  # of single precision: of rotations absolute, of positions relative beyond a metre
 
 
 @dataclass(frozen=True)

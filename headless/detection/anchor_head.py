@@ -18,10 +18,7 @@ from .pillars import PillarGrid
 from .settings import CLASSES, GROUND_ABOVE_BOTTOM
 
 ANCHOR_CHANNELS = 10  # of an anchor: score, seven of its box, two of its direction
-
-DIRECTION_FROM = math.pi / 4
-"""Yaw at which the first of the two directions begins: no street of a crossing along the axes runs there."""
-
+DIRECTION_FROM = math.pi / 4  # yaw at which the first of the two directions begins: no street along the axes runs there
 SMOOTH_L1_BETA = 1 / 9  # where the smooth L1 loss turns from a square into a line
 INITIAL_SCORE = 0.01  # score of every anchor before training
 MAX_BOXES = 500  # boxes of a cloud before suppression, the best first
@@ -121,8 +118,7 @@ class AnchorHead(nn.Module):
         return found
 
 
-BACKGROUND, IGNORED = -1, -2
-"""Assignment of an anchor that must find no road user, and of one that is left out of the loss."""
+BACKGROUND, IGNORED = -1, -2  # of an anchor that must find no road user, and of one left out of the loss
 
 
 def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:

@@ -13,9 +13,7 @@ from seip_addon.core.estimates import Interval, percentiles
 from .frame_results import FrameResult
 from .matching import Match, Rule, match
 
-BLOCK_SECONDS = 10.0
-"""Seconds of a run whose frames are drawn together: they show much the same vehicles in much the same places."""
-
+BLOCK_SECONDS = 10.0  # seconds of a run whose frames are drawn together: they show much the same vehicles
 MIN_BLOCKS = 5  # blocks below which an interval would say more about chance than about the traffic
 
 RESAMPLES, RESAMPLES_AT_ONCE = 1000, 50

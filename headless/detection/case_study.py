@@ -52,9 +52,7 @@ MAIN_RULE = next(iter(RULES.values()))
 
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
 WARM_UP = 2.0  # seconds from the first sample of a run to its first frame
-
-PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1
-"""Trainings at once on the CPU: one more than there are cores, as each also waits."""
+PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1  # at once on the CPU: one more than cores, as each also waits
 
 
 @dataclass(frozen=True, eq=False)

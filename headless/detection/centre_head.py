@@ -29,9 +29,7 @@ from .settings import CLASSES
 OFFSET, SIZE, AXIS, HEADING, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
 BOX_CHANNELS = 11
 
-TYPICAL_SIZE = (4.5, 1.8, 1.6)
-"""Length, width and height in metres; sizes are regressed as logarithms of their ratios to these."""
-
+TYPICAL_SIZE = (4.5, 1.8, 1.6)  # length, width and height in metres; sizes are learnt as logarithms of ratios to these
 HEAT_STD = 0.18  # standard deviation of heat along and across a box, as a share of its length and width
 MIN_HEAT = 0.2  # least heat of a cell that learns the box
 INITIAL_HEAT = 0.01  # predicted heat of every cell before training

@@ -22,7 +22,6 @@ from .settings import GRID_STRIDE, GROUND_ABOVE_BOTTOM, HEADROOM
 
 POINT_FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
-
 MAX_PILLARS = 16_000_000  # of a grid at most
 
 

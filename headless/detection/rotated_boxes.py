@@ -11,9 +11,7 @@ import torch
 from torch import Tensor
 
 CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))  # of a unit square, counter-clockwise
-
-PAIRS_AT_ONCE = 2000
-"""Pairs that stay in a core's cache; spread over threads, small steps like these take ten times as long."""
+PAIRS_AT_ONCE = 2000  # pairs that stay in a core's cache; in threads, small steps like these take ten times as long
 
 
 def paired_iou(a: Tensor, b: Tensor) -> Tensor:

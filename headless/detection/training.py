@@ -34,10 +34,7 @@ from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSe
 VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
 LOSS_MARGIN = 1.6  # metres at the border of a window for which no loss is computed: much of what is there lies outside
 MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at most
-
-MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05
-"""Largest turn beyond quarter turns, and largest stretch, of what is learnt from."""
-
+MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of what is learnt from; the turn is beyond quarter turns
 MAX_GRADIENT_NORM = 10.0  # norm beyond which a gradient is cut, as published
 
 

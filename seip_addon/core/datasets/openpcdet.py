@@ -35,10 +35,7 @@ KITTI_CLASS = {
 
 NO_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
 PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
-
-HEIGHT_STEP = 2.0
-"""What the range is a multiple of in height, metres: 40 voxels, as networks of voxels ask for, of 0.05 m each."""
-
+HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
 MARGIN = 0.5  # between the boxes and the range, metres
 
 PILLAR_SIZE = 0.2

@@ -32,8 +32,7 @@ CLASSES = {"car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus"}
 """OpenCOOD has a single class, vehicles, without two-wheelers and pedestrians."""
 
 SPLIT_FOLDERS = {"train": "train", "val": "validate", "test": "test"}
-MAX_AGENTS, MAX_AGENT_DISTANCE = 7, 70.0
-"""OpenCOOD's defaults of max_cav, and of COM_RANGE: metres in plan from the ego."""
+MAX_AGENTS, MAX_AGENT_DISTANCE = 7, 70.0  # OpenCOOD's defaults of max_cav and COM_RANGE (metres in plan from the ego)
 
 POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4")])
 MIRROR = np.array([1.0, -1.0, 1.0])  # the diagonal of M

@@ -4,8 +4,7 @@ import math
 import re
 from dataclasses import dataclass
 
-_SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563
-"""Of the ellipsoid WGS 84; GRS 80 differs from it by 0.1 mm."""
+_SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # of WGS 84; GRS 80 differs by 0.1 mm
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
 _WORLD_DATUMS = {"WGS84", "GRS80", "ETRS89"}
 

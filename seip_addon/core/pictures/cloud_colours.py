@@ -11,10 +11,8 @@ from .palette import INTENSITY_COLOURS, MAX_INTENSITY, SENSOR_COLOURS, rgb
 
 By = Literal["sensor", "intensity", "instance"]
 
-STATIC_COLOUR = "#7d8790"
-"""Of points on what stands still, where road users have colours."""
-GOLDEN_RATIO = 0.618033988749895
-"""Of the colour circle, between a road user and the next: neighbours in number differ most."""
+STATIC_COLOUR = "#7d8790"  # of points on what stands still, where road users have colours
+GOLDEN_RATIO = 0.618033988749895  # of the colour circle, from a road user to the next: neighbours differ most
 
 
 def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:

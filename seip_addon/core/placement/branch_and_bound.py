@@ -48,12 +48,8 @@ Elsewhere branching itself tightens the bound, and sooner.
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
 """... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
 
-FIRST_STEPS, LATER_STEPS = 300, 100
-"""Steps that the multipliers of the first node may take, and of each later one from its parent's."""
-
-MAX_ENTRIES = 30_000_000
-"""Entries of V up to which the search keeps V as numbers: 240 MB, or twice that where weights are uneven."""
-
+FIRST_STEPS, LATER_STEPS = 300, 100  # of the multipliers of the first node, and of later ones from their parent's
+MAX_ENTRIES = 30_000_000  # entries of V that the search keeps as numbers at most: 240 MB, or twice that
 OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
 
 MAX_WAITING_FOLLOWERS = 16_000_000

@@ -26,15 +26,11 @@ from .reduced_problem import Instance
 from .search_limits import OPERATIONS_PER_UNIT, Clock
 
 Expression = Any  # of PuLP, which has no types
-
 TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
 TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
 SOLVERS = ("highs", "cbc", "gurobi")  # what `solver_name` knows beside ``auto``
 MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
-
-OPERATIONS_PER_ENTRY = 1e4
-"""Multiplications for each entry of a program that count as the work of one branch of a solver."""
-
+OPERATIONS_PER_ENTRY = 1e4  # multiplications per entry of a program that count as the work of one branch of a solver
 UNLIMITED_SECONDS = 1e7  # seconds that solvers are given where there is no limit: not all of them take infinity
 
 

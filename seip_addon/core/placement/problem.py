@@ -8,8 +8,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 
-TIE_TOLERANCE = 1e-9
-"""Placements count as equal when they differ by less than this fraction of all weight, or of the price."""
+TIE_TOLERANCE = 1e-9  # placements are equal that differ by less than this share of all weight, or of the price
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,16 +17,12 @@ from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
 MAX_EXACT_DOUBLE = 2**53  # sums of whole numbers up to here are exact in double precision
-
-MAX_EXACT_SINGLE = 2**24
-"""Sums of whole numbers up to here are exact in single precision, whatever the order of summation."""
+MAX_EXACT_SINGLE = 2**24  # sums of whole numbers up to here are exact in single precision, in any order
 
 INCOMMENSURABLE_TOTAL = 2**50
 """Total of weights that have no common unit: sums stay exact in double precision, rounding below `TIE_TOLERANCE`."""
 
-MICROMETRE = 1e-6
-"""Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
-
+MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
 WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
 DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 

@@ -19,27 +19,19 @@ from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
 
-BRANCHING_SHARE = 0.15
-"""Share of what is left of the limits for a first branch and bound, which goes on after the other methods."""
+BRANCHING_SHARE = 0.15  # of what is left of the limits, for a first branch and bound, which goes on after other methods
 
 TABU_SEARCH_SHARE, FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.1, 0.05, 0.4
 """Shares for a tabu search of swaps, for a first bound by decomposition, and for a full one where the first gains."""
 
-MIN_BOUND_GAIN = 0.05
-"""Share of the gap that the first bound by decomposition must close for the full one to be worth its time."""
-
+MIN_BOUND_GAIN = 0.05  # share of the gap that the first bound by decomposition must close for a full one to be worth it
 PROGRAM_SHARE = 0.5  # share for the integer program, beside branch and bound
-
-MAX_RELAXATION_GAP = 0.01
-"""Gap of the linear relaxation up to which the integer program is tried beside branch and bound."""
-
-MIN_TIE_BREAKING_WORK = 2.0
-"""Units of work that the choice among equally good placements may take, or as many as their proof took."""
-
+MAX_RELAXATION_GAP = 0.01  # gap of the linear relaxation up to which the program is tried, beside branch and bound
+MIN_TIE_BREAKING_WORK = 2.0  # units of work for the choice among equally good placements, or as many as the proof took
 MIN_GAP_PROGRESS = 0.02  # share of the gap that closes in the second half of the time where more time is of use
-
-MAX_PROGRAM_ENTRIES = 1_000_000
-"""Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
+MAX_PROGRAM_ENTRIES = (
+    1_000_000  # entries of V up to which the solver gets the whole program: PuLP takes 0.5 kB for each
+)
 
 
 @dataclass(frozen=True, eq=False)

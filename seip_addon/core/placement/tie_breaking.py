@@ -21,9 +21,7 @@ from .search_limits import Clock
 
 MAX_SEARCHED_TIES = 2_000  # ties that branch and bound lists; of more it looks for the first in order
 MAX_LISTED_TIES = 12  # ties that are listed by one program each; beyond, each stage is a program of its own
-
-BLOCK_SIZE = 10
-"""Candidates whose order is settled by one program: powers of two up to 512 stay far above all tolerances."""
+BLOCK_SIZE = 10  # candidates whose order is settled by one program: powers of two up to 512 are far above tolerances
 
 
 def canonical_optimum(

@@ -149,9 +149,7 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
 
 
 _PREFIX = ".seip-"  # how the names of unfinished files begin; the number of the process that writes them follows
-
-_STALE_SECONDS = 86400.0
-"""Seconds after which an unfinished file counts as abandoned, where processes cannot be queried."""
+_STALE_SECONDS = 86400.0  # seconds after which an unfinished file counts as abandoned where processes cannot be queried
 
 _LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 

@@ -13,12 +13,9 @@ from ..arrays import Float
 from ..opendrive import LaneSurface
 from .road_surface import by_road, cut_along, in_groups
 
-JOINT_GAP, MIN_JOINT = 0.3, 0.5
-"""Ends of roads within so many metres, along so many metres of their width, lead into each other."""
+JOINT_GAP, MIN_JOINT = 0.3, 0.5  # ends of roads within so many metres, along so many of their width, are joined
 MIN_HEIGHT_STEP = 1.0  # metres of height between ends that do not
-MAX_STRAIGHT_TURN = math.radians(35.0)
-"""An approach goes on through other junctions on lanes that turn by less than this."""
-
+MAX_STRAIGHT_TURN = math.radians(35.0)  # an approach goes on through other junctions on lanes that turn by less
 Key = tuple[str, int]  # a road and one of its ends: 0 where it starts, 1 where it stops
 
 

@@ -40,11 +40,9 @@ CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new
 VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
 VERGE_BELOW = 0.03
 GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
-MAX_GROUND_DISTANCE = 300.0
-"""How far from the extent (metres) it goes on at most: a wall may run on along the whole map."""
+MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
 VERGE_SPACING = 12.0
-OVERLAY_SPACING = 4.0
-"""As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
+OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
     Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),

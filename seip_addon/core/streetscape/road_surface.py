@@ -47,13 +47,9 @@ MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere a
 MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
 MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
 MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
-MAX_OPEN_MEDIAN_WIDTH = 6.0
-"""Gaps between carriageways narrower than this (metres) are medians though no junction closes them."""
-
-MAX_PAVEMENT_DISTANCE = 6.0
-"""A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
-SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0
-"""Metres: sampling step along sides of roads, and least length of a side without pavement."""
+MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
+MAX_PAVEMENT_DISTANCE = 6.0  # a pavement within this (metres) of the carriageway lies beside it, whatever is between
+SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0  # metres: sampling step along sides of roads, and least side without pavement
 
 
 @dataclass(frozen=True, eq=False)

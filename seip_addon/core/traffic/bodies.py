@@ -35,8 +35,7 @@ PAINT_COLOURS = (
 )
 """Up to which reflectivity paint and clothes are shown in which colour."""
 
-PAINTED_MATERIALS = ("paint", "cloth")
-"""Materials that have the road user's reflectivity; in a body a colour follows: ``paint red``."""
+PAINTED_MATERIALS = ("paint", "cloth")  # have the road user's reflectivity; in a body a colour follows: ``paint red``
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,7 @@ from ..arrays import Boolean, Float
 from .trajectories import Trajectories
 
 WINDOW_SECONDS = 1.8  # seconds over which a pedestrian's position and heading are averaged
-
-MAX_LEAP = 4.0
-"""Metres beyond what its speed explains: who moves further than that between two samples was put somewhere else."""
+MAX_LEAP = 4.0  # metres beyond what its speed explains: who moves further between two samples was put elsewhere
 
 
 def out_of_reach(trajectories: Trajectories) -> Boolean:

@@ -30,8 +30,7 @@ FILE = ArrayFile(
     "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
 )
 
-CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")
-"""What a road user can be; labels and bodies go by these."""
+CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")  # of road users
 
 
 @dataclass(frozen=True)
