@@ -28,7 +28,7 @@ from .frames import SampledRecording, TrainingSample, drawn, require_separate, s
 from .heads import TrainingTargets
 from .inference import detect
 from .matching import Rule
-from .pillars import PillarGrid, Pillars, fill_pillars, stacked
+from .pillars import PillarGrid, fill_pillars, stacked
 from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
@@ -161,8 +161,13 @@ class _Run:
         """Do one step."""
         self.detector.train()
         random = np.random.default_rng([self.settings.seed, 1, self.step])
-        batch = self._batch([drawn(self.training_set, random) for _ in range(self.settings.batch)], random)
-        loss = self._loss(batch)
+        samples = [drawn(self.training_set, random) for _ in range(self.settings.batch)]
+        grid = self.detector.grid.window(*self.detector.grid.centre, self.window)
+        varied = [vary(sample, grid, random) for sample in samples]
+        pillars = stacked([fill_pillars(one.points, grid, self.detector.settings.most_points) for one in varied], grid)
+        targets = [_targets(one, self.settings.least_points, self.detector.device) for one in varied]
+        output = self.detector(pillars, (len(targets), grid.rows, grid.columns))
+        loss = torch.stack(list(self.detector.found_by.loss(output, targets, grid, LOSS_MARGIN).values())).sum()
         self.optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.detector.parameters(), MAX_GRADIENT_NORM)
@@ -239,42 +244,12 @@ class _Run:
         both = (*self.training_set, *self.aside)
         return [[sampled.recording.name, sampled.recording.traffic, len(sampled)] for sampled in both]
 
-    def _batch(self, samples: Sequence[TrainingSample], random: np.random.Generator) -> _Batch:
-        return _batch(samples, self.detector, self.window, self.settings.least_points, random)
-
-    def _loss(self, batch: _Batch) -> Tensor:
-        output = self.detector(batch.pillars, (len(batch.targets), batch.grid.rows, batch.grid.columns))
-        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, LOSS_MARGIN)
-        return torch.stack(list(parts.values())).sum()
-
 
 def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:
     filled = [recording for recording in recordings if len(recording)]
     if not filled:
         raise SeipError("there is no frame to learn from: simulate some first")
     return filled
-
-
-@dataclass(frozen=True, eq=False)
-class _Batch:
-    """Windows moved onto one grid."""
-
-    pillars: Pillars
-    targets: list[TrainingTargets]
-    grid: PillarGrid
-
-
-def _batch(
-    samples: Sequence[TrainingSample], detector: Detector, window: int, least_points: int, random: np.random.Generator
-) -> _Batch:
-    """Return a window of each sample, turned, mirrored and stretched."""
-    clouds, targets = [], []
-    grid = detector.grid.window(*detector.grid.centre, window)
-    for sample in samples:
-        varied = vary(sample, grid, random)
-        clouds.append(fill_pillars(varied.points, grid, detector.settings.most_points))
-        targets.append(_targets(varied, least_points, detector.device))
-    return _Batch(stacked(clouds, grid), targets, grid)
 
 
 def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator) -> TrainingSample:

@@ -10,9 +10,8 @@ back in LiDAR axes is exact. Evaluators leave out objects less than 25 or 40 pix
 """
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -62,11 +61,6 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
     }
 
 
-def index_files(folder: Path, splits: Mapping[str, Sequence[str]]) -> dict[str, bytes]:  # noqa: ARG001  # names suffice
-    """Return the splits."""
-    return image_sets(splits)
-
-
 def _label_file(sample: Sample) -> bytes:
     boxes = sample.boxes
     length, width, height = boxes.size.T
@@ -96,4 +90,6 @@ def _empty_picture() -> bytes:
     return buffer.getvalue()
 
 
-FORMAT = Format("kitti", "KITTI's object detection format", CLASSES, sample_files, index_files)
+FORMAT = Format(
+    "kitti", "KITTI's object detection format", CLASSES, sample_files, lambda _folder, splits: image_sets(splits)
+)

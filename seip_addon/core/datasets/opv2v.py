@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Float
 from . import pcd
 from .format_interface import Format
-from .sample import Sample, SensorPose, TrafficRun, subset
+from .sample import Sample, TrafficRun, subset
 
 CLASSES = {"car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus"}
 """OpenCOOD has a single class, vehicles, without two-wheelers and pedestrians."""
@@ -72,7 +72,8 @@ def left_handed_pose(xyz: Float, orientation: Float) -> list[float]:
 def notes(run: TrafficRun) -> tuple[str, ...]:
     """Return warnings about agents that OpenCOOD ignores by default."""
     ego = run.sensors[0]
-    far = [sensor.label for sensor in run.sensors if _distance(sensor, ego) > MAX_AGENT_DISTANCE]
+    distances = [float(np.linalg.norm(sensor.xyz[:2] - ego.xyz[:2])) for sensor in run.sensors]
+    far = [sensor.label for sensor, away in zip(run.sensors, distances, strict=True) if away > MAX_AGENT_DISTANCE]
     warnings = []
     if len(run.sensors) > MAX_AGENTS:
         warnings.append(
@@ -84,10 +85,6 @@ def notes(run: TrafficRun) -> tuple[str, ...]:
             "out unless COM_RANGE is raised"
         )
     return tuple(warnings)
-
-
-def _distance(sensor: SensorPose, other: SensorPose) -> float:
-    return float(np.linalg.norm(sensor.xyz[:2] - other.xyz[:2]))
 
 
 def _cloud(sample: Sample, number: int) -> bytes:

@@ -29,9 +29,7 @@ PROGRAM_SHARE = 0.5  # share for the integer program, beside branch and bound
 MAX_RELAXATION_GAP = 0.01  # gap of the linear relaxation up to which the program is tried, beside branch and bound
 MIN_TIE_BREAKING_WORK = 2.0  # units of work for the choice among equally good placements, or as many as the proof took
 MIN_GAP_PROGRESS = 0.02  # share of the gap that closes in the second half of the time where more time is of use
-MAX_PROGRAM_ENTRIES = (
-    1_000_000  # entries of V up to which the solver gets the whole program: PuLP takes 0.5 kB for each
-)
+MAX_PROGRAM_ENTRIES = 1_000_000  # entries of V up to which the solver gets a program whole: PuLP takes 0.5 kB for each
 
 
 @dataclass(frozen=True, eq=False)
