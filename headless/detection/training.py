@@ -4,8 +4,6 @@ Every step takes windows about road users, each from a configuration, a frame an
 number of the step: a training that was stopped goes on as if it had not been.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Generator, Iterator, Sequence
