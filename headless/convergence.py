@@ -104,14 +104,6 @@ def coarsest_settings(
     tolerance : float
         Share of the weight, above 0 and below 1.
 
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Convergence
-
     Raises
     ------
     SeipError

@@ -35,17 +35,13 @@ class PillarEncoder(nn.Module):
         self.normalisation = nn.BatchNorm1d(width, NORMALISATION_EPSILON, NORMALISATION_MOMENTUM)
 
     def forward(self, features: Tensor, pillar: Tensor, count: int) -> Tensor:
-        """Return the channels of ``count`` pillars, zero where there is no point.
+        """Return the channels of ``count`` pillars, zero where there is no point, (count, width) Tensor.
 
         Parameters
         ----------
         features : (m, 8) float32 Tensor
         pillar : (m,) int64 Tensor
             Number of each point's pillar.
-
-        Returns
-        -------
-        (count, width) Tensor
         """
         empty = features.new_zeros((count, self.linear.out_features))
         if len(features) < 2:  # nothing to normalise over while training, and one point is no object
@@ -104,7 +100,7 @@ class FeatureMap(nn.Module):
         return self.backbone.channels
 
     def forward(self, features: Tensor, pillar: Tensor, shape: tuple[int, int, int]) -> Tensor:
-        """Return the feature map of some clouds.
+        """Return the feature map of some clouds, (clouds, channels, rows / 2, columns / 2) Tensor.
 
         Parameters
         ----------
@@ -112,10 +108,6 @@ class FeatureMap(nn.Module):
             As in `PillarEncoder.forward`; pillars count through all clouds.
         shape : tuple of int
             Clouds, rows, columns.
-
-        Returns
-        -------
-        (clouds, channels, rows / 2, columns / 2) Tensor
         """
         clouds, rows, columns = shape
         pillars = self.encoder(features, pillar, clouds * rows * columns)

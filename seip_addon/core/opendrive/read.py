@@ -43,10 +43,6 @@ _MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 def read_map(path: str | os.PathLike[str]) -> RoadMap:
     """Read an OpenDRIVE file.
 
-    Returns
-    -------
-    RoadMap
-
     Raises
     ------
     SeipError

@@ -210,7 +210,7 @@ def reaching(instance: Instance, goal: float) -> CoverProgram:
 
 
 def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
-    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen.
+    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen, (k,) int64.
 
     Cliques bound the linear relaxation more tightly than the pairs they are
     made of. They are grown greedily, in order, so the result is always the same.
@@ -219,10 +219,6 @@ def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
     ----------
     conflict : (c, c) bool
         Symmetric, false on the diagonal.
-
-    Yields
-    ------
-    (k,) int64
     """
     left = np.triu(conflict)
     for first in range(len(conflict)):

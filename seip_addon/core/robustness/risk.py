@@ -99,7 +99,7 @@ class Risk:
         return max(1, math.ceil(self.tail * scenarios - 1e-9))
 
     def outcomes(self, seen: NDArray[np.uint8], weight: Float, sensors: int) -> Float:
-        """Return the outcome of a placement in each scenario.
+        """Return the outcome of a placement in each scenario, (K,) float64.
 
         Parameters
         ----------
@@ -108,10 +108,6 @@ class Risk:
         weight : (t,) float64
         sensors : int
             N, the largest number of sensors.
-
-        Returns
-        -------
-        (K,) float64
         """
         times = seen.sum(axis=1, dtype=np.uint8)
         whole: Float = (times >= self.seen_by) @ weight

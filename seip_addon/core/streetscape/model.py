@@ -119,10 +119,6 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     Progress
         Roads of the map laid out, then stages of the model, of all.
 
-    Returns
-    -------
-    SiteModel
-
     Raises
     ------
     SeipError

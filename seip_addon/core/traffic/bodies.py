@@ -68,10 +68,6 @@ def fitted_body(user: RoadUser) -> Body:
     Road users of one category, size and paint get the same object, and those
     of one category and size the same array of triangles.
 
-    Returns
-    -------
-    Body
-
     Raises
     ------
     SeipError

@@ -85,10 +85,6 @@ def read_floating_car_data(
     window : Extent, optional
         What lies outside is not kept in memory.
 
-    Returns
-    -------
-    FloatingCarData
-
     Raises
     ------
     SeipError
