@@ -3,8 +3,6 @@
 In a checkout ``python -m headless`` is the same command.
 """
 
-from __future__ import annotations
-
 import runpy
 import sys
 

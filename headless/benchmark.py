@@ -3,8 +3,6 @@
 python -m headless.benchmark scenes/junction.blend -o docs
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -2,11 +2,8 @@
 
     python -m headless.build_extension --platforms linux-x64 windows-x64 macos-arm64
 
-The wheels are the group ``extension`` of the pins in ``pyproject.toml``, in
-`wheels/`, checked against ``wheels.lock``.
+The wheels are the group ``extension`` of the pins in ``pyproject.toml``, in `wheels/`, checked against ``wheels.lock``.
 """
-
-from __future__ import annotations
 
 import argparse
 import hashlib

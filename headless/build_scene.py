@@ -5,8 +5,6 @@ python -m headless.build_scene map.xodr --junction 53 --site site.toml -o site.b
 python -m headless.build_scene site.toml -o site.blend
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import replace

@@ -4,8 +4,6 @@ The claims are those of Qu, Huang and Suo, "SEIP: Simulation-based Design and
 Evaluation of Infrastructure-based Collective Perception", section V.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

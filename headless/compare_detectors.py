@@ -6,8 +6,6 @@ Every setting is trained for the same number of steps on all placements, and eva
 CPU times of one thread, independent of other load.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Generator
@@ -43,8 +41,7 @@ NETWORKS = {
 }
 """Networks compared, by family and name of the setting."""
 
-TIMED_RUNS = 5
-"""Timed inferences per frame, of which the median is taken."""
+TIMED_RUNS = 5  # timed inferences per frame, of which the median is taken
 
 
 def main(argv: list[str]) -> None:

@@ -1,13 +1,10 @@
 """The coarsest spacings of targets and of candidates whose answer stays within a tolerance.
 
-An answer is the best placement under some settings; it is evaluated on a fine grid of
-targets, the same for all. First the spacing of the targets is sought, then that of the
-candidates: from coarse to fine until the answer is as good as that of the finest. To stop
-where two spacings in a row agree would be quicker, but they agree too easily: which of a
+An answer is the best placement under some settings; it is evaluated on a fine grid of targets, the same for all. First
+the spacing of the targets is sought, then that of the candidates: from coarse to fine until the answer is as good as
+that of the finest. To stop where two spacings in a row agree would be quicker, but they agree too easily: which of a
 few candidates is the best is a matter of luck.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
@@ -28,17 +25,10 @@ from seip_addon.core.workflows.survey import SurveySettings
 GRID_SPACINGS = (4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5)
 """Metres between targets, from coarse to fine: each halves the square that a target stands for."""
 
-CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)
-"""Metres between posts on the pavement, from coarse to fine."""
-
-COARSE_CANDIDATE_SPACING = 8.0
-"""Metres between posts while the spacing of the targets is sought."""
-
-EVALUATION_SPACING = 0.35
-"""Metres between the targets on which answers are evaluated."""
-
-MAX_EVALUATION_TARGETS = 400_000
-"""Targets to evaluate on; a larger place is evaluated on a coarser grid."""
+CANDIDATE_SPACINGS = (16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0)  # metres between posts on the pavement, from coarse to fine
+COARSE_CANDIDATE_SPACING = 8.0  # metres between posts while the spacing of the targets is sought
+EVALUATION_SPACING = 0.35  # metres between the targets on which answers are evaluated
+MAX_EVALUATION_TARGETS = 400_000  # targets to evaluate on; a larger place is evaluated on a coarser grid
 
 
 @dataclass(frozen=True)
@@ -113,14 +103,6 @@ def coarsest_settings(
         Their spacings do not matter.
     tolerance : float
         Share of the weight, above 0 and below 1.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    Convergence
 
     Raises
     ------
@@ -209,15 +191,7 @@ class Evaluator:
     def solve(self, site: Site, settings: SurveySettings) -> Generator[Progress, None, Solution]:
         """Return the best placement on a site."""
         grid = yield from compute_visibility(site, self._models, settings.visibility, settings.engine)
-        return (
-            yield from optimise(
-                site,
-                grid.visible,
-                self._models,
-                self._objective,
-                settings.limits,
-            )
-        )
+        return (yield from optimise(site, grid.visible, self._models, self._objective, settings.limits))
 
     def evaluate(self, solution: Solution) -> float:
         """Return the share of the fine grid's weight that a placement sees."""

@@ -6,8 +6,6 @@ blender -b --python-exit-code 1 site.blend -P headless/evaluate.py -- --traffic 
 Needs torch (make detection). An evaluation that was stopped goes on where it was.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import dataclass
@@ -68,10 +66,7 @@ def main(argv: list[str]) -> None:
         results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
-        settings = study.surveyed.settings.as_record() | {
-            "seeds": options.seeds,
-            "frames_every_s": options.every,
-        }
+        settings = study.surveyed.settings.as_record() | {"seeds": options.seeds, "frames_every_s": options.every}
         study_results.save_record(
             folder / "evaluation.json", results, claims, settings, versions(blender=bpy.app.version_string)
         )

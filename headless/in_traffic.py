@@ -4,8 +4,6 @@ python -m headless.in_traffic scenes/junction.blend --sensor type1 --count 2 -o 
 blender -b --python-exit-code 1 site.blend -P headless/in_traffic.py -- --traffic run-*.npz --sensor type1 -o out/
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import asdict

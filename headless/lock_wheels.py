@@ -2,9 +2,8 @@
 
     python -m headless.lock_wheels
 
-pip names the wheel that it would take for each pin, Python and platform, and
-its digest; packages are installed, and wheels bundled in the extension, only
-where they are these. To be run after a pin has changed.
+pip names the wheel that it would take for each pin, Python and platform, and its digest; packages are installed, and
+wheels bundled in the extension, only where they are these. To be run after a pin has changed.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ from packaging.requirements import Requirement
 GROUPS = ("installer", "development", "traffic", "detection", "second-opinion")
 """What `headless.set_up` installs; the groups ``benchmark`` and ``readers`` are tried out apart from the rest."""
 
-MAX_GLIBC_MINOR = 36
-"""Of Debian 12, the oldest system that is tried: 2.36."""
+MAX_GLIBC_MINOR = 36  # of Debian 12, the oldest system that is tried: 2.36
 
 
 def main() -> None:

@@ -9,8 +9,6 @@ or as plain Python on the bpy module::
     python -m headless.place site.blend --sensor type1 --count 4 -o out/
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from functools import partial

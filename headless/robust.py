@@ -4,8 +4,6 @@ python -m headless.robust scenes/junction.blend --sensor type1 --count 4 -o out/
 blender -b --python-exit-code 1 site.blend -P headless/robust.py -- --sensor type1 --objective worst -o out/
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -4,15 +4,15 @@ The same file runs as ``blender -b … -P headless/x.py -- arguments`` in the
 real program and as ``python -m headless.x arguments`` on the bpy module.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import signal
 import sys
 import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NoReturn
+from pathlib import Path
+from typing import NoReturn, TypeVar
 
 # Before numpy is loaded: products shared out to threads depend on their number in the last digit, and take many times
 # as long where other work is on the same cores.
@@ -21,13 +21,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from headless.system_libraries import complaint, missing_libraries
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.storage import files as storage
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-    from pathlib import Path
-
-    from seip_addon.core.progress import Progress
 
 try:
     import bpy
@@ -50,15 +45,13 @@ except ImportError:
         raise
     sys.exit(f"error: {complaint(missing)}")
 
+Result = TypeVar("Result")
+
 EXIT_STOPPED = 130  # what a shell reports of a command that was stopped by Ctrl-C
 SECONDS_BETWEEN_LINES = 10.0
 ELAPSED_FORMAT = "{desc} [{elapsed}]"  # how progress of unknown length is shown
-
-LOG = logging.getLogger("headless")
-"""Progress and warnings of commands and their modules; results go through `print_line`."""
-
-_LOCKS: dict[Path, int] = {}
-"""Folders that this process has locked, and what holds each lock."""
+LOG = logging.getLogger("headless")  # progress and warnings of commands and modules; results go through `print_line`
+_LOCKS: dict[Path, int] = {}  # folders that this process has locked, and what holds each lock
 
 
 def in_blender() -> bool:
@@ -158,13 +151,18 @@ def run(main: Callable[[list[str]], None]) -> NoReturn:
     _end(0)
 
 
+def finish_with_bar(steps: Generator[Progress, None, Result]) -> Result:
+    """Run work to its end under a bar of its own, and return its result."""
+    with progress_bar() as report:
+        return finish(steps, report)
+
+
 @contextmanager
 def progress_bar() -> Iterator[Callable[[Progress], None]]:
     """Yield a callable for `finish` that shows work done and time left on standard error.
 
-    A terminal sees one bar, which stays on its line and begins anew where the
-    work does (a smaller count, another total); work of unknown length shows
-    what it does and for how long. A log gets a line every ten seconds at most.
+    A terminal sees one bar, which stays on its line and begins anew where the work does (a smaller count, another
+    total); work of unknown length shows what it does and for how long. A log gets a line every ten seconds at most.
     """
     if not sys.stderr.isatty():
         yield _line_reporter()

@@ -3,9 +3,8 @@
     python3 -m headless.set_up .venv
     python3 -m headless.set_up .venv traffic  # and a group of packages more
 
-It does nothing when the environment is there and the pins in ``pyproject.toml``
-have not changed. pip takes no package whose digest is not in ``wheels.lock``,
-but for `UNLOCKED`. It runs under any Python 3, so that one of the wrong version
+It does nothing when the environment is there and the pins in ``pyproject.toml`` have not changed. pip takes no package
+whose digest is not in ``wheels.lock``, but for `UNLOCKED`. It runs under any Python 3, so that one of the wrong version
 gets a sentence and no traceback.
 """
 
@@ -30,8 +29,7 @@ LOCK = ROOT / "wheels.lock"
 UNLOCKED = {"torch"}
 """Packages of many builds, of which pip's settings choose: those for graphics cards bring packages of their own."""
 
-SEPARATE_GROUPS = {"second-opinion"}
-"""Groups of packages that ask for others which are not used here."""
+SEPARATE_GROUPS = {"second-opinion"}  # groups of packages that ask for others which are not used here
 
 
 def main(arguments: list[str]) -> str | None:

@@ -7,8 +7,6 @@ The merged cloud of a frame is the array ``points``; that of a sensor are those 
 that was stopped goes on where it was when it is started again.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import replace
@@ -24,7 +22,6 @@ import bpy
 
 from seip_addon.core.datasets import FORMATS, SPLITS
 from seip_addon.core.lidar import load_catalogue
-from seip_addon.core.progress import finish
 from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.scans.run_folder import Record, Run, check_run_folder
@@ -48,11 +45,9 @@ def main(argv: list[str]) -> None:
     run = _run(options, settings)
     check_run_folder(options.output, run)
     runtime.LOG.info(_in_words(run))
-    with runtime.progress_bar() as report:
-        simulation = finish(simulation_of(run), report)
+    simulation = runtime.finish_with_bar(simulation_of(run))
     runtime.warn(simulation.warnings)
-    with runtime.progress_bar() as report:
-        manifest = finish(record(options.output, run, simulation, settings), report)
+    manifest = runtime.finish_with_bar(record(options.output, run, simulation, settings))
     runtime.print_line(_summary(manifest))
     for key in settings.formats:
         runtime.print_line(f"{FORMATS[key].name}: {dataset_folder(options.output, settings, key)}/")
@@ -75,8 +70,7 @@ def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
         for sensor in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
     ]
     if options.traffic is None:
-        with runtime.progress_bar() as report:
-            trajectories = finish(read_traffic(bpy.context.scene), report)
+        trajectories = runtime.finish_with_bar(read_traffic(bpy.context.scene))
     else:
         trajectories = load_trajectories(options.traffic, reading.geometry)
     return make_run(

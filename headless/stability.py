@@ -6,8 +6,6 @@ blender -b --python-exit-code 1 site.blend -P headless/stability.py -- -o docs
 Chapters that are done are kept in the folder of work: a run that was stopped goes on with the next.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

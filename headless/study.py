@@ -4,8 +4,6 @@ python -m headless.study scenes/junction.blend -o out/study
 blender -b --python-exit-code 1 site.blend -P headless/study.py -- -o out/study
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -9,16 +9,12 @@ or as plain Python on the bpy module::
     python -m headless.traffic site.blend --simulate site.xodr --flow 600 --seed 1 --duration 120 -o traffic.npz
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
 if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -32,7 +28,6 @@ import bpy
 import numpy as np
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.floating_car_data import Extent, listed
@@ -50,8 +45,6 @@ from seip_addon.core.traffic.source import (
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate
-
-Result = TypeVar("Result")
 
 
 def main(argv: list[str]) -> None:
@@ -71,7 +64,7 @@ def main(argv: list[str]) -> None:
 
 def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
     files = TrafficFiles(options.fcd, tuple(options.routes), options.net, options.begin, options.end)
-    loaded = _run(load_traffic(files, geometry))
+    loaded = runtime.finish_with_bar(load_traffic(files, geometry))
     runtime.warn(loaded.warnings)
     return loaded.trajectories
 
@@ -83,24 +76,20 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
     end = options.warm_up + options.duration
     scenario = Scenario(demand, SignalPlan(options.green), options.seed, end)
     with tempfile.TemporaryDirectory() as folder:
-        files = _run(simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0)))
+        steps = simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0))
+        files = runtime.finish_with_bar(steps)
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
         window = Extent(options.warm_up, end, road_bounds(geometry, ROAD_MARGIN))
-        read = _run(read_sumo(files, window, geometry.origin, source))
+        read = runtime.finish_with_bar(read_sumo(files, window, geometry.origin, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
     runtime.warn((*read.warnings, *fit.warnings))
     simulated = fit.trajectories
-    apart, collided = _run(without_overlaps(simulated))
+    apart, collided = runtime.finish_with_bar(without_overlaps(simulated))
     if collided:
         runtime.LOG.info(
             f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {listed(collided)}"
         )
     return replace(apart, time=np.round(apart.time - options.warm_up, 3))
-
-
-def _run(steps: Generator[Progress, None, Result]) -> Result:
-    with runtime.progress_bar() as report:
-        return finish(steps, report)
 
 
 def _in_words(trajectories: Trajectories) -> str:

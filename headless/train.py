@@ -7,8 +7,6 @@ on several configurations of sensors works with all of them. A training that was
 is started again.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
@@ -38,7 +36,6 @@ import bpy
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
-from seip_addon.core.progress import finish
 from seip_addon.core.scans.run_folder import load_manifest
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import save_json
@@ -73,9 +70,7 @@ def main(argv: list[str]) -> None:
         ]
         for name in ("train", "validation")
     )
-    steps = train(learning, aside, network, training, device=options.device, store=path)
-    with runtime.progress_bar() as report:
-        trained = finish(steps, report)
+    trained = runtime.finish_with_bar(train(learning, aside, network, training, device=options.device, store=path))
     best = trained.curve.best
     runtime.print_line(
         f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} on validation frames"

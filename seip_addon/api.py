@@ -25,8 +25,6 @@ Examples
 (dtype('float32'), 3, 50)
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -45,18 +43,9 @@ from .core.workflows.survey import Layout, Survey, SurveySettings, lay_out, with
 from .core.workflows.survey import place as _place
 
 __all__ = [
-    "CandidateSettings",
-    "Objective",
-    "ScanSettings",
-    "SurveySettings",
-    "VisibilitySettings",
-    "compute_visibility",
-    "lay_out",
-    "load_traffic",
-    "place",
-    "read_scene",
-    "scan",
-]
+    "CandidateSettings", "Objective", "ScanSettings", "SurveySettings", "VisibilitySettings",
+    "compute_visibility", "lay_out", "load_traffic", "place", "read_scene", "scan",
+]  # fmt: skip
 
 
 def read_scene(path: str | os.PathLike[str] | None = None) -> SceneGeometry:

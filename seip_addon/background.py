@@ -1,7 +1,5 @@
 """Background thread for long work, polled from Blender's event loop."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Generator
@@ -9,7 +7,7 @@ from concurrent.futures import CancelledError, Future
 from contextlib import closing
 from typing import Generic, TypeVar
 
-from .core.progress import Progress
+from .core.progress import Progress, finish
 
 Result = TypeVar("Result")
 
@@ -60,23 +58,19 @@ class Background(Generic[Result]):
         return not self._thread.is_alive()
 
     def _run(self, steps: Generator[Progress, None, Result]) -> None:
+        def report(progress: Progress) -> None:
+            self.progress = progress
+            self._pace.note(progress, time.monotonic())
+            if self._stop.is_set():
+                raise CancelledError
+
         try:
             with closing(steps):
-                result = self._step_through(steps)
+                result = finish(steps, report)
         except BaseException as error:  # noqa: BLE001  # raised again where the result is asked for
             self._end.set_exception(error)
         else:
             self._end.set_result(result)
-
-    def _step_through(self, steps: Generator[Progress, None, Result]) -> Result:
-        while not self._stop.is_set():
-            try:
-                self.progress = next(steps)
-            except StopIteration as stop:
-                result: Result = stop.value
-                return result
-            self._pace.note(self.progress, time.monotonic())
-        raise CancelledError
 
 
 class Pace:

@@ -4,8 +4,6 @@ A handler notes that something moved; a timer, a moment later, casts the rays of
 those sensors alone and colours the road anew. Neither is there while this is off.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 
@@ -24,8 +22,7 @@ from .scene.write import show_seen_by
 from .sensor_edits import same_pose
 from .session import FollowedSensors, SceneState, scene_of, session
 
-DELAY = 0.02
-"""Seconds from a movement to the look at it: a drag reports many."""
+DELAY = 0.02  # seconds from a movement to the look at it: a drag reports many
 
 
 def start(scene: bpy.types.Scene, state: SceneState, visibility: VisibilityModel) -> None:
@@ -130,14 +127,7 @@ def _update_soon() -> None:
 
 
 def _handlers() -> tuple[tuple[str, Callable[..., None]], ...]:
-    return (
-        ("depsgraph_update_post", _on_update),
-        ("undo_post", _on_undo),
-        ("redo_post", _on_undo),
-    )
-
-
-CLASSES: tuple[type, ...] = ()
+    return (("depsgraph_update_post", _on_update), ("undo_post", _on_undo), ("redo_post", _on_undo))
 
 
 def forget() -> None:

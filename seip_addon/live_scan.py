@@ -1,7 +1,5 @@
 """Live scans: the last frame of each scene, shown as a point cloud and scanned again as the timeline moves."""
 
-from __future__ import annotations
-
 import time
 
 import bpy
@@ -71,12 +69,7 @@ def keep_following() -> None:
     if wanted and _frame_changed not in handlers:
         handlers.append(_frame_changed)
     if not wanted:
-        _unfollow()
-
-
-def _unfollow() -> None:
-    if _frame_changed in bpy.app.handlers.frame_change_post:
-        bpy.app.handlers.frame_change_post.remove(_frame_changed)
+        forget()
 
 
 def _frame_changed(scene: bpy.types.Scene, *_: object) -> None:
@@ -86,9 +79,7 @@ def _frame_changed(scene: bpy.types.Scene, *_: object) -> None:
         keep(scene, measure(scan.run, scan.simulation, now(scene)))
 
 
-CLASSES: tuple[type, ...] = ()
-
-
 def forget() -> None:
     """Follow no timeline: another file is opened, or the add-on is disabled."""
-    _unfollow()
+    if _frame_changed in bpy.app.handlers.frame_change_post:
+        bpy.app.handlers.frame_change_post.remove(_frame_changed)

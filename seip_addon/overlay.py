@@ -1,21 +1,20 @@
 """Overlays: points, lines and faces drawn over a viewport, with the legend that explains them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import bpy
+import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
 Colour = tuple[float, float, float, float]
 
 Kind = Literal["POINTS", "LINES", "TRIS"]
 
-POINT_SIZE = 2.0
-"""Pixels, at the interface's usual scale."""
+POINT_SIZE = 2.0  # pixels, at the interface's usual scale
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,6 @@ class Layer:
 
     def draw(self, scale: float) -> None:
         """Draw it into the framebuffer that is bound."""
-        import gpu  # noqa: PLC0415  # not available in background mode
-        from gpu_extras.batch import batch_for_shader  # noqa: PLC0415  # as above
-
         single = isinstance(self.colours, tuple)
         prefix = "POINT_" if self.kind == "POINTS" else ""
         shader = gpu.shader.from_builtin(f"{prefix}{'UNIFORM' if single else 'FLAT'}_COLOR")

@@ -1,7 +1,5 @@
 """Add-on preferences, for all files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -1,7 +1,5 @@
 """Registration of the add-on's classes, in order."""
 
-from __future__ import annotations
-
 import importlib
 from types import ModuleType
 
@@ -9,37 +7,16 @@ import bpy
 
 PARTS = (
     "preferences",
-    "properties.site",
-    "properties.survey",
-    "properties.placement",
-    "properties.results",
-    "properties.view",
-    "properties.traffic",
-    "properties.scene",
-    "session",
-    "scene_survey",
-    "sensor_types",
-    "live_scan",
-    "viewport.beam_preview",
-    "viewport.overlays",
-    "operators.base",
-    "operators.site",
-    "operators.sensors",
-    "operators.visibility",
-    "operators.placement",
+    "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
+    "properties.traffic", "properties.scene",
+    "session", "scene_survey", "sensor_types", "live_scan", "viewport.beam_preview", "viewport.overlays",
+    "operators.base", "operators.site", "operators.sensors", "operators.visibility", "operators.placement",
     "live_coverage",
-    "operators.results",
-    "operators.view",
-    "operators.traffic",
-    "panels.site",
-    "panels.sensors",
-    "panels.visibility",
-    "panels.placement",
-    "panels.results",
-    "panels.view",
+    "operators.results", "operators.view", "operators.traffic",
+    "panels.site", "panels.sensors", "panels.visibility", "panels.placement", "panels.results", "panels.view",
     "panels.traffic",
-)
-"""Modules with ``CLASSES``.
+)  # fmt: skip
+"""Modules of the add-on; most have ``CLASSES``.
 
 Some have ``attach`` and ``detach`` for what is no class: handlers, properties,
 menus; and some ``forget``, for what must not outlive the open file.
@@ -55,7 +32,7 @@ def register() -> None:
     except ImportError as error:
         parts = [_incomplete(error)]
     for part in parts:
-        for one in part.CLASSES:
+        for one in getattr(part, "CLASSES", ()):
             bpy.utils.register_class(one)
         _registered.append(part)
         if hasattr(part, "attach"):
@@ -71,7 +48,7 @@ def unregister() -> None:
         part = _registered.pop()
         if hasattr(part, "detach"):
             part.detach()
-        for one in reversed(part.CLASSES):
+        for one in reversed(getattr(part, "CLASSES", ())):
             bpy.utils.unregister_class(one)
 
 

@@ -161,8 +161,6 @@ def _before_save(*_: object) -> None:
 
 HANDLERS = (("load_post", _after_load), ("save_pre", _before_save), ("depsgraph_update_post", on_update))
 
-CLASSES: tuple[type, ...] = ()
-
 
 def attach() -> None:
     """Watch scenes, and compare a placement with its scene whenever a file is opened."""

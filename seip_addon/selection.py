@@ -1,7 +1,5 @@
 """Selection of objects from list rows, and of rows from objects."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import bpy

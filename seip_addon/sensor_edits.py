@@ -1,7 +1,5 @@
 """Manual edits of placed sensors in the scene: moved, rotated, of another type, deleted or added."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import bpy
@@ -14,8 +12,7 @@ from .core.workflows.moved_sensors import BY_HAND
 from .scene import contract
 from .scene.sensors import labelled_sensors, pose_of
 
-POSE_TOLERANCE = 1e-5
-"""Rounding errors of a pose in single precision: of rotations absolute, of positions relative beyond a metre."""
+POSE_TOLERANCE = 1e-5  # of single precision: of rotations absolute, of positions relative beyond a metre
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,6 @@ class SensorEdits:
     added: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Return whether there are any edits."""
         return bool(self.moved or self.deleted or self.added)
 
     def describe(self) -> str:

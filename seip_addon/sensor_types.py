@@ -1,7 +1,5 @@
 """Sensor types: the catalogue in the session, for panels that only look, and each scene's list of keys."""
 
-from __future__ import annotations
-
 import bpy
 
 from . import preferences
@@ -47,26 +45,18 @@ def _after_load(*_: object) -> None:
     refresh()
 
 
-def _once() -> None:
-    """Do what Blender forbids while it registers an add-on: look at the open file."""
-    refresh()
-
-
-CLASSES: tuple[type, ...] = ()
-
-
 def attach() -> None:
     """List the types now, and whenever a file is opened."""
     bpy.app.handlers.load_post.append(_after_load)
     if isinstance(bpy.data, bpy.types.BlendData):
         refresh()
-    else:
-        bpy.app.timers.register(_once, first_interval=0.0)
+    else:  # Blender lets nobody look at the open file while it registers an add-on
+        bpy.app.timers.register(refresh, first_interval=0.0)
 
 
 def detach() -> None:
     """Forget them."""
-    if bpy.app.timers.is_registered(_once):
-        bpy.app.timers.unregister(_once)
+    if bpy.app.timers.is_registered(refresh):
+        bpy.app.timers.unregister(refresh)
     bpy.app.handlers.load_post.remove(_after_load)
     session.sensor_types.clear()

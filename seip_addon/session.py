@@ -1,11 +1,8 @@
 """Session: all that the add-on keeps in memory of the open file, in one object.
 
-None of it is needed to go on: the file keeps what was asked and found, and the
-cache keeps visibility. Scenes are named by their session number, as undo and
-redo put another Python object in place of each.
+None of it is needed to go on: the file keeps what was asked and found, and the cache keeps visibility. Scenes are named
+by their session number, as undo and redo put another Python object in place of each.
 """
-
-from __future__ import annotations
 
 import time
 from collections.abc import Mapping
@@ -82,8 +79,6 @@ class SceneState:
         As the preferences were when this was asked for last.
     catalogues : tuple
         The user's catalogue files and when each was last written.
-    warnings : tuple of str
-        Of the scene's reading.
     estimate : Estimate or None
         Of what the visibility grid will take.
     solution : Solution or None
@@ -91,7 +86,6 @@ class SceneState:
     record : str
         The result that the solution was taken from.
     durations : mapping of str to float, seconds
-        How long each step took.
     """
 
     layout: Layout
@@ -149,8 +143,6 @@ class RunningWork:
         Reading of `time.monotonic`.
     timer : bpy.types.Timer or None
         Has somebody look at it from time to time.
-    stop : bool
-        Whether somebody asked to stop it.
     """
 
     operator: str
@@ -177,7 +169,6 @@ class FollowedSensors:
     moved : tuple of str
         Labels of those that are not where the placement put them.
     seconds : float
-        How long the last update took.
     problem : str
         Why nothing is followed at the moment.
     """
@@ -218,7 +209,6 @@ class LastScan:
     run : Run
         What the scans follow from.
     seconds : float
-        That the scan took.
     facts : tuple of str
         What came of it, one sentence each.
     """
@@ -281,8 +271,7 @@ class Session:
         return self.scans.get(scene.session_uid)
 
 
-session = Session()
-"""There is one Blender, and one file open in it."""
+session = Session()  # there is one Blender, and one file open in it
 
 
 def scene_of(number: int) -> bpy.types.Scene:
@@ -297,9 +286,6 @@ def scene_of(number: int) -> bpy.types.Scene:
         if scene.session_uid == number:
             return scene
     raise SeipError("the scene that this was computed for is gone: nothing was written")
-
-
-CLASSES: tuple[type, ...] = ()
 
 
 def forget() -> None:

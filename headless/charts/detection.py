@@ -1,7 +1,5 @@
 """Charts of average precision against number, price, coverage and time."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -194,7 +192,8 @@ def save_price_chart(path: str | os.PathLike[str], cells: Sequence[PrecisionCell
     panel.xaxis.set_major_formatter(FuncFormatter(lambda price, _: f"${price / 1000:,.0f}k"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     prices = [cell.price for cell in cells]
-    panel.set_xticks([tick for tick in _round_prices() if min(prices) / 1.5 <= tick <= max(prices) * 1.5])
+    ticks = [step * 10.0**decade for decade in range(7) for step in (1, 2, 5)]
+    panel.set_xticks([tick for tick in ticks if min(prices) / 1.5 <= tick <= max(prices) * 1.5])
     _precision_axis(panel, _reached(cells), "price of all sensors")
     add_legend(figure, [panel])
     set_title(figure, title)
@@ -410,10 +409,6 @@ def _smoothed(values: Float) -> Float:
     first, last = np.maximum(places - reach, 0), np.minimum(places + reach + 1, len(values))
     mean: Float = (total[last] - total[first]) / (last - first)
     return mean
-
-
-def _round_prices() -> list[float]:
-    return [step * 10.0**decade for decade in range(7) for step in (1, 2, 5)]
 
 
 def _name(figure: Figure, panel: Axes, named: Sequence[tuple[float, float, str, bool]]) -> None:

@@ -1,18 +1,15 @@
 """Plan view of one frame with road users, detections and errors."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from headless.charts.style import new_figure, save_chart
+from headless.charts.style import limits_around, new_figure, save_chart
 
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.path import Path
@@ -20,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.pictures.drawing import SENSOR_MARK
+from seip_addon.core.pictures.drawing import SENSOR_MARK, draw_polygons
 from seip_addon.core.pictures.palette import INK, SOFT_INK
 
 TRUTH_COLOUR, DETECTED_COLOUR, IGNORED_COLOUR = "#00875a", "#d1242f", "#a9b1b8"
@@ -28,9 +25,7 @@ TRUTH_FILL = TRUTH_COLOUR + "22"
 HIT_COLOUR, GROUND_COLOUR = "#9aa3ab", "#f1f3f4"
 PICTURE_SIDE, DPI = 5.6, 200  # inches
 MARGIN_SHARE = 0.03  # of the region's size, shown around it
-MAX_POINTS = 150_000
-"""Returns that are drawn of each cloud, evenly chosen: more hide each other."""
-
+MAX_POINTS = 150_000  # returns that are drawn of each cloud, evenly chosen: more hide each other
 RING_RADIUS = 4.0  # metres, radius of the rings about errors
 MIN_NOSE_LENGTH = 0.3  # metres, of the stroke that shows where a box's front is
 
@@ -43,12 +38,8 @@ class ErrorView:
 
     Parameters
     ----------
-    name : str
-        Heads the panel.
     cloud : (n, 2) float array, metres
         Returns in plan.
-    region : shapely geometry
-        Region of interest in plan.
     sensors : (s, 2) float64, metres
     truth : (g, 5) float64
         Road users in plan: x, y of the middle, length, width (metres), yaw (radians, counter-clockwise from +x).
@@ -72,21 +63,13 @@ class ErrorView:
 
 
 def save_error_view(path: str | os.PathLike[str], views: Sequence[ErrorView], title: str) -> None:
-    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG.
-
-    Parameters
-    ----------
-    views : sequence of ErrorView
-        Side by side.
-    """
+    """Draw frames from above: the cloud grey, road users green, detections red, errors ringed, as PNG."""
     if not views:
         raise SeipError("there is no frame to draw the errors of: evaluate a detector on at least one frame")
-    left, bottom, right, top = shapely.total_bounds([view.region for view in views])
-    around = MARGIN_SHARE * max(right - left, top - bottom)
-    shape = (top - bottom + 2 * around) / (right - left + 2 * around)
+    limits, shape = limits_around(shapely.total_bounds([view.region for view in views]), MARGIN_SHARE)
     figure, panels = new_figure(PICTURE_SIDE * len(views), PICTURE_SIDE * shape + 1.1, len(views), dpi=DPI)
     for panel, view in zip(panels, views, strict=True):
-        panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
+        panel.set(**limits)
         _draw(panel, view)
     legend = figure.legend(handles=_legend(), frameon=False, fontsize=9, loc="outside lower center", ncols=7)
     for text in legend.get_texts():
@@ -108,8 +91,7 @@ def _draw(panel: Axes, view: ErrorView) -> None:
     _rings(panel, view.detected[view.false], DETECTED_COLOUR, dashed=False)
     panel.plot(*view.sensors.T, zorder=SENSOR, marker="o", **SENSOR_MARK | {"markersize": 8.0})
     panel.set(xticks=(), yticks=())
-    for spine in panel.spines.values():
-        spine.set(color=SOFT_INK, linewidth=0.6)
+    panel.spines[:].set(color=SOFT_INK, linewidth=0.6)
     words = f"{_count(view.missed, 'missed')} of {int(view.wanted.sum())}, {_count(view.false, 'false')}"
     panel.set_title(view.name, color=INK, fontsize=10.5, parse_math=False, loc="left")
     panel.set_title(words, color=SOFT_INK, fontsize=9, loc="right")
@@ -117,16 +99,11 @@ def _draw(panel: Axes, view: ErrorView) -> None:
 
 def _boxes(panel: Axes, boxes: Float, colour: str, zorder: int, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Draw boxes, each with a stroke from its middle to where its front is."""
-    panel.add_collection(
-        PolyCollection(list(corners(boxes)), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder),
-        autolim=False,
-    )
+    draw_polygons(panel, corners(boxes), **{"facecolor": "none"} | style, edgecolor=colour, zorder=zorder)
     ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])]) * np.maximum(boxes[:, 2:3] / 2, MIN_NOSE_LENGTH)
     strokes = np.stack([boxes[:, :2], boxes[:, :2] + ahead], axis=1)
-    panel.add_collection(
-        PolyCollection(list(strokes), closed=False, edgecolor=colour, facecolor="none", linewidth=0.7, zorder=zorder),
-        autolim=False,
-    )
+    line: dict[str, Any] = {"edgecolor": colour, "facecolor": "none", "linewidth": 0.7}
+    draw_polygons(panel, strokes, closed=False, zorder=zorder, **line)
 
 
 def corners(boxes: Float) -> Float:
@@ -142,17 +119,8 @@ def _rings(panel: Axes, boxes: Float, colour: str, *, dashed: bool) -> None:
     angle = np.linspace(0, 2 * np.pi, 49)
     radius = np.maximum(RING_RADIUS, 0.62 * boxes[:, 2])[:, None]
     rings = boxes[:, None, :2] + radius[..., None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    panel.add_collection(
-        PolyCollection(
-            list(rings),
-            facecolor="none",
-            edgecolor=colour,
-            linewidth=1.3,
-            linestyle=(0, (3, 1.6)) if dashed else "-",
-            zorder=ERROR,
-        ),
-        autolim=False,
-    )
+    stroke = (0, (3, 1.6)) if dashed else "-"
+    draw_polygons(panel, rings, facecolor="none", edgecolor=colour, linewidth=1.3, linestyle=stroke, zorder=ERROR)
 
 
 def _count(which: Boolean, word: str) -> str:

@@ -1,7 +1,5 @@
 """Charts of coverage under pose errors, and of the price of robust placements."""
 
-from __future__ import annotations
-
 import os
 from textwrap import fill
 

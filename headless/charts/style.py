@@ -1,10 +1,8 @@
 """Style of all charts: colours, marks, axes, legends and titles."""
 
-from __future__ import annotations
-
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 from matplotlib.axes import Axes
@@ -40,6 +38,17 @@ def new_figure(
     figure = Figure((width, height), dpi=dpi, facecolor=PAPER, layout="constrained")
     FigureCanvasAgg(figure)  # measures text
     return figure, list(figure.subplots(1, panels, sharey=sharey, squeeze=False)[0])
+
+
+def limits_around(bounds: Iterable[float], margin: float) -> tuple[dict[str, Any], float]:
+    """Return the limits of a plan with a margin, a share of its size, around (left, bottom, right, top), and its shape.
+
+    The shape is how many times as high as wide it is.
+    """
+    left, bottom, right, top = bounds
+    around = margin * max(right - left, top - bottom)
+    limits = {"xlim": (left - around, right + around), "ylim": (bottom - around, top + around), "aspect": "equal"}
+    return limits, (top - bottom + 2 * around) / (right - left + 2 * around)
 
 
 def style_axes(panel: Axes, x: str = "", y: str = "", grid: Literal["both", "x", "y"] = "both", **font: Any) -> None:  # noqa: ANN401 -- matplotlib's own

@@ -1,24 +1,20 @@
 """Charts of the coverage that traffic leaves, for nominal and for traffic-aware placements."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 
-from headless.charts.style import COLOURS, interval_ends, new_figure, save_chart, style_axes
+from headless.charts.style import COLOURS, interval_ends, limits_around, new_figure, save_chart, style_axes
 
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.ticker import PercentFormatter
 
-from seip_addon.core.arrays import Float
 from seip_addon.core.estimates import IntervalEstimate
 from seip_addon.core.geometry.plan import closed, outline
-from seip_addon.core.pictures.drawing import draw_sensors
+from seip_addon.core.pictures.drawing import draw_polygons, draw_sensors
 from seip_addon.core.pictures.palette import INK, SEEN_COLOURS, SOFT_INK
 from seip_addon.core.pictures.plan_view import MAX_GAP, draw_area
 from seip_addon.core.placement.deployment import Deployment
@@ -45,17 +41,16 @@ def save_time_map(  # what is drawn, and where
     title: str,
 ) -> None:
     """Draw for each target, and for the point above it, the share of time for which it is seen, as PNG."""
-    left, bottom, right, top = site.region.bounds
-    around = MARGIN_SHARE * max(right - left, top - bottom)
-    shape = (top - bottom + 2 * around) / (right - left + 2 * around)
+    limits, shape = limits_around(site.region.bounds, MARGIN_SHARE)
     figure, panels = new_figure(PICTURE_SIDE * len(placed.seen) + 0.9, PICTURE_SIDE * shape + 0.9, len(placed.seen))
     for panel, (layer, seen) in zip(panels, placed.seen.items(), strict=True):
-        panel.set(xlim=(left - around, right + around), ylim=(bottom - around, top + around), aspect="equal")
+        panel.set(**limits)
         panel.set_title(
             f"{LAYER_NAMES[layer]}: {seen.mean.describe(1)}, empty {seen.empty:.1%}", color=INK, fontsize=10
         )
         panel.set(xticks=(), yticks=())
-        _draw_shares(panel, site, seen.time)
+        squares, colours = target_squares(site.targets)[:, :, :2], TIME_CMAP(seen.time)
+        draw_polygons(panel, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=1)
         _draw_place(panel, geometry)
     for panel in panels:  # after the last change of the layout that moves data on the page
         figure.draw_without_rendering()
@@ -77,12 +72,7 @@ def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
     """
     figure, (shares, changes) = new_figure(11.5, 4.6, 2)
     rows = [(study.empty.seen[study.layer], study.traffic.seen[study.layer]) for _, study in studies]
-    _bars(
-        shares,
-        -1,
-        [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows],
-        "empty road",
-    )
+    _bars(shares, -1, [IntervalEstimate(empty.empty, empty.empty, empty.empty) for empty, _ in rows], "empty road")
     _bars(shares, 0, [empty.mean for empty, _ in rows], "in traffic")
     _bars(shares, 1, [traffic.mean for _, traffic in rows], "in traffic, placed on traffic")
     shares.set_ylabel(f"share of the {LAYER_NAMES[studies[0][1].layer]} seen", color=INK)
@@ -102,14 +92,6 @@ def save_traffic_chart(path: str | os.PathLike[str], studies: Sequence[tuple[str
 def negative(estimate: IntervalEstimate) -> IntervalEstimate:
     """Return an estimate with the opposite sign."""
     return IntervalEstimate(-estimate.value, -estimate.high, -estimate.low)
-
-
-def _draw_shares(panel: Axes, site: Site, time: Float) -> None:
-    squares = list(target_squares(site.targets)[:, :, :2])
-    panel.add_collection(
-        PolyCollection(squares, facecolors=TIME_CMAP(time), edgecolors="none", antialiaseds=False, zorder=1),
-        autolim=False,
-    )
 
 
 def _draw_place(panel: Axes, geometry: SceneGeometry) -> None:

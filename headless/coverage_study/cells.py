@@ -1,7 +1,5 @@
 """The cells of the study: the best placement for each type, height, number and central weight."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 
@@ -19,12 +17,8 @@ from seip_addon.core.site.site import Site
 
 COUNTS = (1, 2, 4)
 CENTRAL_WEIGHTS = (2.0, 4.0, 8.0, 16.0)
-CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]
-"""Central weight of the plans that stand beside the vanilla ones."""
-
-
-Span = tuple[float, float]
-"""Least and largest possible value of something that the solver may not have settled."""
+CHARTED_WEIGHT = CENTRAL_WEIGHTS[1]  # central weight of the plans that stand beside the vanilla ones
+Span = tuple[float, float]  # least and largest possible value of something that the solver may not have settled
 
 
 @dataclass(frozen=True)
@@ -57,8 +51,6 @@ class Case(Cell):
     ----------
     placement, greedy : Placement
         The integer program's and the greedy algorithm's answer.
-    deployment : Deployment
-        What the integer program's sensors see.
     """
 
     placement: Placement
@@ -113,20 +105,6 @@ class CoverageStudy:
         wanted = (sensor, count, height, weight)
         return next((c for c in self.cases if (c.sensor, c.count, c.height, c.weight) == wanted), None)
 
-    def case(self, sensor: str, count: int, height: float | None = None, weight: float = 1.0) -> Case:
-        """Return one cell that has a placement.
-
-        Raises
-        ------
-        SeipError
-            It has none.
-        """
-        found = self.find(sensor, count, height, weight)
-        if found is None:
-            at = "any height" if height is None else f"{height:g} m"
-            raise SeipError(f"the study has no placement of {sensor} at {at}, N = {count}, central weight {weight:g}")
-        return found
-
     def possible(self, sensor: str, count: int, height: float | None = None) -> Span | None:
         """Return the least and largest possible best coverage of a vanilla cell, or None where it has no placement."""
         found = self.find(sensor, count, height)
@@ -137,10 +115,7 @@ class CoverageStudy:
 
 
 def coverage_study(
-    site: Site,
-    models: Mapping[str, LidarModel],
-    visible: NDArray[np.bool_],
-    limits: SolverLimits = DEFAULT_LIMITS,
+    site: Site, models: Mapping[str, LidarModel], visible: NDArray[np.bool_], limits: SolverLimits = DEFAULT_LIMITS
 ) -> Generator[Progress, None, CoverageStudy]:
     """Solve every cell: each type, each height alone and all together, N = 1, 2, 4; then a sweep of central weights.
 
@@ -152,9 +127,6 @@ def coverage_study(
     site : Site
         With poses of every type and height to be studied.
     visible : (c, t) bool
-        The visibility grid.
-    limits : SolverLimits
-        For each cell.
 
     Raises
     ------

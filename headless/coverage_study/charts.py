@@ -1,7 +1,5 @@
 """Charts of a coverage study."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence
@@ -23,8 +21,7 @@ TYPE_SHIFT = 0.09  # of the step between two heights, from one type to the next
 def save_height_chart(path: str | os.PathLike[str], study: CoverageStudy, title: str) -> None:
     """Draw coverage against mounting height, a panel for each number of sensors, as PNG.
 
-    A bar above a mark ends at the coverage that the solver could not rule out.
-    Cells without a placement are left out.
+    A bar above a mark ends at the coverage that the solver could not rule out. Cells without a placement are left out.
     """
     figure, panels = _figure(len(COUNTS))
     ticks = [*(f"{height:g}" for height in study.heights), "free"]

@@ -1,7 +1,5 @@
 """Verdicts on the paper's claims about coverage, for one site."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
@@ -10,15 +8,13 @@ from headless.claims import FAILS, HOLDS, UNDECIDED, Claim, verdict, worst_verdi
 
 from .cells import CENTRAL_WEIGHTS, COUNTS, Case, CoverageStudy, Span
 
-MIN_CHANGE = 0.01
-"""Share of the region below which a gain or loss of coverage is negligible."""
+MIN_CHANGE = 0.01  # share of the region below which a gain or loss of coverage is negligible
 
 
 def coverage_claims(study: CoverageStudy) -> tuple[Claim, ...]:
     """Evaluate claims 1 to 4 and 10 of the paper on the solved cells.
 
-    Claims that compare types, heights or weights are left out where there is
-    nothing to compare.
+    Claims that compare types, heights or weights are left out where there is nothing to compare.
     """
     claims = [_four_of_the_best(study), _greedy(study)]
     if len(study.sensors) > 1:

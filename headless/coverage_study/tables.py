@@ -1,7 +1,5 @@
 """Table of a coverage study: every cell as CSV."""
 
-from __future__ import annotations
-
 import csv
 import os
 
@@ -11,24 +9,10 @@ from seip_addon.core.storage.files import whole_file
 from .cells import Case, CoverageStudy, EmptyCell
 
 COLUMNS = (
-    "sensor",
-    "height_m",
-    "count",
-    "central_weight",
-    "sensors_used",
-    "heights_used_m",
-    "tilts_used_deg",
-    "coverage",
-    "central_coverage",
-    "seen_twice",
-    "objective",
-    "bound",
-    "gap",
-    "status",
-    "greedy_objective",
-    "price_usd",
-    "note",
-)
+    "sensor", "height_m", "count", "central_weight", "sensors_used", "heights_used_m", "tilts_used_deg",
+    "coverage", "central_coverage", "seen_twice", "objective", "bound", "gap", "status", "greedy_objective",
+    "price_usd", "note",
+)  # fmt: skip
 
 
 def save_study_table(path: str | os.PathLike[str], study: CoverageStudy) -> None:

@@ -4,8 +4,6 @@ After A. H. Lang et al.: PointPillars. CVPR 2019, and Y. Yan, Y. Mao, B. Li:
 SECOND: Sparsely Embedded Convolutional Detection. Sensors 18 (2018).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -19,20 +17,11 @@ from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid
 from .settings import CLASSES, GROUND_ABOVE_BOTTOM
 
-ANCHOR_CHANNELS = 10
-"""Of an anchor: score, seven of its box, two of its direction."""
-
-DIRECTION_FROM = math.pi / 4
-"""Yaw at which the first of the two directions begins: no street of a crossing along the axes runs there."""
-
-SMOOTH_L1_BETA = 1 / 9
-"""Where the smooth L1 loss turns from a square into a line."""
-
-INITIAL_SCORE = 0.01
-"""Score of every anchor before training."""
-
-MAX_BOXES = 500
-"""Boxes of a cloud before suppression, the best first."""
+ANCHOR_CHANNELS = 10  # of an anchor: score, seven of its box, two of its direction
+DIRECTION_FROM = math.pi / 4  # yaw at which the first of the two directions begins: no street along the axes runs there
+SMOOTH_L1_BETA = 1 / 9  # where the smooth L1 loss turns from a square into a line
+INITIAL_SCORE = 0.01  # score of every anchor before training
+MAX_BOXES = 500  # boxes of a cloud before suppression, the best first
 
 
 @dataclass(frozen=True)
@@ -129,16 +118,14 @@ class AnchorHead(nn.Module):
         return found
 
 
-BACKGROUND, IGNORED = -1, -2
-"""Assignment of an anchor that must find no road user, and of one that is left out of the loss."""
+BACKGROUND, IGNORED = -1, -2  # of an anchor that must find no road user, and of one left out of the loss
 
 
 def assignment(wanted: TrainingTargets, grid: PillarGrid) -> Tensor:
     """Return which box each anchor must find: (anchors, rows, columns) int64, or `BACKGROUND` or `IGNORED`.
 
-    An anchor belongs to the road user of its class that overlaps it most, both
-    set along the nearer axis, if that is its ``positive`` share or more. The
-    anchor that overlaps a road user most belongs to it in any case.
+    An anchor belongs to the road user of its class that overlaps it most, both set along the nearer axis, if that is
+    its ``positive`` share or more. The anchor that overlaps a road user most belongs to it in any case.
     """
     device = wanted.boxes.device
     overlap = _overlaps(wanted, grid)  # (boxes, anchors, rows, columns)

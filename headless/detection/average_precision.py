@@ -1,7 +1,5 @@
 """Average precision over many frames, with confidence intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar
@@ -15,18 +13,14 @@ from seip_addon.core.estimates import Interval, percentiles
 from .frame_results import FrameResult
 from .matching import Match, Rule, match
 
-BLOCK_SECONDS = 10.0
-"""Seconds of a run whose frames are drawn together: they show much the same vehicles in much the same places."""
-
-MIN_BLOCKS = 5
-"""Blocks below which an interval would say more about chance than about the traffic."""
+BLOCK_SECONDS = 10.0  # seconds of a run whose frames are drawn together: they show much the same vehicles
+MIN_BLOCKS = 5  # blocks below which an interval would say more about chance than about the traffic
 
 RESAMPLES, RESAMPLES_AT_ONCE = 1000, 50
 
 Table = TypeVar("Table", "EvaluatedDetections", "CountedTruth")
 
-MISSED_SCORE = -np.inf
-"""The score at which a road user is found that none finds."""
+MISSED_SCORE = -np.inf  # the score at which a road user is found that none finds
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +33,7 @@ class EvaluatedDetections:
     hit : (d,) bool
         Whether it found a road user; false otherwise.
     frame : (d,) int64
-        The frame it is from.
     density : (d,) float64, per square metre
-        Of the returns around it.
     points : (d,) int64
         Returns from the road user that it found; in the box itself where it is false.
     distance : (d,) float64, metres
@@ -56,7 +48,6 @@ class EvaluatedDetections:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of detections."""
         return len(self.score)
 
 
@@ -69,7 +60,6 @@ class CountedTruth:
     score : (t,) float64
         Of the detection that found it, `MISSED_SCORE` where none did.
     frame : (t,) int64
-        The frame it is in.
     category, points, visibility, distance
         As in `GroundTruth`.
     """
@@ -82,7 +72,6 @@ class CountedTruth:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.score)
 
 
@@ -120,9 +109,8 @@ class Evaluation:
     def average_precision(self) -> float:
         """The area under the curve of the best precision at each recall or beyond; NaN where nothing had to be found.
 
-        All-point interpolation of PASCAL VOC 2010, on all detections of all
-        frames in one order. Equal scores make one point of the curve: no
-        threshold can tell them apart.
+        All-point interpolation of PASCAL VOC 2010, on all detections of all frames in one order. Equal scores make one
+        point of the curve: no threshold can tell them apart.
         """
         return float(_areas(self, np.ones((1, len(self.detections))), np.array([float(len(self.wanted))]))[0])
 
@@ -156,9 +144,8 @@ def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
 def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | None:
     """Return the 95 % interval of the average precision over other traffic like this, or None on too few blocks.
 
-    Bootstrap (Efron 1979) over blocks of `BLOCK_SECONDS` seconds of each run: frames
-    that follow each other are nearly the same, and drawn one by one they would
-    feign certainty. It says nothing about another training.
+    Bootstrap (Efron 1979) over blocks of `BLOCK_SECONDS` seconds of each run: frames that follow each other are nearly
+    the same, and drawn one by one they would feign certainty. It says nothing about another training.
 
     Parameters
     ----------
@@ -190,8 +177,7 @@ def resampled_average_precisions(evaluation: Evaluation, seed: int, resamples: i
 def balanced_score(evaluation: Evaluation) -> float:
     """Return the score with the highest F1, the harmonic mean of precision and recall; 0 without detections.
 
-    Choose it on validation frames and keep it, where false positives are
-    compared at a fixed score.
+    Choose it on validation frames and keep it, where false positives are compared at a fixed score.
     """
     curve = precision_recall(evaluation)
     if not curve.recall.any():

@@ -1,7 +1,5 @@
 """Average precision, recall and false positives by distance, returns, visibility, category and density."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

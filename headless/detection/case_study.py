@@ -1,12 +1,8 @@
 """The detection study: average precision of sensor types × numbers, against price and coverage.
 
-Placements come from the integer program, clouds from simulated traffic. One
-detector learns from all placements at once (or one from each), several times
-with other seeds, and is evaluated with each placement on traffic that none has
-seen.
+Placements come from the integer program, clouds from simulated traffic. One detector learns from all placements at once
+(or one from each), several times with other seeds, and is evaluated with each placement on traffic that none has seen.
 """
-
-from __future__ import annotations
 
 import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
@@ -14,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 from headless.coverage_study.cells import COUNTS, Case, Cell, solve_cell
 
@@ -23,7 +20,6 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, side_by_side, within
-from seip_addon.core.scans import Frame
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
@@ -33,7 +29,7 @@ from .breakdown import false_positives
 from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
 from .detector import Detector
-from .frame_results import Detections, FrameResult, frame_result
+from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
 from .kitti_precision import kitti
@@ -54,14 +50,9 @@ RULES = {
 
 MAIN_RULE = next(iter(RULES.values()))
 
-MIN_RUNS = 4
-"""One to learn from, one for validation, two for tests."""
-
-WARM_UP = 2.0
-"""Seconds from the first sample of a run to its first frame."""
-
-PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1
-"""Trainings at once on the CPU: one more than there are cores, as each also waits."""
+MIN_RUNS = 4  # one to learn from, one for validation, two for tests
+WARM_UP = 2.0  # seconds from the first sample of a run to its first frame
+PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1  # at once on the CPU: one more than cores, as each also waits
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +89,6 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     Parameters
     ----------
     origin : (3,) float64, metres
-        Of the scene's local axes.
     every : float, seconds
         From frame to frame.
 
@@ -153,8 +143,6 @@ class DetectorOutcome:
 
     Parameters
     ----------
-    evaluation : Evaluation
-        By the study's rule.
     score : float
         From which on false positives are counted: the best balance of precision and recall on validation frames.
     """
@@ -289,15 +277,7 @@ def training(
 def train_all(
     models: Sequence[ModelConfiguration], training_set: TrainingSet, folder: Path, *, device: str
 ) -> Generator[Progress, None, list[TrainedDetector]]:
-    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again.
-
-    Parameters
-    ----------
-    folder : path
-        Of the detectors' files.
-    device : str
-        Of torch.
-    """
+    """Train detectors, on the CPU one on each core; what was trained before an interruption is not trained again."""
     trainings = [training(model, training_set, device=device, store=folder / f"{model.name}.pt") for model in models]
     at_once = PARALLEL_TRAININGS if device == "cpu" else 1
     with deterministic(models[0].training.threads):  # all the time, as torch keeps one such setting for all threads
@@ -319,6 +299,8 @@ def evaluate_all(
             for model, detector in zip(models, detectors, strict=True)
             if configuration in model.configurations
         ]
+        known: dict[str, Any] = {"region": simulator.static.region, "sensors": configuration.places}
+        known["classes"] = tuple(CLASS_CATEGORIES.values())
         for results, runs in ((validated, traffic.validation), (tested, traffic.test)):
             for run in runs:
                 for number in range(len(run.times)):
@@ -329,7 +311,7 @@ def evaluate_all(
                     for model, detector in asked:
                         with deterministic(model.training.threads):
                             found = detect(detector, frame.points, frame.intensity)
-                        result = _result(simulator, configuration, run, frame, cloud, found)
+                        result = frame_result(frame, cloud, found, run=run.name, **known)
                         results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "evaluated")
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
@@ -358,22 +340,3 @@ def _outcomes(
     for configuration in model.configurations:
         frames = tuple(tested[model.name, configuration.name])
         yield DetectorOutcome(model, configuration, frames, evaluate(frames, MAIN_RULE), score)
-
-
-def _result(
-    simulator: Simulator,
-    configuration: SensorConfiguration,
-    run: SampledRun,
-    frame: Frame,
-    cloud: CloudInPlan,
-    found: Detections,
-) -> FrameResult:
-    return frame_result(
-        frame,
-        cloud,
-        found,
-        classes=tuple(CLASS_CATEGORIES.values()),
-        region=simulator.static.region,
-        sensors=configuration.places,
-        run=run.name,
-    )

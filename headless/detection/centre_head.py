@@ -12,8 +12,6 @@ Tracking. CVPR 2021, with three changes for few training steps on sparse clouds:
   score, so that suppression keeps the best placed boxes.
 """
 
-from __future__ import annotations
-
 import math
 
 import torch
@@ -31,23 +29,12 @@ from .settings import CLASSES
 OFFSET, SIZE, AXIS, HEADING, OVERLAP = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10), 10
 BOX_CHANNELS = 11
 
-TYPICAL_SIZE = (4.5, 1.8, 1.6)
-"""Length, width and height in metres; sizes are regressed as logarithms of their ratios to these."""
-
-HEAT_STD = 0.18
-"""Standard deviation of heat along and across a box, as a share of its length and width."""
-
-MIN_HEAT = 0.2
-"""Least heat of a cell that learns the box."""
-
-INITIAL_HEAT = 0.01
-"""Predicted heat of every cell before training."""
-
-MAX_PEAKS = 500
-"""Most peaks of a cloud that go into suppression, those of the highest heat."""
-
-OVERLAP_POWER = 0.5
-"""Exponent p of the predicted overlap in the score heat^(1 − p) · overlap^p."""
+TYPICAL_SIZE = (4.5, 1.8, 1.6)  # length, width and height in metres; sizes are learnt as logarithms of ratios to these
+HEAT_STD = 0.18  # standard deviation of heat along and across a box, as a share of its length and width
+MIN_HEAT = 0.2  # least heat of a cell that learns the box
+INITIAL_HEAT = 0.01  # predicted heat of every cell before training
+MAX_PEAKS = 500  # most peaks of a cloud that go into suppression, those of the highest heat
+OVERLAP_POWER = 0.5  # exponent p of the predicted overlap in the score heat^(1 − p) · overlap^p
 
 
 class CentreHead(nn.Module):

@@ -1,7 +1,5 @@
 """Data of the detection charts, taken from evaluations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

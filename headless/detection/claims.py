@@ -1,13 +1,10 @@
 """Verdicts on the paper's claims about detection, 5 to 9, for one site.
 
-Gains are in points of average precision. All figures are means over the seeds of the
-training with Student's 95 % interval; seeds are compared pair by pair. A claim
-holds where the interval lies within what is claimed, does not hold where it
-lies outside, and is undecided between the two. Where the study says "about",
-from half to twice its figure is meant.
+Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
+interval; seeds are compared pair by pair. A claim holds where the interval lies within what is claimed, does not hold
+where it lies outside, and is undecided between the two. Where the study says "about", from half to twice its figure is
+meant.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,9 +16,7 @@ import numpy as np
 
 from seip_addon.core.estimates import Interval, mean_interval
 
-FACTOR = 2.0
-"""Factor up to which a figure is about another."""
-
+FACTOR = 2.0  # factor up to which a figure is about another
 MIN_SEEDS = 3  # seeds below which nothing is decided
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
@@ -40,12 +35,9 @@ class SeedResult:
         Catalogue key.
     count : int
         N, the number of sensors that were allowed.
-    seed : int
-        Of the training.
     average_precision : float, 0 to 1
         Of vehicles at an intersection over union of 0.7 in plan.
     price : float, US dollars
-        Of all sensors.
     coverage : float, 0 to 1
         Share of targets that the placement sees.
     false_positives : float

@@ -1,14 +1,11 @@
 """Spatial index of a cloud in plan."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Float, Integer
 
-CELL_SIZE = 1.0
-"""Side of a cell in metres: a few of them make up the surroundings of a road user."""
+CELL_SIZE = 1.0  # side of a cell in metres: a few of them make up the surroundings of a road user
 
 
 class CloudInPlan:

@@ -9,7 +9,6 @@ import struct
 import sys
 import threading
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -20,6 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.storage.array_file import READ_ERRORS
 from seip_addon.core.storage.files import digest, whole_file
 
 from .anchor_head import AnchorHead
@@ -43,8 +43,6 @@ class TrainingRecord:
     ----------
     sensors : tuple of str
         Catalogue keys of the types whose clouds it has seen, in alphabetical order; none where it is not known.
-    sites : tuple of str
-        Names of the scenes.
     """
 
     sensors: tuple[str, ...] = ()
@@ -124,7 +122,8 @@ class Detector(nn.Module):
             grid = PillarGrid(**state["grid"])
             _check_grid(grid, settings)
             training_record = _training_record(state.get("experience", {}))
-            _check_finite(state["weights"])
+            if not all(bool(torch.isfinite(tensor).all()) for tensor in state["weights"].values()):
+                raise _ContentError("its weights are not finite")
             detector = cls(settings, grid, training_record=training_record)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
@@ -197,7 +196,8 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
     with fault_of(path):
         _check_archive(content)
         state: dict[str, Any] = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
-        _check_sizes(state, len(content))
+        if sum(tensor.numel() * tensor.element_size() for tensor in _tensors(state)) > len(content):
+            raise _ContentError("it has tensors larger than itself")
         version = state["version"]
         known = state["schema"] == SCHEMA and version in {_OLD_VERSION, VERSION}
         written = state.pop("digest", None)
@@ -223,23 +223,7 @@ class _ContentError(SeipError):
     """What is wrong with the content of a file, as a part of a sentence."""
 
 
-_READ_ERRORS = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    EOFError,
-    ImportError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-    pickle.UnpicklingError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
+_READ_ERRORS = (*READ_ERRORS, AssertionError, ImportError, pickle.UnpicklingError, struct.error)
 """What torch raises on reading what it has not written, or taking from it what should be there."""
 
 
@@ -255,12 +239,6 @@ def _check_archive(content: bytes) -> None:
             raise _ContentError("its checksums do not fit")
 
 
-def _check_sizes(state: object, most: int) -> None:
-    """Raise `_ContentError` where tensors are larger than their file."""
-    if sum(tensor.numel() * tensor.element_size() for tensor in _tensors(state)) > most:
-        raise _ContentError("it has tensors larger than itself")
-
-
 def _check_grid(grid: PillarGrid, settings: NetworkSettings) -> None:
     if grid.pillar != settings.pillar:
         raise _ContentError(f"it is of pillars of {settings.pillar:g} m on a grid with pillars of {grid.pillar:g} m")
@@ -270,11 +248,6 @@ def _check_grid(grid: PillarGrid, settings: NetworkSettings) -> None:
         raise _ContentError("its grid is nowhere")
     if not all(isinstance(count, int) and count > 0 for count in counts) or len(grid) > MAX_PILLARS:
         raise _ContentError("its grid has no or too many pillars")
-
-
-def _check_finite(weights: Mapping[str, Tensor]) -> None:
-    if not all(bool(torch.isfinite(tensor).all()) for tensor in weights.values()):
-        raise _ContentError("its weights are not finite")
 
 
 def _training_record(known: Mapping[str, Any]) -> TrainingRecord:

@@ -1,7 +1,5 @@
 """Ground truth and detections of one frame, with the attributes by which errors are broken down."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,8 +12,7 @@ from seip_addon.core.scans.frame import Frame
 
 from .cloud_in_plan import CloudInPlan
 
-DENSITY_RADIUS = 3.0
-"""Radius in metres of the circle around a box in which the density of returns is taken."""
+DENSITY_RADIUS = 3.0  # radius in metres of the circle around a box in which the density of returns is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +33,6 @@ class Detections:
     category: Integer
 
     def __len__(self) -> int:
-        """Return the number of boxes."""
         return len(self.score)
 
 
@@ -67,7 +63,6 @@ class GroundTruth:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.boxes)
 
 
@@ -99,7 +94,6 @@ class EvaluatedBoxes:
     distance: Float
 
     def __len__(self) -> int:
-        """Return the number of detections."""
         return len(self.boxes)
 
 
@@ -109,8 +103,6 @@ class FrameResult:
 
     Parameters
     ----------
-    run : str
-        The traffic run it is from.
     time : float, seconds
         In that run.
     """
@@ -140,11 +132,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     classes : sequence of sequence of str
         Categories of road users in each of the detector's classes.
     region : shapely geometry, metres
-        Region of interest in plan.
     sensors : (s, 3) float64, metres
-        Where the sensors are.
-    run : str
-        The traffic run that the frame is from.
     """
     labels, boxes = frame.labels, detections.boxes
     first = np.array([members[0] for members in classes], dtype=np.str_)

@@ -1,7 +1,5 @@
 """Frames of recorded runs as training samples, and checks that splits are independent."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -77,7 +75,6 @@ class LazyFrames(Sequence[Frame]):
         self._numbers, self._load = range(count), load
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self._numbers)
 
     @overload
@@ -85,7 +82,6 @@ class LazyFrames(Sequence[Frame]):
     @overload
     def __getitem__(self, index: slice) -> list[Frame]: ...
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        """Load one frame or several."""
         if isinstance(index, slice):
             return [self._load(number) for number in self._numbers[index]]
         return self._load(self._numbers[index])
@@ -141,7 +137,6 @@ class SampledRecording:
         self.get = functools.cache(self._sample)
 
     def __len__(self) -> int:
-        """Return the number of frames."""
         return len(self.recording.frames)
 
     def _sample(self, frame: int) -> TrainingSample:

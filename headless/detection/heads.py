@@ -1,7 +1,5 @@
 """Interface of detection heads: training targets, decoded boxes and the feature map's cells."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Detection in one cloud."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -11,20 +9,13 @@ from .frame_results import Detections
 from .pillars import fill_pillars
 from .rotated_boxes import in_plan, suppress
 
-MIN_SCORE = 0.05
-"""Boxes below it are not kept: average precision hardly sees them, and time is spent on each."""
-
-MAX_OVERLAP = 0.1
-"""Intersection over union in plan beyond which two boxes are one road user."""
+MIN_SCORE = 0.05  # boxes below it are not kept: average precision hardly sees them, and time is spent on each
+MAX_OVERLAP = 0.1  # intersection over union in plan beyond which two boxes are one road user
 
 
 @torch.inference_mode()
 def detect(
-    detector: Detector,
-    points: NDArray[np.float32],
-    intensity: NDArray[np.float32],
-    *,
-    least_score: float = MIN_SCORE,
+    detector: Detector, points: NDArray[np.float32], intensity: NDArray[np.float32], *, least_score: float = MIN_SCORE
 ) -> Detections:
     """Return the road users in a cloud.
 

@@ -1,17 +1,12 @@
 """Average precision as the KITTI benchmark computes it (Geiger et al. 2012; 40 points since Simonelli et al. 2019).
 
-It differs from the interpolated average precision that other tools give by the
-same names. Every road user first takes, of the detections that overlap it
-enough, the one with the best score; the scores so found give at most 41
-thresholds, each at the score whose recall is nearest to a multiple of 1/40. At
-every threshold all are matched anew, each road user with the detection that
-overlaps it most. Precision is the best at this threshold or a lower one, and
-nothing where recall does not reach. AP40 leaves out the threshold at recall
-0, AP11 takes every fourth. With fewer than 41 road users there are fewer
-thresholds, and even a perfect detector scores less than 1.
+It differs from the interpolated average precision that other tools give by the same names. Every road user first takes,
+of the detections that overlap it enough, the one with the best score; the scores so found give at most 41 thresholds,
+each at the score whose recall is nearest to a multiple of 1/40. At every threshold all are matched anew, each road user
+with the detection that overlaps it most. Precision is the best at this threshold or a lower one, and nothing where
+recall does not reach. AP40 leaves out the threshold at recall 0, AP11 takes every fourth. With fewer than 41 road users
+there are fewer thresholds, and even a perfect detector scores less than 1.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,9 +33,8 @@ class Kitti(NamedTuple):
 class _Scene:
     """A frame as this benchmark treats it: k detections in the order given, and which overlap which road user.
 
-    ``near`` holds for each road user the detections that overlap it enough,
-    and by how much; ``blamed`` (k,) whether a detection that finds nobody is
-    false; ``counted`` whether the road user counts.
+    ``near`` holds for each road user the detections that overlap it enough, and by how much; ``blamed`` (k,) whether a
+    detection that finds nobody is false; ``counted`` whether the road user counts.
     """
 
     score: Float

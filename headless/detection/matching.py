@@ -1,19 +1,14 @@
 """Match detections to ground-truth boxes by IoU, best score first.
 
-The rule: detections take turns, the best score first (of equal scores the one
-that overlaps its road user most). Each takes, of the road users that count and
-that none has taken, the one it overlaps most, if the overlap exceeds the
-threshold. One that finds none of these, but overlaps a road user that does not
-count, or has its middle outside the region, is not evaluated. All others are false.
+The rule: detections take turns, the best score first (of equal scores the one that overlaps its road user most). Each
+takes, of the road users that count and that none has taken, the one it overlaps most, if the overlap exceeds the
+threshold. One that finds none of these, but overlaps a road user that does not count, or has its middle outside the
+region, is not evaluated. All others are false.
 
-This is the rule of PASCAL VOC (Everingham et al. 2010) and COCO (Lin et al.
-2014); the two differ where road users overlap each other alone. Road users
-count that are of the categories asked for, have their middle in the region and
-return enough points. All others neither count nor punish, as the neighbouring
-classes of KITTI (Geiger et al. 2012).
+This is the rule of PASCAL VOC (Everingham et al. 2010) and COCO (Lin et al. 2014); the two differ where road users
+overlap each other alone. Road users count that are of the categories asked for, have their middle in the region and
+return enough points. All others neither count nor punish, as the neighbouring classes of KITTI (Geiger et al. 2012).
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
@@ -27,11 +22,8 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from .frame_results import FrameResult
 from .rotated_boxes import in_plan, iou_matrix, iou_matrix_3d
 
-VEHICLES = ("car", "van", "truck", "bus")
-"""Categories whose average precision the study compares."""
-
-NO_MATCH = -1
-"""Index that stands for no match, of a detection and of a road user."""
+VEHICLES = ("car", "van", "truck", "bus")  # categories whose average precision the study compares
+NO_MATCH = -1  # index that stands for no match, of a detection and of a road user
 
 
 @dataclass(frozen=True)

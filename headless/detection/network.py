@@ -3,8 +3,6 @@
 A. H. Lang et al.: PointPillars: Fast Encoders for Object Detection from Point Clouds. CVPR 2019.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import torch
@@ -13,8 +11,7 @@ from torch import Tensor, nn
 from .pillars import POINT_FEATURES
 from .settings import NetworkSettings
 
-OUTPUT_STRIDE = 2
-"""Pillars along a side of a cell of the feature map."""
+OUTPUT_STRIDE = 2  # pillars along a side of a cell of the feature map
 
 NORMALISATION_EPSILON, NORMALISATION_MOMENTUM = 1e-3, 0.03
 """Of batch normalisation: as published, but with running means that keep up with a short training."""
@@ -38,17 +35,13 @@ class PillarEncoder(nn.Module):
         self.normalisation = nn.BatchNorm1d(width, NORMALISATION_EPSILON, NORMALISATION_MOMENTUM)
 
     def forward(self, features: Tensor, pillar: Tensor, count: int) -> Tensor:
-        """Return the channels of ``count`` pillars, zero where there is no point.
+        """Return the channels of ``count`` pillars, zero where there is no point, (count, width) Tensor.
 
         Parameters
         ----------
         features : (m, 8) float32 Tensor
         pillar : (m,) int64 Tensor
             Number of each point's pillar.
-
-        Returns
-        -------
-        (count, width) Tensor
         """
         empty = features.new_zeros((count, self.linear.out_features))
         if len(features) < 2:  # nothing to normalise over while training, and one point is no object
@@ -107,7 +100,7 @@ class FeatureMap(nn.Module):
         return self.backbone.channels
 
     def forward(self, features: Tensor, pillar: Tensor, shape: tuple[int, int, int]) -> Tensor:
-        """Return the feature map of some clouds.
+        """Return the feature map of some clouds, (clouds, channels, rows / 2, columns / 2) Tensor.
 
         Parameters
         ----------
@@ -115,10 +108,6 @@ class FeatureMap(nn.Module):
             As in `PillarEncoder.forward`; pillars count through all clouds.
         shape : tuple of int
             Clouds, rows, columns.
-
-        Returns
-        -------
-        (clouds, channels, rows / 2, columns / 2) Tensor
         """
         clouds, rows, columns = shape
         pillars = self.encoder(features, pillar, clouds * rows * columns)

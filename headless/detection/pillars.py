@@ -1,8 +1,7 @@
 """Pillars: the points of a cloud grouped by the cells of a grid in plan.
 
-There is no padding: the points of all pillars stand in one array, pillar after
-pillar, so no point can appear that was not measured. The maximum over each
-pillar is taken with ``scatter_reduce``, which torch 2.13 does on two cores in a
+There is no padding: the points of all pillars stand in one array, pillar after pillar, so no point can appear that was
+not measured. The maximum over each pillar is taken with ``scatter_reduce``, which torch 2.13 does on two cores in a
 tenth of the time of a padded (pillar, point, channel) block.
 """
 
@@ -23,7 +22,6 @@ from .settings import GRID_STRIDE, GROUND_ABOVE_BOTTOM, HEADROOM
 
 POINT_FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
-
 MAX_PILLARS = 16_000_000  # of a grid at most
 
 
@@ -52,7 +50,6 @@ class PillarGrid:
     pillar: float
 
     def __len__(self) -> int:
-        """Return the number of pillars."""
         return self.columns * self.rows
 
     @property
@@ -159,9 +156,8 @@ class Pillars:
 def fill_pillars(points: NDArray[np.float32], grid: PillarGrid, most: int) -> Pillars:
     """Sort a cloud into pillars, of which each keeps some points, chosen at random.
 
-    Which ones depends on the points' coordinates alone, hashed: neither on their
-    order nor on what else is in the cloud, and choosing among those chosen
-    changes nothing.
+    Which ones depends on the points' coordinates alone, hashed: neither on their order nor on what else is in the
+    cloud, and choosing among those chosen changes nothing.
 
     Parameters
     ----------

@@ -1,7 +1,5 @@
 """Simulated recordings of traffic for each sensor configuration, made on demand."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 
@@ -11,14 +9,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import (
-    Frame,
-    MountedSensor,
-    ScanSettings,
-    Simulation,
-    StaticScene,
-    prepare,
-)
+from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
 from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
@@ -77,11 +68,6 @@ class Simulator:
 
     What stands still is cast against once for a configuration and a run, and
     kept until another is asked for: ask for the frames of one after the other.
-
-    Parameters
-    ----------
-    site : str
-        The scene's name.
     """
 
     def __init__(self, static: StaticScene, settings: ScanSettings, site: str = "") -> None:

@@ -1,24 +1,17 @@
 """IoU of rotated boxes, vectorised over pairs, and non-maximum suppression.
 
-The overlap in plan is found in the second box's own frame, where it is a
-rectangle about the origin. The first box's outline, moved point by point to the
-nearest point of that rectangle, winds around just the points that both boxes
-hold: its area is the overlap. That is what polygon clipping after Sutherland
-and Hodgman (1974) computes, without vertices that come and go, so it needs no
-tolerance and parallel or shared edges are nothing special.
+The overlap in plan is found in the second box's own frame, where it is a rectangle about the origin. The first box's
+outline, moved point by point to the nearest point of that rectangle, winds around just the points that both boxes hold:
+its area is the overlap. That is what polygon clipping after Sutherland and Hodgman (1974) computes, without vertices
+that come and go, so it needs no tolerance and parallel or shared edges are nothing special.
 """
-
-from __future__ import annotations
 
 import numpy as np
 import torch
 from torch import Tensor
 
-CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))
-"""Of a unit square, counter-clockwise."""
-
-PAIRS_AT_ONCE = 2000
-"""Pairs that stay in a core's cache; spread over threads, small steps like these take ten times as long."""
+CORNERS = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))  # of a unit square, counter-clockwise
+PAIRS_AT_ONCE = 2000  # pairs that stay in a core's cache; in threads, small steps like these take ten times as long
 
 
 def paired_iou(a: Tensor, b: Tensor) -> Tensor:

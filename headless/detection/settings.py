@@ -1,7 +1,5 @@
 """Settings of the detection network and its training, their limits, and the detector's classes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,14 +24,9 @@ CLASSES = tuple(CLASS_CATEGORIES)
 CLASS_OF = {category: number for number, group in enumerate(CLASS_CATEGORIES.values()) for category in group}
 """Index of the class of each category of road users."""
 
-GRID_STRIDE = 8
-"""Stride of the network's coarsest feature map in pillars; grids have a multiple of it along each side."""
-
-GROUND_ABOVE_BOTTOM = 1.0
-"""Metres from the bottom of a detector's extent to the lowest road."""
-
-HEADROOM = 4.5
-"""Metres from the highest road to the top of a detector's extent."""
+GRID_STRIDE = 8  # stride of the network's coarsest feature map in pillars; grids have a multiple of it along each side
+GROUND_ABOVE_BOTTOM = 1.0  # metres from the bottom of a detector's extent to the lowest road
+HEADROOM = 4.5  # metres from the highest road to the top of a detector's extent
 
 
 def _require(rules: dict[str, bool]) -> None:

@@ -1,7 +1,5 @@
 """Charts, tables and records of the detection study."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -46,15 +44,7 @@ SCHEMA = "seip-evaluation/1"
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """All that was found on one site.
-
-    Parameters
-    ----------
-    name : str
-        Of the site.
-    simulator : Simulator
-        To draw frames with.
-    """
+    """All that was found on one site."""
 
     name: str
     simulator: Simulator
@@ -183,11 +173,7 @@ def _row(outcome: DetectorOutcome) -> dict[str, str]:
 
 
 def save_record(
-    path: Path,
-    results: StudyResults,
-    claims: Sequence[Claim],
-    settings: Mapping[str, Any],
-    versions: Mapping[str, str],
+    path: Path, results: StudyResults, claims: Sequence[Claim], settings: Mapping[str, Any], versions: Mapping[str, str]
 ) -> None:
     """Write settings, sensors, figures and claims as JSON."""
     correlation, interval = results.correlation

@@ -1,7 +1,5 @@
 """Warnings where a detector is used beyond the sensor types, sites and densities that it was trained on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

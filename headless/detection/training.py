@@ -1,11 +1,8 @@
 """Training of a detector on many configurations of sensors at once.
 
-Every step takes windows about road users, each from a configuration, a frame
-and a place drawn by the seed and the number of the step: a training that was
-stopped goes on as if it had not been.
+Every step takes windows about road users, each from a configuration, a frame and a place drawn by the seed and the
+number of the step: a training that was stopped goes on as if it had not been.
 """
-
-from __future__ import annotations
 
 import math
 import os
@@ -29,23 +26,14 @@ from .frames import SampledRecording, TrainingSample, drawn, require_separate, s
 from .heads import TrainingTargets
 from .inference import detect
 from .matching import Rule
-from .pillars import PillarGrid, Pillars, fill_pillars, stacked
+from .pillars import PillarGrid, fill_pillars, stacked
 from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSettings
 
-VALIDATION_FRAMES = 18
-"""Frames of each validation, spread over the recordings set aside."""
-
-LOSS_MARGIN = 1.6
-"""Metres at the border of a window for which no loss is computed: much of what is there lies outside."""
-
-MAX_CROP_SHIFT = 0.25
-"""Share of a window that it lies beside its road user at most."""
-
-MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05
-"""Largest turn beyond quarter turns, and largest stretch, of what is learnt from."""
-
-MAX_GRADIENT_NORM = 10.0
-"""Norm beyond which a gradient is cut, as published."""
+VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
+LOSS_MARGIN = 1.6  # metres at the border of a window for which no loss is computed: much of what is there lies outside
+MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at most
+MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of what is learnt from; the turn is beyond quarter turns
+MAX_GRADIENT_NORM = 10.0  # norm beyond which a gradient is cut, as published
 
 
 @dataclass(frozen=True)
@@ -171,8 +159,13 @@ class _Run:
         """Do one step."""
         self.detector.train()
         random = np.random.default_rng([self.settings.seed, 1, self.step])
-        batch = self._batch([drawn(self.training_set, random) for _ in range(self.settings.batch)], random)
-        loss = self._loss(batch)
+        samples = [drawn(self.training_set, random) for _ in range(self.settings.batch)]
+        grid = self.detector.grid.window(*self.detector.grid.centre, self.window)
+        varied = [vary(sample, grid, random) for sample in samples]
+        pillars = stacked([fill_pillars(one.points, grid, self.detector.settings.most_points) for one in varied], grid)
+        targets = [_targets(one, self.settings.least_points, self.detector.device) for one in varied]
+        output = self.detector(pillars, (len(targets), grid.rows, grid.columns))
+        loss = torch.stack(list(self.detector.found_by.loss(output, targets, grid, LOSS_MARGIN).values())).sum()
         self.optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.detector.parameters(), MAX_GRADIENT_NORM)
@@ -249,42 +242,12 @@ class _Run:
         both = (*self.training_set, *self.aside)
         return [[sampled.recording.name, sampled.recording.traffic, len(sampled)] for sampled in both]
 
-    def _batch(self, samples: Sequence[TrainingSample], random: np.random.Generator) -> _Batch:
-        return _batch(samples, self.detector, self.window, self.settings.least_points, random)
-
-    def _loss(self, batch: _Batch) -> Tensor:
-        output = self.detector(batch.pillars, (len(batch.targets), batch.grid.rows, batch.grid.columns))
-        parts = self.detector.found_by.loss(output, batch.targets, batch.grid, LOSS_MARGIN)
-        return torch.stack(list(parts.values())).sum()
-
 
 def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecording]:
     filled = [recording for recording in recordings if len(recording)]
     if not filled:
         raise SeipError("there is no frame to learn from: simulate some first")
     return filled
-
-
-@dataclass(frozen=True, eq=False)
-class _Batch:
-    """Windows moved onto one grid."""
-
-    pillars: Pillars
-    targets: list[TrainingTargets]
-    grid: PillarGrid
-
-
-def _batch(
-    samples: Sequence[TrainingSample], detector: Detector, window: int, least_points: int, random: np.random.Generator
-) -> _Batch:
-    """Return a window of each sample, turned, mirrored and stretched."""
-    clouds, targets = [], []
-    grid = detector.grid.window(*detector.grid.centre, window)
-    for sample in samples:
-        varied = vary(sample, grid, random)
-        clouds.append(fill_pillars(varied.points, grid, detector.settings.most_points))
-        targets.append(_targets(varied, least_points, detector.device))
-    return _Batch(stacked(clouds, grid), targets, grid)
 
 
 def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator) -> TrainingSample:

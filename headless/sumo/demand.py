@@ -1,7 +1,5 @@
 """Traffic demand, departures and routes of vehicles and pedestrians, as a route file for SUMO."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -100,7 +98,6 @@ class Demand:
     pedestrians: float = 200.0
 
     def __post_init__(self) -> None:
-        """Raise SeipError where a volume cannot be meant."""
         if not 0.0 < self.flow <= 3000.0:
             raise SeipError(f"--flow must be above 0 and at most 3000 vehicles per hour and arm, not {self.flow:g}")
         if not 0.0 <= self.pedestrians <= 3000.0:

@@ -1,7 +1,5 @@
 """Traffic from SUMO (Simulation of Urban MObility, Eclipse) on an OpenDRIVE map; SUMO itself is an optional extra."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shutil
@@ -25,12 +23,8 @@ from seip_addon.core.traffic.source import TrafficFiles
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
 
-STEP_SECONDS = 0.1
-"""Seconds between two steps of the simulation."""
-
-SAMPLING_SECONDS = 0.2
-"""Seconds between two samples of the trajectories."""
-
+STEP_SECONDS = 0.1  # seconds between two steps of the simulation
+SAMPLING_SECONDS = 0.2  # seconds between two samples of the trajectories
 _LANE_CHANGE_SECONDS = 4.0  # seconds; without it SUMO's vehicles jump from lane to lane
 _MAX_SIGNAL_DISTANCE = 60.0  # metres: a crosswalk further from any traffic light belongs to none
 _PAVEMENT_REACH = 6.0  # metres that pavements reach beyond the ends of a crosswalk
@@ -64,7 +58,6 @@ class SignalPlan:
     all_red: int = 2
 
     def __post_init__(self) -> None:
-        """Raise SeipError where a duration cannot be meant."""
         if min(self.green, self.amber) < 1 or self.all_red < 0:
             raise SeipError("a signal plan needs green and amber of at least 1 s, and no negative times")
 
@@ -86,7 +79,6 @@ class Scenario:
     duration: float
 
     def __post_init__(self) -> None:
-        """Raise SeipError where the scenario cannot be simulated."""
         if not 0 <= self.seed < 2**31:
             raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
         if not 0.0 < self.duration <= 86400.0:
@@ -118,10 +110,6 @@ def simulate(
 
     Parameters
     ----------
-    map_path : path
-        The ``.xodr``.
-    folder : path
-        For SUMO's files.
     bounds : (4,) float, metres, optional
         Only roads that reach into this rectangle of the map are kept: left, low, right, high.
 
@@ -156,11 +144,7 @@ def simulate(
 
 
 def _network(
-    programs: Sumo,
-    map_path: Path,
-    network: Path,
-    signals: SignalPlan,
-    bounds: tuple[float, float, float, float] | None,
+    programs: Sumo, map_path: Path, network: Path, signals: SignalPlan, bounds: tuple[float, float, float, float] | None
 ) -> Generator[Progress, None, None]:
     """Write the network of a map: driving lanes, pavements, crossings where there are traffic lights, parking lanes."""
     road_map = read_map(map_path)

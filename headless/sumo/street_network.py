@@ -1,7 +1,5 @@
 """A street network as SUMO drives on it: edges, their lanes, and how one leads to the next."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 
@@ -12,9 +10,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.traffic.sumo_files import Attributes, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes
-
-PARKED_CLASS = "custom1"
-"""The vClass that alone may stand in a parking lane."""
+PARKED_CLASS = "custom1"  # the vClass that alone may stand in a parking lane
 
 
 @dataclass(frozen=True, eq=False)

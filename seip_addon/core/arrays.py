@@ -1,7 +1,5 @@
 """Type aliases of NumPy arrays by element type; docstrings give shapes and units."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

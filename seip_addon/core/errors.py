@@ -6,10 +6,9 @@ _MAX_LENGTH = 1000
 class SeipError(Exception):
     """A mistake of the user's, in one sentence that names the thing and the cure.
 
-    Operators turn it into a report and headless commands into one line on
-    standard error with exit status 1; every other exception is a defect of
-    this package and is left alone. A sentence that repeats more of a file than
-    anybody reads loses its middle.
+    Operators turn it into a report and headless commands into one line on standard error with exit status 1; every
+    other exception is a defect of this package and is left alone. A sentence that repeats more of a file than anybody
+    reads loses its middle.
     """
 
     def __init__(self, sentence: str) -> None:

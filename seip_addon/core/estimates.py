@@ -11,19 +11,11 @@ import numpy as np
 from .arrays import Float, Integer
 from .errors import SeipError
 
-Interval = tuple[float, float]
-"""Least and largest value that a 95 % interval holds."""
-
-TAIL_PROBABILITY = 0.025
-"""Probability on either side of an interval."""
-
-NORMAL_QUANTILE = 1.959963984540054
-"""Value that a standard normal variable exceeds with a probability of 2.5 %."""
-
+Interval = tuple[float, float]  # least and largest value that a 95 % interval holds
+TAIL_PROBABILITY = 0.025  # probability on either side of an interval
+NORMAL_QUANTILE = 1.959963984540054  # value that a standard normal variable exceeds with a probability of 2.5 %
 RESAMPLES = 2000  # of a bootstrap
-
-MIN_BATCHES = 4
-"""With fewer, no interval is given for a mean."""
+MIN_BATCHES = 4  # with fewer, no interval is given for a mean
 
 
 @dataclass(frozen=True)
@@ -65,9 +57,8 @@ def mean_of(values: Float) -> IntervalEstimate:
         Independent draws.
     """
     mean = math.fsum(values) / len(values)
-    if len(values) < 2:
-        return IntervalEstimate(mean, -math.inf, math.inf)
-    reach = NORMAL_QUANTILE * float(values.std(ddof=1)) / math.sqrt(len(values))
+    several = len(values) > 1
+    reach = NORMAL_QUANTILE * float(values.std(ddof=1)) / math.sqrt(len(values)) if several else math.inf
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
@@ -87,19 +78,16 @@ def mean_over_time(values: Float, batch: Integer) -> IntervalEstimate:
     many = np.bincount(which)
     means = np.bincount(which, values) / many
     mean, number = math.fsum(values) / len(values), len(many)
-    if number < MIN_BATCHES:
-        return IntervalEstimate(mean, -math.inf, math.inf)
-    reach = student_reach(means)
+    reach = student_reach(means) if number >= MIN_BATCHES else math.inf
     return IntervalEstimate(mean, mean - reach, mean + reach)
 
 
 def student_reach(values: Float | Sequence[float]) -> float:
     """Return half the width of the 95 % interval of a mean (Student 1908).
 
-    Exact for values from a normal distribution however few they are. Three
-    values, as from three seeds, can be drawn with replacement in ten ways only,
-    and a bootstrap over them would hold the mean in three of four cases instead
-    of 19 of 20.
+    Exact for values from a normal distribution however few they are. Three values, as from three seeds, can be drawn
+    with replacement in ten ways only, and a bootstrap over them would hold the mean in three of four cases instead of
+    19 of 20.
 
     Parameters
     ----------
@@ -164,9 +152,8 @@ def rank_correlation(x: Float | Sequence[float], y: Float | Sequence[float]) -> 
 def rank_correlation_interval(x: Sequence[float], y: Sequence[float], seed: int) -> Interval | None:
     """Return the 95 % interval of the rank correlation, or None where there are too few pairs.
 
-    Bootstrap (Efron 1979) over pairs: give one pair for each configuration,
-    with the mean over its seeds, since seeds of one configuration are no new
-    evidence of a correlation.
+    Bootstrap (Efron 1979) over pairs: give one pair for each configuration, with the mean over its seeds, since seeds
+    of one configuration are no new evidence of a correlation.
 
     Parameters
     ----------
@@ -190,9 +177,8 @@ def _ranks(values: Float) -> Float:
 def quantile_of(values: Float, share: float) -> IntervalEstimate:
     """Estimate a quantile; its interval holds whatever the distribution is (David and Nagaraja 2003, section 7.1).
 
-    The number of draws below the true quantile is binomial, so that the order
-    statistics between which it lies follow from n and ``share`` alone. The
-    value itself is the order statistic of rank ``ceil(share · n)``.
+    The number of draws below the true quantile is binomial, so that the order statistics between which it lies follow
+    from n and ``share`` alone. The value itself is the order statistic of rank ``ceil(share · n)``.
 
     Parameters
     ----------

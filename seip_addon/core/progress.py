@@ -1,11 +1,8 @@
 """Progress of long work, as values yielded by generators.
 
-Long loops of the core are generators that yield `Progress` and return their
-result: a modal operator steps them, a batch command shows a bar, a test
-exhausts them with `finish`.
+Long loops of the core are generators that yield `Progress` and return their result: a modal operator steps them, a
+batch command shows a bar, a test exhausts them with `finish`.
 """
-
-from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Generator, Sequence
@@ -16,8 +13,7 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
-REPORT_INTERVAL = 0.1
-"""Seconds between the reports of work in a thread."""
+REPORT_INTERVAL = 0.1  # seconds between the reports of work in a thread
 
 
 @dataclass(frozen=True)
@@ -67,8 +63,6 @@ def in_thread(work: Callable[[threading.Event], Result], what: str) -> Generator
     ----------
     work : callable
         Called with an event; once that is set nobody waits for the result, and the sooner it returns the better.
-    what : str
-        What is being worked on.
 
     Yields
     ------

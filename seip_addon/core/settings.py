@@ -1,7 +1,5 @@
 """Settings with help, unit and limits, from which commands and panel make their options."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """A sensor's beams in the viewport: rings on a flat road, and the edges of the vertical field of view."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -16,15 +14,13 @@ from ..core.lidar.rings import BeamRings, beam_rings
 from ..core.visibility.ring_resolution import unresolved_from
 from ..scene import contract
 from ..session import session
+from .overlays import redraw
 
 DENSE, WIDE, CONE = (0.30, 0.75, 1.0, 0.9), (1.0, 0.55, 0.10, 0.9), (1.0, 1.0, 1.0, 0.35)
 """Colours of rings within 2δ of the next, of others, and of the edges of the field of view."""
-WIDTH = 1.5
-"""Pixels."""
-UPRIGHT = 1e-5
-"""Radians."""
-LIFT = 0.05
-"""Metres of the rings above the road."""
+WIDTH = 1.5  # pixels
+UPRIGHT = 1e-5  # radians
+LIFT = 0.05  # metres of the rings above the road
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +92,6 @@ def hide() -> None:
     redraw()
 
 
-def redraw() -> None:
-    """Have all 3D views drawn anew."""
-    for manager in bpy.data.window_managers:
-        for window in manager.windows:
-            for area in window.screen.areas:
-                if area.type == "VIEW_3D":
-                    area.tag_redraw()
-
-
 def preview_of(context: bpy.types.Context) -> Preview | None:
     """Return whose beams to show: the active sensor's, else the active type's at the 3D cursor; None if unknown."""
     scene = context.scene
@@ -151,9 +138,6 @@ def _draw() -> None:
         batch.draw(shader)
     gpu.state.blend_set(before[0])
     gpu.state.depth_test_set(before[1])
-
-
-CLASSES: tuple[type, ...] = ()
 
 
 def forget() -> None:

@@ -1,7 +1,5 @@
 """The coverage on the road: its legend, and whether a view shows its colours."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..core.pictures.palette import rgb
@@ -9,8 +7,7 @@ from ..overlay import Block, Entry, Overlay
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
 
 NAME = "coverage"
-SHOWN_BY = {"MATERIAL", "VERTEX"}
-"""Ways to colour Solid shading that show the coverage."""
+SHOWN_BY = {"MATERIAL", "VERTEX"}  # ways to colour Solid shading that show the coverage
 
 
 def coverage_overlay() -> Overlay:

@@ -1,16 +1,16 @@
 """The legend in the lower right corner of a viewport: what is drawn there, and in which colours."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 
+import blf
 import bpy
+import gpu
+from gpu_extras.batch import batch_for_shader
 
 from ..overlay import Block, Colour, Entry
 
-TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0
-"""Pixels at the interface's usual scale."""
+TEXT_SIZE, LINE, SWATCH, GAP, MARGIN = 12.0, 20.0, 22.0, 8.0, 14.0  # pixels at the interface's usual scale
 PAPER: Colour = (0.06, 0.08, 0.10, 0.82)
 INK: Colour = (0.95, 0.96, 0.97, 1.0)
 EDGE: Colour = (0.55, 0.58, 0.62, 1.0)
@@ -34,8 +34,6 @@ def draw_legend(blocks: Sequence[Block], region: bpy.types.Region, area: bpy.typ
 
 def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: float) -> None:
     """Draw the legend with its lower right corner at a place in pixels."""
-    import blf  # noqa: PLC0415  # not available in background mode
-
     if not blocks:
         return
     blf.size(FONT, TEXT_SIZE * scale)
@@ -54,8 +52,6 @@ def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: 
 
 
 def _width(block: Block) -> float:
-    import blf  # noqa: PLC0415  # as above
-
     return float(max(blf.dimensions(FONT, words)[0] for words in (block.title, *(e.words for e in block.entries))))
 
 
@@ -69,8 +65,6 @@ def _draw_entry(entry: Entry, x: float, y: float, scale: float) -> None:
 
 
 def _write(words: str, x: float, y: float, scale: float) -> None:
-    import blf  # noqa: PLC0415  # as above
-
     blf.position(FONT, x, y + 3 * scale, 0)
     blf.color(FONT, *INK)
     blf.draw(FONT, words)
@@ -78,9 +72,6 @@ def _write(words: str, x: float, y: float, scale: float) -> None:
 
 def _fill(x: float, y: float, width: float, height: float, colours: tuple[Colour, ...]) -> None:
     """Fill a rectangle with a colour on the left that runs into one on the right."""
-    import gpu  # noqa: PLC0415  # not available in background mode
-    from gpu_extras.batch import batch_for_shader  # noqa: PLC0415  # as above
-
     left, right = colours
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     corners = [(x, y, 0), (x + width, y, 0), (x, y + height, 0), (x + width, y + height, 0)]

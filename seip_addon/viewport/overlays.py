@@ -3,11 +3,10 @@
 Blender's draw handlers are registered only while there is an overlay.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import bpy
+import gpu
 
 from ..overlay import Block, Overlay
 from ..session import session
@@ -46,8 +45,6 @@ def handler_count() -> int:
 
 def draw_overlays(scene: bpy.types.Scene) -> None:
     """Draw a scene's overlays into the bound framebuffer, with depth test."""
-    import gpu  # noqa: PLC0415  # not available in background mode
-
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.blend_set("ALPHA")
     for overlay in overlays_of(scene):
@@ -91,9 +88,6 @@ def _draw_view() -> None:
 def _draw_pixels() -> None:
     context = bpy.context
     draw_legend(legend_blocks(context.scene), context.region, context.area, context.preferences.system.ui_scale)
-
-
-CLASSES: tuple[type, ...] = ()
 
 
 def forget() -> None:

@@ -1,8 +1,7 @@
 """What a viewport shows, as an array of pixels: the scene, what is drawn over it, and the legend."""
 
-from __future__ import annotations
-
 import bpy
+import gpu
 import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
@@ -10,20 +9,11 @@ from numpy.typing import NDArray
 from .legend import MARGIN, draw_legend_at
 from .overlays import draw_overlays, legend_blocks
 
-WIDTH = 1920
-"""Pixels."""
+WIDTH = 1920  # pixels
 
 
 def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint8]:
-    """Return a viewport as it stands, without its panels and handles, (h, w, 4), the uppermost row first.
-
-    Parameters
-    ----------
-    area : bpy.types.Area
-        A 3D viewport.
-    """
-    import gpu  # noqa: PLC0415  # not available in background mode
-
+    """Return a viewport as it stands, without its panels and handles, (h, w, 4), the uppermost row first."""
     region = next(region for region in area.regions if region.type == "WINDOW")
     space = area.spaces.active
     view, projection = space.region_3d.view_matrix, space.region_3d.window_matrix
@@ -42,8 +32,6 @@ def view_pixels(scene: bpy.types.Scene, area: bpy.types.Area) -> NDArray[np.uint
 
 def _draw_over(scene: bpy.types.Scene, view: Matrix, projection: Matrix, height: int) -> None:
     """Draw the layers in the view's matrices and the legend in pixels."""
-    import gpu  # noqa: PLC0415  # as above
-
     scale = WIDTH / 1200.0  # a report's reader sees it smaller than its maker
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_matrix(view)

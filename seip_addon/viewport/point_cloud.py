@@ -1,10 +1,7 @@
 """The points that all sensors measure of one frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
-import bpy
 import numpy as np
 
 from ..core.pictures.cloud_colours import STATIC_COLOUR, By, cloud_colours, sensor_colour, strength_ramp
@@ -20,11 +17,7 @@ def cloud_overlay(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> Ove
     """Return a frame's points, coloured by sensor, intensity or instance."""
     layer = Layer("POINTS", np.ascontiguousarray(frame.points), cloud_colours(frame, by))
     block = Block(f"{len(frame):,} points at {frame.time:.2f} s", _entries(frame, sensors, by))
-
-    def legend(_scene: bpy.types.Scene) -> Block:
-        return block
-
-    return Overlay((layer,), legend, by)
+    return Overlay((layer,), lambda _scene: block, by)
 
 
 def _entries(frame: Frame, sensors: Sequence[MountedSensor], by: By) -> tuple[Entry, ...]:

@@ -1,8 +1,5 @@
 """Sight lines and shadows of one sensor."""
 
-from __future__ import annotations
-
-import bpy
 import numpy as np
 
 from ..core.pictures.palette import INK, rgb
@@ -13,8 +10,7 @@ from ..scene.write import LIFT
 NAME = "sight lines"
 LINE_COLOUR: Colour = (1.0, 0.85, 0.25, 0.30)
 SHADOW_COLOUR: Colour = (*rgb(INK), 0.80)
-ABOVE = LIFT + 0.02
-"""Metres of the shadows over the road: on the coverage, not in it."""
+ABOVE = LIFT + 0.02  # metres of the shadows over the road: on the coverage, not in it
 
 
 def sight_overlay(sight: SightLines, label: str) -> Overlay:
@@ -35,8 +31,4 @@ def sight_overlay(sight: SightLines, label: str) -> Overlay:
             Entry(f"{sight.in_range - sight.seen:,} in its shadows", ((*SHADOW_COLOUR[:3], 1.0),)),
         ),
     )
-
-    def legend(_scene: bpy.types.Scene) -> Block:
-        return block
-
-    return Overlay(layers, legend, label)
+    return Overlay(layers, lambda _scene: block, label)

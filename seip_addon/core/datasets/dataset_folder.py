@@ -1,11 +1,9 @@
 """A dataset's folder: samples run by run, and ``manifest.json`` with settings, counts and digests."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +72,9 @@ def write_dataset(
     if not entry["samples"]:
         raise SeipError(f"the run '{run.name}' has no frames; simulate it again")
     entry.update(finished=True, frames=len(entry["samples"]))
-    splits = {split: _names(manifest, split) for split in SPLITS}
+    splits: dict[str, list[str]] = {split: [] for split in SPLITS}
+    for each in manifest["runs"]:
+        splits[each["split"]] += [sample["name"] for sample in each["samples"]]
     index = kind.index_files(folder, splits)
     manifest["files"] = {path: _write(folder / path, content) for path, content in index.items()}
     save_json(folder / MANIFEST, manifest)
@@ -111,8 +111,9 @@ def _manifest_of(folder: Path, kind: Format, min_points: int) -> Record:
         manifest = load_manifest(folder)
         there = (manifest["format"], manifest["settings"])
         if there != (kind.key, {"min_points": min_points}):
+            settings = ", ".join(f"{name} {value}" for name, value in manifest["settings"].items())
             raise SeipError(
-                f"{folder} holds a dataset in the format {manifest['format']} with {_listed(manifest['settings'])}; "
+                f"{folder} holds a dataset in the format {manifest['format']} with {settings}; "
                 "choose another folder, or the same format and settings"
             )
         return {**manifest, "versions": versions()}
@@ -225,10 +226,6 @@ def _written(folder: Path, kind: Format, sample: Sample) -> Record:
     }
 
 
-def _names(manifest: Record, split: str) -> list[str]:
-    return [sample["name"] for entry in manifest["runs"] if entry["split"] == split for sample in entry["samples"]]
-
-
 def _write(path: Path, content: bytes) -> str:
     with whole_file(path) as temporary:
         temporary.write_bytes(content)
@@ -237,7 +234,3 @@ def _write(path: Path, content: bytes) -> str:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _listed(settings: Mapping[str, object]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in settings.items())

@@ -1,7 +1,5 @@
 """Interface of a dataset format."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

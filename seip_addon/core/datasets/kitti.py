@@ -9,12 +9,9 @@ back in LiDAR axes is exact. Evaluators leave out objects less than 25 or 40 pix
    2012; readme of the object development kit.
 """
 
-from __future__ import annotations
-
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -35,11 +32,8 @@ CLASSES = {
 }
 """KITTI has neither buses nor motorcycles; readers ignore or refuse a name that it does not have."""
 
-NO_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"
-"""The label of a frame without any."""
-
-PIXELS = 100
-"""Width and height of the empty picture and of each box in it."""
+NO_LABEL = "DontCare -1 -1 -10 0 0 0 0 -1 -1 -1 -1000 -1000 -1000 -10\n"  # the label of a frame without any
+PIXELS = 100  # width and height of the empty picture and of each box in it
 
 _IDENTITY = "1 0 0 0 0 1 0 0 0 0 1 0"
 CALIBRATION = "".join(
@@ -65,11 +59,6 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
         f"{part}/calib/{sample.name}.txt": CALIBRATION.encode,
         f"{part}/image_2/{sample.name}.png": _empty_picture,
     }
-
-
-def index_files(folder: Path, splits: Mapping[str, Sequence[str]]) -> dict[str, bytes]:  # noqa: ARG001  # names suffice
-    """Return the splits."""
-    return image_sets(splits)
 
 
 def _label_file(sample: Sample) -> bytes:
@@ -101,4 +90,6 @@ def _empty_picture() -> bytes:
     return buffer.getvalue()
 
 
-FORMAT = Format("kitti", "KITTI's object detection format", CLASSES, sample_files, index_files)
+FORMAT = Format(
+    "kitti", "KITTI's object detection format", CLASSES, sample_files, lambda _folder, splits: image_sets(splits)
+)

@@ -1,7 +1,5 @@
 """Label and split text files that several formats share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

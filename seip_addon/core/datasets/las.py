@@ -5,8 +5,6 @@ the file itself; the GPS time is the time of the simulation; the intensity has 1
 ``instance`` is the road user, −1 for none. Source: ASPRS, "LAS Specification 1.4 - R15".
 """
 
-from __future__ import annotations
-
 import importlib
 import io
 from collections.abc import Callable

@@ -8,8 +8,6 @@ information files are made from them.
 .. [2] mmdetection3d, docs/en/advanced_guides/customize_dataset.md.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

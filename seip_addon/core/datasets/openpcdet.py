@@ -8,8 +8,6 @@ these, and stays in its split, where a detection in it is a false one.
 .. [2] OpenPCDet, pcdet/datasets/custom/custom_dataset.py.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math
@@ -36,13 +34,8 @@ KITTI_CLASS = {
 """As which of KITTI's classes each is evaluated, which is all that OpenPCDet evaluates a custom dataset by."""
 
 NO_LABEL = "0.0 0.0 0.0 1.0 1.0 1.0 0.0 DontCare\n"  # the label of a frame without any
-
-PLAN_STEP = 6.4
-"""What the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m."""
-
-HEIGHT_STEP = 2.0
-"""What the range is a multiple of in height, metres: 40 voxels, as networks of voxels ask for, of 0.05 m each."""
-
+PLAN_STEP = 6.4  # what the range is a multiple of in plan, metres: 16 pillars of 0.4, 32 of 0.2 or 64 of 0.1 m
+HEIGHT_STEP = 2.0  # what the range is a multiple of in height, metres: 40 voxels of 0.05 m, as networks ask for
 MARGIN = 0.5  # between the boxes and the range, metres
 
 PILLAR_SIZE = 0.2

@@ -17,8 +17,6 @@ indices of the sensors, from 0: OpenCOOD takes negative numbers for roadside uni
    Communication", ICRA 2022; OpenCOOD, opencood/utils/transformation_utils.py.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -28,14 +26,13 @@ import numpy as np
 from ..arrays import Float
 from . import pcd
 from .format_interface import Format
-from .sample import Sample, SensorPose, TrafficRun, subset
+from .sample import Sample, TrafficRun, subset
 
 CLASSES = {"car": "Car", "van": "Van", "truck": "Truck", "bus": "Bus"}
 """OpenCOOD has a single class, vehicles, without two-wheelers and pedestrians."""
 
 SPLIT_FOLDERS = {"train": "train", "val": "validate", "test": "test"}
-MAX_AGENTS, MAX_AGENT_DISTANCE = 7, 70.0
-"""OpenCOOD's defaults of max_cav, and of COM_RANGE: metres in plan from the ego."""
+MAX_AGENTS, MAX_AGENT_DISTANCE = 7, 70.0  # OpenCOOD's defaults of max_cav and COM_RANGE (metres in plan from the ego)
 
 POINT_TYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4")])
 MIRROR = np.array([1.0, -1.0, 1.0])  # the diagonal of M
@@ -75,7 +72,8 @@ def left_handed_pose(xyz: Float, orientation: Float) -> list[float]:
 def notes(run: TrafficRun) -> tuple[str, ...]:
     """Return warnings about agents that OpenCOOD ignores by default."""
     ego = run.sensors[0]
-    far = [sensor.label for sensor in run.sensors if _distance(sensor, ego) > MAX_AGENT_DISTANCE]
+    distances = [float(np.linalg.norm(sensor.xyz[:2] - ego.xyz[:2])) for sensor in run.sensors]
+    far = [sensor.label for sensor, away in zip(run.sensors, distances, strict=True) if away > MAX_AGENT_DISTANCE]
     warnings = []
     if len(run.sensors) > MAX_AGENTS:
         warnings.append(
@@ -87,10 +85,6 @@ def notes(run: TrafficRun) -> tuple[str, ...]:
             "out unless COM_RANGE is raised"
         )
     return tuple(warnings)
-
-
-def _distance(sensor: SensorPose, other: SensorPose) -> float:
-    return float(np.linalg.norm(sensor.xyz[:2] - other.xyz[:2]))
 
 
 def _cloud(sample: Sample, number: int) -> bytes:

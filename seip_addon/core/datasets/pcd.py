@@ -4,8 +4,6 @@ All clouds are in the site's local axes, so that they lie over each other when t
 sensors stand is in the manifest. Source: Point Cloud Library, "The PCD (Point Cloud Data) file format", version 0.7.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Samples of a dataset: frames of traffic runs with their labels."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -105,8 +103,6 @@ class Sample:
         With all its labels.
     fates : tuple of str
         What becomes of each of them, one of `OUTCOMES`.
-    boxes : Labels
-        Those that are to be written.
     classes : tuple of str
         Of each box, in the words of the format.
     """

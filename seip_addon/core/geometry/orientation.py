@@ -5,12 +5,9 @@ A sensor of yaw ψ, tilt θ and roll φ is rotated as
 .. math::
     R = R_z(ψ)\, R_y(θ)\, R_x(φ):
 
-first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by θ,
-about the new y axis, so that the ray of azimuth zero and elevation zero points θ
-below the horizon; then it rolls about the new x axis.
+first its azimuth zero to ψ, counter-clockwise from +x; then its nose down by θ, about the new y axis, so that the ray
+of azimuth zero and elevation zero points θ below the horizon; then it rolls about the new x axis.
 """
-
-from __future__ import annotations
 
 import math
 
@@ -18,21 +15,16 @@ import numpy as np
 
 from ..arrays import Float
 
-VERTICAL_SINE = 1 - 1e-12
-"""Sine of the tilt from which a sensor looks straight down, or up."""
+VERTICAL_SINE = 1 - 1e-12  # sine of the tilt from which a sensor looks straight down, or up
 
 
 def orientations(yaw: Float, tilt: Float, roll: Float) -> Float:
-    """Return rotations from sensors' axes to the site's.
+    """Return rotations from sensors' axes to the site's, (..., 3, 3) float64.
 
     Parameters
     ----------
     yaw, tilt, roll : (...) float64, radians
         Of one shape. Positive tilts are nose down.
-
-    Returns
-    -------
-    (..., 3, 3) float64
     """
     sin_yaw, cos_yaw = np.sin(yaw), np.cos(yaw)
     sin_tilt, cos_tilt = np.sin(tilt), np.cos(tilt)
@@ -67,7 +59,7 @@ def angles_of(matrix: Float) -> tuple[float, float, float]:
 
 
 def rotated(vectors: Float, matrix: Float) -> Float:
-    """Return the products of a matrix and each vector.
+    """Return the products of a matrix and each vector, (n, 3) float64.
 
     They are the same bits in every batch, which those of a matrix product need not be.
 
@@ -75,10 +67,6 @@ def rotated(vectors: Float, matrix: Float) -> Float:
     ----------
     vectors : (n, 3) float64
     matrix : (3, 3) float64
-
-    Returns
-    -------
-    (n, 3) float64
     """
     x, y, z = vectors.T
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=1)

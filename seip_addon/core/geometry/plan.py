@@ -1,20 +1,16 @@
 """Triangles seen in plan: their areas, their outline, and heights on them."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Boolean, Float, Integer
 
-MIN_AREA = 1e-9
-"""Square metres in plan below which a triangle stands on edge and covers nothing."""
+MIN_AREA = 1e-9  # square metres in plan below which a triangle stands on edge and covers nothing
 
 _OVERLAY_GRID = 1e-4
 
-_BARYCENTRIC_SLACK = 1e-6
-"""Slack in barycentric coordinates, so that no point falls between two triangles."""
+_BARYCENTRIC_SLACK = 1e-6  # slack in barycentric coordinates, so that no point falls between two triangles
 
 
 def signed_area(triangles: Float) -> Float:

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..arrays import Boolean, Float, Integer
 
-_COORDINATE_BITS = 16
-"""Of each coordinate, for the order of triangles in space."""
+_COORDINATE_BITS = 16  # of each coordinate, for the order of triangles in space
 _MIN_BLOCK_TRIANGLES = 16  # triangles of a block at least
 _TOLERANCES = (0.1, 0.01, 0.001, 0.0)
 """Of the errors of all far blocks together; a point that is undecided by the first is computed with the next."""
@@ -31,10 +30,9 @@ def enclosed(points: Float, triangles: Float) -> Boolean:
 
     Notes
     -----
-    Triangles are put into blocks, and a far block counts by its moments, as in the
-    fast winding numbers of Barill et al. (2018), here with a bound on the error of
-    each. A point whose winding number is nearer to a half than all its errors
-    together is looked at with smaller ones, and in the end with none.
+    Triangles are put into blocks, and a far block counts by its moments, as in the fast winding numbers of Barill et
+    al. (2018), here with a bound on the error of each. A point whose winding number is nearer to a half than all its
+    errors together is looked at with smaller ones, and in the end with none.
     """
     if not len(triangles):
         return np.zeros(len(points), dtype=bool)
@@ -65,9 +63,8 @@ def winding_number(points: Float, triangles: Float) -> Float:
 
     Notes
     -----
-    Where shells of opposite sense lie within each other, or faces are turned at
-    random, their parts cancel and a point inside counts as outside. That does no
-    harm here: a sensor that closed faces surround sees nothing.
+    Where shells of opposite sense lie within each other, or faces are turned at random, their parts cancel and a point
+    inside counts as outside. That does no harm here: a sensor that closed faces surround sees nothing.
 
     As a test for open and messy meshes Jacobson et al. (2013).
     """
@@ -143,10 +140,9 @@ class Blocks:
         """Return the winding number of a point (3,) and a bound of its error.
 
         Blocks whose error is bounded by their part of the tolerance count by their moments, the triangles of the others
-        one by one.
-        The share of a small surface is ∫ n·v / |v|³ ds / 4π, v its place from the point: of its Taylor series about
-        the centroid the first two terms are taken. No third derivative of 1 / |v|, along whatever unit vectors, is
-        above 6 / |v|⁴.
+        one by one. The share of a small surface is ∫ n·v / |v|³ ds / 4π, v its place from the point: of its Taylor
+        series about the centroid the first two terms are taken. No third derivative of 1 / |v|, along whatever unit
+        vectors, is above 6 / |v|⁴.
         """
         away = self.centre - point
         distance = np.linalg.norm(away, axis=1)

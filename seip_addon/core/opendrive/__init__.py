@@ -8,18 +8,7 @@ from .road_map import Junction, Road, RoadMap
 from .signals import PlacedSignal, placed_signals
 
 __all__ = [
-    "Junction",
-    "LaneSurface",
-    "Outline",
-    "PlacedObject",
-    "PlacedSignal",
-    "Road",
-    "RoadMap",
-    "find_junction",
-    "junction_area",
-    "lane_surfaces",
-    "nearest_junctions",
-    "placed_objects",
-    "placed_signals",
-    "read_map",
-]
+    "Junction", "LaneSurface", "Outline", "PlacedObject", "PlacedSignal", "Road", "RoadMap",
+    "find_junction", "junction_area", "lane_surfaces", "nearest_junctions",
+    "placed_objects", "placed_signals", "read_map",
+]  # fmt: skip

@@ -25,8 +25,6 @@ class Node:
 
     Parameters
     ----------
-    element : Element
-        The element itself.
     place : str
         Where it stands, such as ``town.xodr, road 17``.
     """
@@ -131,9 +129,8 @@ def read_document(path: str | os.PathLike[str]) -> Node:
     Raises
     ------
     SeipError
-        The file cannot be read, is not well-formed, or declares a document
-        type: OpenDRIVE needs none, and through one a file can reach for other
-        files or blow up in memory.
+        The file cannot be read, is not well-formed, or declares a document type: OpenDRIVE needs none, and through one
+        a file can reach for other files or blow up in memory.
     """
     name = os.path.basename(os.fspath(path))  # noqa: PTH119 - works for any path-like, existing or not
     try:

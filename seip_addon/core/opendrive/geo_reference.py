@@ -1,13 +1,10 @@
 """From latitude and longitude to the metres of a map, where its reference is a transverse Mercator projection."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
 
-_SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563
-"""Of the ellipsoid WGS 84; GRS 80 differs from it by 0.1 mm."""
+_SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # of WGS 84; GRS 80 differs by 0.1 mm
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
 _WORLD_DATUMS = {"WGS84", "GRS80", "ETRS89"}
 
@@ -25,8 +22,7 @@ class TransverseMercator:
     def __call__(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Return easting and northing, metres, of a place in radians.
 
-        After Krüger (1912) with four terms: within 1,000 km of the central
-        meridian exact to a millimetre.
+        After Krüger (1912) with four terms: within 1,000 km of the central meridian exact to a millimetre.
         """
         n = _FLATTENING / (2 - _FLATTENING)
         radius = _SEMI_MAJOR_AXIS / (1 + n) * (1 + n**2 / 4 + n**4 / 64)

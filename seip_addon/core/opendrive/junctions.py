@@ -1,7 +1,5 @@
 """Junctions: their area, by their id or name, and by where they are."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 
@@ -35,8 +33,7 @@ def find_junction(road_map: RoadMap, surfaces: Iterable[LaneSurface], id_or_name
     Raises
     ------
     SeipError
-        There is no such junction (close ones are named), the name is not
-        unique, or the junction has no lanes.
+        There is no such junction (close ones are named), the name is not unique, or the junction has no lanes.
     """
     of_id = [junction for junction in road_map.junctions if junction.id == id_or_name]
     found = of_id or [junction for junction in road_map.junctions if junction.name == id_or_name]

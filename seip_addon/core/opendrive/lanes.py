@@ -1,7 +1,5 @@
 """The surfaces of lanes as strips between a left and a right edge."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -26,16 +24,12 @@ class LaneSurface:
 
     Parameters
     ----------
-    junction_id : str or None
-        The junction that the road belongs to.
     section : int
         Number of the lane section along the road, from 0.
     lane_id : int
         Positive to the left of the centre lane, negative to the right.
     lane_type : str
         As in the file: ``driving``, ``shoulder``, ``sidewalk``, ``parking``, ...
-    keeps_left : bool
-        Whether traffic on the road keeps to the left.
     s : (n,) float64, metres
         Where along the road the points of the edges are.
     left, right : (n, 3) float64, metres
@@ -77,9 +71,8 @@ class LaneSurface:
 def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...]:
     """Return the surfaces of all lanes of a road that have an area.
 
-    Elevation, superelevation, crossfall, shape, level lanes and lane heights
-    are part of them; across, a lane is straight from edge to edge. Lane
-    sections shorter than a micrometre are left out.
+    Elevation, superelevation, crossfall, shape, level lanes and lane heights are part of them; across, a lane is
+    straight from edge to edge. Lane sections shorter than a micrometre are left out.
 
     Parameters
     ----------
@@ -94,33 +87,20 @@ def lane_surfaces(road: Road, tolerance: float = 0.02) -> tuple[LaneSurface, ...
     Raises
     ------
     SeipError
-        The tolerance is not above zero, or the road cannot be followed within it.
+        The road cannot be followed within the tolerance.
     """
-    if not tolerance > 0.0:
-        raise SeipError(f"a tolerance of {tolerance:g} m cannot be met; choose one above zero, such as 0.02")
-    return tuple(_surfaces(road, tolerance))
-
-
-def _surfaces(road: Road, tolerance: float) -> Iterator[LaneSurface]:
+    surfaces = []
     for number, section in enumerate(road.sections):
-        lanes = (*section.left[::-1], *section.right)
+        lanes, place = (*section.left[::-1], *section.right), f"road {road.id}, lane section at s={section.start:g}"
         if not lanes:
             continue
-        s, points = sample(
-            partial(_edges, road, section),
-            _knots(road, section),
-            tolerance,
-            f"road {road.id}, lane section at s={section.start:g}",
-        )
+        s, points = sample(partial(_edges, road, section), _knots(road, section), tolerance, place)
         points = points.reshape(-1, len(lanes), 2, 3)
-        _check_size(points, f"road {road.id}, lane section at s={section.start:g}")
-        for index, lane in enumerate(lanes):
-            left, right = points[:, index, 0], points[:, index, 1]
-            surface = LaneSurface(
-                road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left, s, left, right
-            )
-            if len(surface.triangles):
-                yield surface
+        _check_size(points, place)
+        for lane, edges in zip(lanes, np.moveaxis(points, 1, 0), strict=True):
+            of_road = (road.id, road.junction_id, number, lane.id, lane.type, road.keeps_left)
+            surfaces.append(LaneSurface(*of_road, s, edges[:, 0], edges[:, 1]))
+    return tuple(surface for surface in surfaces if len(surface.triangles))
 
 
 def _check_size(points: Float, place: str) -> None:

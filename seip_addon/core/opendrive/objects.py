@@ -1,7 +1,5 @@
 """Objects of the map in map coordinates, with repeated ones expanded."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,26 +1,21 @@
 """Piecewise cubic profiles of OpenDRIVE: elevation, offsets and widths along a road."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Float
 
-_MIN_TERM = 1e-12
-"""Terms of a cubic smaller than this, in relation to the largest, move no zero that can be told."""
-_MAX_IMAGINARY_PART = 1e-9
-"""Imaginary parts below this come from rounding."""
+_MIN_TERM = 1e-12  # terms of a cubic smaller than this, in relation to the largest, move no zero that can be told
+_MAX_IMAGINARY_PART = 1e-9  # imaginary parts below this come from rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
     """Value ``a + b·ds + c·ds² + d·ds³`` with ``ds`` counted from the start of the record in force.
 
-    A record is in force up to the start of the next one; of two that start at
-    one place the later counts. Before the first record its first value holds,
-    and without any record the value is zero.
+    A record is in force up to the start of the next one; of two that start at one place the later counts. Before the
+    first record its first value holds, and without any record the value is zero.
 
     Parameters
     ----------
@@ -34,7 +29,6 @@ class Profile:
     coefficients: Float
 
     def __len__(self) -> int:
-        """Return the number of records."""
         return len(self.start)
 
     def __call__(self, s: Float) -> Float:
@@ -78,8 +72,7 @@ def profile(records: list[tuple[float, tuple[float, float, float, float]]]) -> P
     )
 
 
-ZERO_PROFILE = profile([])
-"""The profile without records: zero everywhere."""
+ZERO_PROFILE = profile([])  # the profile without records: zero everywhere
 
 
 @dataclass(frozen=True, eq=False)

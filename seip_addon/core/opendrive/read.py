@@ -1,10 +1,7 @@
 """Read an OpenDRIVE file into a `RoadMap`.
 
-Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have
-the standard's defaults.
+Written after ASAM OpenDRIVE 1.4 to 1.8; attributes that a file leaves out have the standard's defaults.
 """
-
-from __future__ import annotations
 
 import math
 import os
@@ -12,18 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SeipError
 from .document import Node, read_document
-from .profile import ZERO_PROFILE, LateralShape, Profile, lateral_shape, profile
+from .profile import ZERO_PROFILE, Profile, lateral_shape, profile
 from .reference_line import Clothoid, Piece, ReferenceLine, param_poly3, poly3
 from .road_map import (
     Corner,
     Junction,
     Lane,
     LaneSection,
-    MapPlace,
     ObjectOutline,
     Repeat,
     Road,
@@ -48,21 +43,11 @@ _MAX_TURN = 200.0 * math.pi  # radians within one geometry; a hundred turns
 def read_map(path: str | os.PathLike[str]) -> RoadMap:
     """Read an OpenDRIVE file.
 
-    Parameters
-    ----------
-    path : path-like
-        The ``.xodr`` file.
-
-    Returns
-    -------
-    RoadMap
-
     Raises
     ------
     SeipError
-        There is no such file, it is no well-formed or harmless XML, no
-        OpenDRIVE, has no roads, or a number in it makes no sense; the message
-        names the road and the element.
+        There is no such file, it is no well-formed or harmless XML, no OpenDRIVE, has no roads, or a number in it makes
+        no sense; the message names the road and the element.
     """
     root = read_document(path)
     if root.tag != "OpenDRIVE":
@@ -72,23 +57,16 @@ def read_map(path: str | os.PathLike[str]) -> RoadMap:
     if not roads:
         raise SeipError(f"{root.place} has no roads; choose an OpenDRIVE map with at least one <road>")
     header = root.child("header")
+    offset, reference = (header and header.child(name) for name in ("offset", "geoReference"))
     return RoadMap(
         name=(header.text("name", "") if header else "") or Path(path).stem,
-        header_offset=_header_offset(header.child("offset") if header else None),
-        geo_reference=_geo_reference(header.child("geoReference") if header else None),
+        header_offset=np.array([offset.number(name, 0.0) for name in ("x", "y", "z", "hdg")])
+        if offset
+        else np.zeros(4),
+        geo_reference=((reference.element.text or "").strip() or None) if reference else None,
         roads=roads,
         junctions=tuple(Junction(node.text("id"), node.text("name", "")) for node in root.children("junction")),
     )
-
-
-def _header_offset(node: Node | None) -> NDArray[np.float64]:
-    if node is None:
-        return np.zeros(4)
-    return np.array([node.number(name, 0.0) for name in ("x", "y", "z", "hdg")])
-
-
-def _geo_reference(node: Node | None) -> str | None:
-    return ((node.element.text or "").strip() or None) if node else None
 
 
 def _road(node: Node) -> Road:
@@ -104,7 +82,9 @@ def _road(node: Node) -> Road:
         superelevation=_profile(node, "lateralProfile", "superelevation"),
         left_crossfall=_crossfall(node, "left"),
         right_crossfall=_crossfall(node, "right"),
-        shape=_shape(node),
+        shape=lateral_shape(
+            [(each.number("s"), each.number("t"), _cubic(each)) for each in node.children("lateralProfile", "shape")]
+        ),
         lane_offset=_profile(node, "lanes", "laneOffset"),
         sections=_sections(node, line.end),
         objects=tuple(
@@ -180,11 +160,6 @@ def _profile(road: Node, *path: str) -> Profile:
 def _crossfall(road: Node, side: str) -> Profile:
     nodes = road.children("lateralProfile", "crossfall")
     return profile([(node.number("s"), _cubic(node)) for node in nodes if node.text("side", "both") in (side, "both")])
-
-
-def _shape(road: Node) -> LateralShape:
-    nodes = road.children("lateralProfile", "shape")
-    return lateral_shape([(node.number("s"), node.number("t"), _cubic(node)) for node in nodes])
 
 
 def _cubic(node: Node) -> tuple[float, float, float, float]:
@@ -324,9 +299,7 @@ def _signal(node: Node, road_id: str) -> RoadSignal:
         t=stands.number("t"),
         z_offset=stands.number("zOffset", 0.0),
         heading=turned + stands.number("hOffset", 0.0),
-        place=_map_place(on_map) if on_map else None,
+        place=None
+        if on_map is None
+        else (on_map.number("x"), on_map.number("y"), on_map.number("z"), on_map.number("hdg", 0.0)),
     )
-
-
-def _map_place(node: Node) -> MapPlace:
-    return MapPlace(node.number("x"), node.number("y"), node.number("z"), node.number("hdg", 0.0))

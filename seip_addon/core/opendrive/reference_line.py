@@ -4,8 +4,6 @@ All follow ASAM OpenDRIVE 1.8, section "Geometry". A piece of any kind is
 evaluated at distances along itself, to well below a nanometre.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -162,8 +160,6 @@ class ReferenceLine:
         Length of each piece.
     start : (n, 3) float64
         x, y in metres and heading in radians of each piece's start.
-    pieces : tuple of Piece
-        The curves.
     """
 
     s: Float

@@ -10,8 +10,7 @@ from ..arrays import Float
 from .profile import LateralShape, Profile
 from .reference_line import ReferenceLine
 
-MIDDLE_STEP = 10.0
-"""Metres along a road between the places that may be a map's middle."""
+MIDDLE_STEP = 10.0  # metres along a road between the places that may be a map's middle
 
 
 @dataclass(frozen=True)
@@ -64,9 +63,8 @@ class LaneSection:
 class Corner:
     """A corner of an object's outline.
 
-    ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of
-    the object, ``up`` is dz or z, all in metres; ``height`` is None where the
-    file does not say.
+    ``along`` and ``aside`` are s and t of the road (`on_road`) or u and v of the object, ``up`` is dz or z, all in
+    metres; ``height`` is None where the file does not say.
     """
 
     on_road: bool
@@ -124,16 +122,6 @@ class RoadObject:
 
 
 @dataclass(frozen=True)
-class MapPlace:
-    """Position and heading of a signal in map coordinates (metres, radians)."""
-
-    x: float
-    y: float
-    z: float
-    heading: float
-
-
-@dataclass(frozen=True)
 class RoadSignal:
     """A signal as the file gives it, in the coordinates of the road on which it stands (metres, radians).
 
@@ -141,7 +129,7 @@ class RoadSignal:
     ----------
     road_id : str
         The road on which it stands, which need not be the one that it applies to.
-    place : MapPlace or None
+    place : (x, y, z, heading) or None
         Where it stands, if the file says that in map coordinates.
     """
 
@@ -154,7 +142,7 @@ class RoadSignal:
     t: float
     z_offset: float
     heading: float
-    place: MapPlace | None
+    place: tuple[float, float, float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,10 +153,6 @@ class Road:
     ----------
     id, name : str
         As in the file; the name may be empty.
-    junction_id : str or None
-        The junction it belongs to.
-    keeps_left : bool
-        Whether traffic on it keeps to the left.
     elevation, lane_offset : Profile
         Metres over metres along the road.
     superelevation, left_crossfall, right_crossfall : Profile
@@ -221,8 +205,7 @@ class Road:
 class RoadFrame:
     """The moving axes of a road at k places.
 
-    Superelevation turns the road about its reference line, which itself climbs
-    at the pitch of the elevation profile.
+    Superelevation turns the road about its reference line, which itself climbs at the pitch of the elevation profile.
 
     Parameters
     ----------

@@ -1,7 +1,5 @@
 """Sampling of smooth curves with a tolerance on chords."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Signals of the map in map coordinates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +15,7 @@ from .road_map import Road, RoadMap, RoadSignal
 class PlacedSignal:
     """A signal in map coordinates.
 
-    Maps disagree on what is given, the foot of the post or the lamp above the
-    carriageway.
+    Maps disagree on what is given, the foot of the post or the lamp above the carriageway.
 
     Parameters
     ----------
@@ -64,7 +61,7 @@ def _placed(owner: Road, signal: RoadSignal, roads: dict[str, Road]) -> PlacedSi
             f"road {owner.id}: signal {signal.id} stands on road {signal.road_id}, which is not there; correct the map"
         )
     if signal.place is not None:
-        position, yaw = np.array([signal.place.x, signal.place.y, signal.place.z]), signal.place.heading
+        position, yaw = np.array(signal.place[:3]), signal.place[3]
     else:
         road, s = roads[signal.road_id], np.array([signal.s])
         position = road.place(s, np.array([signal.t]))[0] + np.array([0.0, 0.0, signal.z_offset])

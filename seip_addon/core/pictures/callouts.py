@@ -1,7 +1,5 @@
 """Placement of labels without overlaps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Float
@@ -15,12 +13,11 @@ DISTANCE_COSTS = 0.35 * np.repeat(np.array(LABEL_DISTANCES) - 1.0, LABEL_DIRECTI
 
 
 def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: float, subject: Float) -> Float:
-    """Return the centre of each label's box.
+    """Return the centre of each label's box, (k, 2) float64.
 
-    Labels are set one after the other without leaving the picture or touching
-    an anchor or an earlier label: near their anchors, off the subject of the
-    picture, and outwards from the middle of all anchors. A label for which
-    there is no room goes to the nearest place inside the picture.
+    Labels are set one after the other without leaving the picture or touching an anchor or an earlier label: near their
+    anchors, off the subject of the picture, and outwards from the middle of all anchors. A label for which there is no
+    room goes to the nearest place inside the picture.
 
     Parameters
     ----------
@@ -34,10 +31,6 @@ def place_callouts(anchors: Float, sizes: Float, bounds: Bounds, clearance: floa
         To keep between a label and everything else.
     subject : (m, 2) float64
         Evenly spread points of what labels had better not hide.
-
-    Returns
-    -------
-    (k, 2) float64
     """
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
     taken_low = anchors - clearance

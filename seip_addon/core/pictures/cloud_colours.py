@@ -1,7 +1,5 @@
 """Colours of the points of a cloud, on a dark ground or on a street, and what they mean."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np
@@ -13,16 +11,23 @@ from .palette import INTENSITY_COLOURS, MAX_INTENSITY, SENSOR_COLOURS, rgb
 
 By = Literal["sensor", "intensity", "instance"]
 
-STATIC_COLOUR = "#7d8790"
-"""Of points on what stands still, where road users have colours."""
-GOLDEN_RATIO = 0.618033988749895
-"""Of the colour circle, between a road user and the next: neighbours in number differ most."""
+STATIC_COLOUR = "#7d8790"  # of points on what stands still, where road users have colours
+GOLDEN_RATIO = 0.618033988749895  # of the colour circle, from a road user to the next: neighbours differ most
 
 
 def cloud_colours(frame: Frame, by: By) -> NDArray[np.float32]:
     """Return red, green, blue and opacity (n, 4) of each point, sRGB."""
     colours = np.ones((len(frame), 4), dtype=np.float32)
-    colours[:, :3] = _BY[by](frame)
+    if by == "sensor":
+        palette = np.array([rgb(colour) for colour in SENSOR_COLOURS])
+        colours[:, :3] = palette[frame.sensor % len(palette)]
+    elif by == "intensity":
+        colours[:, :3] = strength_ramp(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))
+    else:
+        hue = (frame.instance * GOLDEN_RATIO) % 1.0
+        wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, saturated
+        bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
+        colours[:, :3] = np.where((frame.instance == STATIC_INSTANCE)[:, None], np.array(rgb(STATIC_COLOUR)), bright)
     return colours
 
 
@@ -36,24 +41,3 @@ def strength_ramp(share: Float) -> Float:
 def sensor_colour(number: int) -> str:
     """Return the web colour of a sensor's points."""
     return SENSOR_COLOURS[number % len(SENSOR_COLOURS)]
-
-
-def _by_sensor(frame: Frame) -> Float:
-    palette = np.array([rgb(colour) for colour in SENSOR_COLOURS])
-    coloured: Float = palette[frame.sensor % len(palette)]
-    return coloured
-
-
-def _by_intensity(frame: Frame) -> Float:
-    return strength_ramp(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))
-
-
-def _by_instance(frame: Frame) -> Float:
-    hue = (frame.instance * GOLDEN_RATIO) % 1.0
-    wheel = np.abs((hue[:, None] + np.array([0.0, 2.0, 1.0]) / 3.0) % 1.0 * 6.0 - 3.0) - 1.0  # of HSV, full saturation
-    bright = 0.35 + 0.65 * np.clip(wheel, 0.0, 1.0)
-    coloured: Float = np.where((frame.instance == STATIC_INSTANCE)[:, None], np.array(rgb(STATIC_COLOUR)), bright)
-    return coloured
-
-
-_BY = {"sensor": _by_sensor, "intensity": _by_intensity, "instance": _by_instance}

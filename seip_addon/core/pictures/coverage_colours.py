@@ -1,7 +1,5 @@
 """Colours of targets in the viewport: coverage, weight, comparison."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,42 +1,35 @@
 """Elements shared by pictures: sensors with labels, title, PNG output."""
 
-from __future__ import annotations
-
 import io
-from typing import TYPE_CHECKING, Any
+import os
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 from PIL import Image
 
 from ..arrays import Boolean, Float
 from ..geometry.orientation import describe_tilt
+from ..placement.deployment import Deployment
+from ..site.site import Site
 from ..storage.files import whole_file
 from .callouts import place_callouts
 from .palette import INK, PAPER, SOFT_INK
-
-if TYPE_CHECKING:
-    import os
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from ..placement.deployment import Deployment
-    from ..site.site import Site
-
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "X")
 SENSOR_MARK: dict[str, Any] = {"linestyle": "none", "markersize": 11.0, "mfc": INK, "mec": PAPER, "mew": 1.6}
 HIDDEN_MARK: dict[str, Any] = {"mfc": "none", "mec": INK, "mew": 2.0}
 MARK_RADIUS, LABEL_SIZE, LABEL_PADDING = 8.0, 8.5, 0.35  # points, points, share of the size
-MAX_LABELLED = 40
-"""More sensors than these get no labels on the picture."""
+MAX_LABELLED = 40  # more sensors than these get no labels on the picture
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
     """Write a figure as PNG; the same figure gives the same bytes.
 
-    A palette of the 256 colours that stand for all others makes a file a third
-    to a fifth as large.
+    A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
     """
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
@@ -44,6 +37,19 @@ def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
     picture = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     with whole_file(path) as temporary:
         picture.save(temporary, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+
+
+def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
+    """Draw polygons by their corners, (k, 2) each; the limits of the axes stay."""
+    axes.add_collection(PolyCollection(list(polygons), **style), autolim=False)
+
+
+def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Return axes without ticks at a place given in inches."""
+    page_width, page_height = figure.get_size_inches()
+    axes = figure.add_axes((left / page_width, bottom / page_height, width / page_width, height / page_height))
+    axes.set(xticks=(), yticks=())
+    return axes
 
 
 def markers_of(deployment: Deployment) -> dict[str, str]:

@@ -1,9 +1,7 @@
 """A rendered picture with the sensors' labels and a legend on it."""
 
-from __future__ import annotations
-
+import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -12,15 +10,10 @@ from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 
 from ..arrays import Boolean, Float
+from ..placement.deployment import Deployment
+from ..site.site import Site
 from .drawing import draw_sensors, draw_title, percent, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-
-if TYPE_CHECKING:
-    import os
-
-    from ..placement.deployment import Deployment
-    from ..site.site import Site
-
 
 DPI = 160
 HEAD, FOOT, MARGIN = 0.86, 0.42, 0.2  # inches
@@ -52,14 +45,8 @@ def save_labelled_view(
 
     Parameters
     ----------
-    path : path-like
-        The picture to write.
     picture : path-like
         The rendered PNG, transparent where there is nothing.
-    deployment : Deployment
-        The chosen sensors and what they see.
-    sight : Sight
-        Where they are on the picture.
     """
     pixels = imread(str(picture))
     height, width = pixels.shape[0] / DPI, pixels.shape[1] / DPI

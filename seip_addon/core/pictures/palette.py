@@ -13,8 +13,7 @@ SENSOR_COLOURS = ("#56b4e9", "#e69f00", "#3cc99b", "#f07ac0", "#f0e442", "#d55e0
 """Told apart by colour-blind people, on a dark ground (after Okabe and Ito 2008)."""
 INTENSITY_COLOURS = ("#27408b", "#1fa187", "#fde725", "#ffffff")
 """From no intensity to `MAX_INTENSITY`, evenly spaced along its square root."""
-MAX_INTENSITY = 0.6
-"""Intensity from which on returns have the last colour; below, colours go by its square root."""
+MAX_INTENSITY = 0.6  # intensity from which on returns have the last colour; below, colours go by its square root
 
 
 def rgb(colour: str) -> tuple[float, float, float]:

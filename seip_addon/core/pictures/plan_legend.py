@@ -1,28 +1,21 @@
 """The legend beside a plan: sensors, shares of the road, and what lines and marks mean."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 
 from ..geometry.orientation import describe_tilt
-from ..site.scene_geometry import ASSUMED, FROM_MAP
+from ..placement.deployment import Deployment
+from ..site.scene_geometry import ASSUMED, FROM_MAP, SceneGeometry
+from ..site.site import Site
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
 from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.colors import Normalize
-
-    from ..placement.deployment import Deployment
-    from ..site.scene_geometry import SceneGeometry
-    from ..site.site import Site
 
 LEGEND_WIDTH = 3.7  # inches
 ROW_HEIGHT, LINE_HEIGHT, SMALL_LINE_HEIGHT = 0.42, 0.24, 0.15  # inches
@@ -48,12 +41,7 @@ class PlanLegend:
         axes.axis("off")
 
     def draw(
-        self,
-        geometry: SceneGeometry,
-        site: Site,
-        deployment: Deployment,
-        heights: Normalize,
-        notes: Sequence[str],
+        self, geometry: SceneGeometry, site: Site, deployment: Deployment, heights: Normalize, notes: Sequence[str]
     ) -> None:
         """Write all parts, with as many sensors as there is room for.
 

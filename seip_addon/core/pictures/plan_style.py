@@ -1,7 +1,5 @@
 """Colours and marks shared by a plan and its legend."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from matplotlib.colors import LinearSegmentedColormap

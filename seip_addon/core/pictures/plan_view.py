@@ -1,38 +1,30 @@
 """Plan view of a placement with scale, north, candidates and coverage."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import shapely
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
+from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..geometry.plan import closed, outline
-from ..site.scene_geometry import ASSUMED
+from ..placement.deployment import Deployment
+from ..site.scene_geometry import ASSUMED, Mesh, SceneGeometry
+from ..site.site import Site
 from ..site.target_squares import target_squares
-from .drawing import draw_sensors, draw_title, save_png
+from .drawing import add_axes, draw_polygons, draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
 from .plan_legend import LEGEND_WIDTH, PlanLegend
-from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Iterable, Sequence
-
-    from matplotlib.axes import Axes
-    from shapely.geometry.base import BaseGeometry
-
-    from ..placement.deployment import Deployment
-    from ..site.scene_geometry import Mesh, SceneGeometry
-    from ..site.site import Site
+from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
 
 DPI = 160
 MARGIN, HEAD = 0.3, 0.95  # inches
@@ -49,11 +41,7 @@ SURFACE, EDGE, TARGET, OBSTACLE, BORDER, CANDIDATE, TEXT, SENSOR = range(8)
 
 
 def save_plan_view(
-    path: str | os.PathLike[str],
-    geometry: SceneGeometry,
-    site: Site,
-    deployment: Deployment,
-    notes: Sequence[str] = (),
+    path: str | os.PathLike[str], geometry: SceneGeometry, site: Site, deployment: Deployment, notes: Sequence[str] = ()
 ) -> None:
     """Draw the site with its candidates, the chosen sensors and what they see, as PNG.
 
@@ -61,14 +49,6 @@ def save_plan_view(
 
     Parameters
     ----------
-    path : path-like
-        The picture to write.
-    geometry : SceneGeometry
-        What the scene holds; drawn in plan.
-    site : Site
-        Targets and candidates made from it.
-    deployment : Deployment
-        The chosen sensors and what they see.
     notes : sequence of str
         Notes for the reader of the plan, one sentence each.
     """
@@ -82,7 +62,8 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
     window = _window(site.region, map_height / map_width)
     figure = Figure((map_width + LEGEND_WIDTH + 3 * MARGIN, map_height + HEAD + MARGIN), dpi=DPI, facecolor=PAPER)
     FigureCanvasAgg(figure)  # measures text
-    plan = _axes(figure, MARGIN, MARGIN, map_width, map_height)
+    plan = add_axes(figure, MARGIN, MARGIN, map_width, map_height)
+    plan.spines[:].set(color=SOFT_INK, linewidth=0.8)
     plan.set(xlim=(window[0], window[2]), ylim=(window[1], window[3]), facecolor=LAND)
     shown = shapely.box(*window)
 
@@ -98,7 +79,7 @@ def draw_plan(geometry: SceneGeometry, site: Site, deployment: Deployment, notes
     draw_scale(plan, inch)
     _draw_north(plan, inch)
     draw_title(figure, site, deployment, MARGIN)
-    panel = _axes(figure, map_width + 2 * MARGIN, MARGIN, LEGEND_WIDTH, map_height)
+    panel = add_axes(figure, map_width + 2 * MARGIN, MARGIN, LEGEND_WIDTH, map_height)
     PlanLegend(panel, map_height).draw(geometry, site, deployment, norm, notes)
     return figure
 
@@ -124,16 +105,6 @@ def _bounds(region: BaseGeometry) -> tuple[float, float, float, float]:
     return (left + right) / 2, (bottom + top) / 2, right - left + around, top - bottom + around
 
 
-def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Return axes without ticks at a place given in inches."""
-    page_width, page_height = figure.get_size_inches()
-    axes = figure.add_axes((left / page_width, bottom / page_height, width / page_width, height / page_height))
-    axes.set(xticks=(), yticks=())
-    for spine in axes.spines.values():
-        spine.set(color=SOFT_INK, linewidth=0.8)
-    return axes
-
-
 def _draw_surfaces(plan: Axes, geometry: SceneGeometry, shown: BaseGeometry) -> None:
     pavement = shapely.intersection(geometry.candidate_areas, shown)
     draw_area(plan, closed(pavement, MAX_GAP), facecolor=PAVEMENT, edgecolor=KERB, linewidth=0.4, zorder=SURFACE)
@@ -149,11 +120,8 @@ def _footprint(mesh: Mesh, shown: BaseGeometry) -> BaseGeometry:
 
 def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
     colours = np.array(SEEN_COLOURS)[np.minimum(deployment.seen_by, SEEN_TWICE)]
-    squares = list(target_squares(site.targets)[:, :, :2])
-    plan.add_collection(
-        PolyCollection(squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET),
-        autolim=False,
-    )
+    squares = target_squares(site.targets)[:, :, :2]
+    draw_polygons(plan, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET)
 
 
 def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: BaseGeometry) -> Normalize:
@@ -165,13 +133,8 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
     height = triangles[:, :, 2].max(axis=1) - _road_level(site, triangles.mean(axis=1))
     norm = Normalize(0.0, 5.0 * math.ceil(max(10.0, height.max(initial=0.0)) / 5.0))
     order = np.argsort(triangles[:, :, 2].max(axis=1), kind="stable")
-    colours = HEIGHT_CMAP(norm(height[order]))
-    plan.add_collection(
-        PolyCollection(
-            triangles[order, :, :2], facecolors=colours, edgecolors="none", antialiaseds=False, zorder=OBSTACLE
-        ),
-        autolim=False,
-    )
+    style = {"facecolors": HEIGHT_CMAP(norm(height[order])), "edgecolors": "none", "antialiaseds": False}
+    draw_polygons(plan, triangles[order, :, :2], **style, zorder=OBSTACLE)
     draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
     return norm
 
@@ -194,15 +157,8 @@ def _draw_areas(plan: Axes, geometry: SceneGeometry, region: BaseGeometry) -> No
             draw_area(plan, area.polygon, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.9, zorder=BORDER)
     for area in geometry.weighted_regions:
         draw_area(plan, area.polygon, facecolor="none", edgecolor=PAPER, linewidth=2.8, zorder=BORDER)
-        draw_area(
-            plan,
-            area.polygon,
-            facecolor="none",
-            edgecolor=WEIGHTED,
-            linewidth=1.5,
-            linestyle=(0, (5, 2)),
-            zorder=BORDER,
-        )
+        dashed = {"edgecolor": WEIGHTED, "linewidth": 1.5, "linestyle": (0, (5, 2))}
+        draw_area(plan, area.polygon, facecolor="none", **dashed, zorder=BORDER)
 
 
 def draw_area(plan: Axes, area: BaseGeometry, **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
@@ -242,49 +198,24 @@ def draw_scale(plan: Axes, inch: float) -> None:
     decade = 10.0 ** math.floor(math.log10(2 * inch))
     length = max(step * decade for step in (1, 2, 5) if step * decade <= 2 * inch)
     left, bottom = plan.get_xlim()[0] + 0.25 * inch, plan.get_ylim()[0] + 0.25 * inch
-    plan.add_patch(
-        Rectangle(
-            (left - 0.13 * inch, bottom - 0.12 * inch),
-            length + 0.45 * inch,
-            0.52 * inch,
-            facecolor=PAPER,
-            alpha=0.9,
-            edgecolor="none",
-            zorder=TEXT,
-        )
-    )
+    _draw_paper(plan, left - 0.13 * inch, bottom - 0.12 * inch, length + 0.45 * inch, 0.52 * inch)
     for part in range(4):
-        colour = INK if part % 2 == 0 else PAPER
-        plan.add_patch(
-            Rectangle(
-                (left + part * length / 4, bottom),
-                length / 4,
-                0.08 * inch,
-                facecolor=colour,
-                edgecolor=INK,
-                linewidth=0.7,
-                zorder=TEXT,
-            )
-        )
+        style: Style = {"facecolor": INK if part % 2 == 0 else PAPER, "edgecolor": INK, "linewidth": 0.7}
+        plan.add_patch(Rectangle((left + part * length / 4, bottom), length / 4, 0.08 * inch, zorder=TEXT, **style))
     for at, words in ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length:g} m")):
         plan.text(left + at, bottom + 0.13 * inch, words, ha="center", va="bottom", size=8, color=INK, zorder=TEXT)
+
+
+def _draw_paper(plan: Axes, left: float, bottom: float, width: float, height: float) -> None:
+    style: Style = {"facecolor": PAPER, "alpha": 0.9, "edgecolor": "none", "zorder": TEXT}
+    plan.add_patch(Rectangle((left, bottom), width, height, **style))
 
 
 def _draw_north(plan: Axes, inch: float) -> None:
     """Draw an arrow along +y, which is north in map coordinates."""
     right, top = plan.get_xlim()[1], plan.get_ylim()[1]
     x, y = right - 0.38 * inch, top - 0.82 * inch
-    plan.add_patch(
-        Rectangle(
-            (x - 0.24 * inch, y - 0.1 * inch),
-            0.48 * inch,
-            0.8 * inch,
-            facecolor=PAPER,
-            alpha=0.9,
-            edgecolor="none",
-            zorder=TEXT,
-        )
-    )
+    _draw_paper(plan, x - 0.24 * inch, y - 0.1 * inch, 0.48 * inch, 0.8 * inch)
     arrow = np.array([(0.0, 0.42), (0.12, 0.0), (0.0, 0.09), (-0.12, 0.0)]) * inch + (x, y)
     plan.fill(arrow[:, 0], arrow[:, 1], facecolor=INK, edgecolor="none", zorder=TEXT)
     plan.text(x, y + 0.46 * inch, "N", ha="center", va="bottom", size=9, weight="bold", color=INK, zorder=TEXT)

@@ -1,13 +1,10 @@
 """A bird's-eye view of a frame of scans: which sensor measured what, and how strong the returns are."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -17,8 +14,10 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..scans.frame import Frame, Labels
 from ..scans.sensor import MountedSensor
-from .drawing import LABEL_SIZE, SENSOR_MARK, save_png
-from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SENSOR_COLOURS, SOFT_INK
+from .cloud_colours import sensor_colour
+from .drawing import LABEL_SIZE, SENSOR_MARK, add_axes, draw_polygons, save_png
+from .palette import INK, INTENSITY_COLOURS, MAX_INTENSITY, PAPER, SOFT_INK
+from .plan_style import Style
 from .plan_view import draw_area, draw_scale
 
 DPI = 160
@@ -51,13 +50,10 @@ def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSenso
     left, bottom, right, top = region.buffer(MARGIN_SHARE * max(east - west, north - south)).bounds
     tall = MAP_SIDE * (top - bottom) / (right - left)
     figure = Figure((2 * MAP_SIDE + 3 * MARGIN, tall + HEAD + FOOT), dpi=DPI, facecolor=PAPER)
-    palette = np.array([to_rgb(SENSOR_COLOURS[number % len(SENSOR_COLOURS)]) for number in range(len(sensors))])
-    colours = (
-        palette[frame.sensor],
-        INTENSITY_CMAP(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))[:, :3],
-    )
+    palette = np.array([to_rgb(sensor_colour(number)) for number in range(len(sensors))])
+    colours = (palette[frame.sensor], INTENSITY_CMAP(np.sqrt(np.minimum(frame.intensity / MAX_INTENSITY, 1.0)))[:, :3])
     for number, colour in enumerate(colours):
-        axes = _axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
+        axes = add_axes(figure, MARGIN + number * (MAP_SIDE + MARGIN), FOOT, MAP_SIDE, tall)
         axes.set(xlim=(left, right), ylim=(bottom, top), facecolor=BACKGROUND_COLOUR)
         _draw_points(axes, frame.points, colour)
         draw_area(axes, region, facecolor="none", edgecolor=SOFT_INK, linewidth=0.9)
@@ -66,13 +62,6 @@ def draw_scan(frame: Frame, region: BaseGeometry, sensors: Sequence[MountedSenso
         draw_scale(axes, (right - left) / MAP_SIDE)
     _write_around(figure, frame, sensors)
     return figure
-
-
-def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    page_width, page_height = figure.get_size_inches()
-    axes = figure.add_axes((left / page_width, bottom / page_height, width / page_width, height / page_height))
-    axes.set(xticks=(), yticks=())
-    return axes
 
 
 def _draw_points(axes: Axes, points: NDArray[np.float32], colour: Float) -> None:
@@ -98,25 +87,15 @@ def _draw_boxes(axes: Axes, labels: Labels) -> None:
     noses = np.stack([middle, middle + forward], axis=1)
     edge = np.where(labels.points.sum(axis=1) > 0, SEEN_COLOUR, UNSEEN_COLOUR)
     for shapes, closed in ((corners, True), (noses, False)):
-        axes.add_collection(
-            PolyCollection(list(shapes), closed=closed, facecolors="none", edgecolors=edge, linewidths=0.8),
-            autolim=False,
-        )
+        draw_polygons(axes, shapes, closed=closed, facecolors="none", edgecolors=edge, linewidths=0.8)
 
 
 def _draw_sensors(axes: Axes, sensors: Sequence[MountedSensor], colours: Float) -> None:
     for sensor, colour in zip(sensors, colours, strict=True):
         axes.plot(*sensor.xyz[:2], marker="o", **SENSOR_MARK | {"mfc": colour, "mec": INK, "markersize": 8.0})
-        axes.annotate(
-            sensor.label,
-            (float(sensor.xyz[0]), float(sensor.xyz[1])),
-            xytext=(7, 5),
-            textcoords="offset points",
-            color=PAPER,
-            size=LABEL_SIZE,
-            weight="bold",
-            parse_math=False,
-        )
+        place = (float(sensor.xyz[0]), float(sensor.xyz[1]))
+        style: Style = {"color": PAPER, "size": LABEL_SIZE, "weight": "bold", "parse_math": False}
+        axes.annotate(sensor.label, place, xytext=(7, 5), textcoords="offset points", **style)
 
 
 def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]) -> None:
@@ -127,10 +106,8 @@ def _write_around(figure: Figure, frame: Frame, sensors: Sequence[MountedSensor]
     counts = f"{len(frame):,} points of {len(sensors)} sensors  ·  {users}"
     figure.text(y=1 - 0.20 / height, s=f"Scan at {frame.time:.2f} s", size=17, weight="bold", color=INK, **style)
     figure.text(y=1 - 0.58 / height, s=counts, size=11, color=SOFT_INK, **style)
-    marks = [
-        Line2D([], [], color=SENSOR_COLOURS[number % len(SENSOR_COLOURS)], marker="o", linestyle="none")
-        for number in range(len(sensors))
-    ]
+    shown = range(len(sensors))
+    marks = [Line2D([], [], color=sensor_colour(number), marker="o", linestyle="none") for number in shown]
     types = [f"{sensor.label}  {sensor.model.key}" for sensor in sensors]
     legend = figure.legend(
         marks, types, loc="lower left", bbox_to_anchor=(MARGIN / width, 0.0), frameon=False, ncols=8, fontsize=9

@@ -1,7 +1,5 @@
 """Camera position that frames a set of points, and their pixel coordinates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -46,12 +44,10 @@ class Viewpoint:
 def frame(points: Float, azimuth: float, elevation: float, slopes: Float) -> Viewpoint:
     r"""Return the nearest viewpoint in a direction that has all points in its picture.
 
-    With right, up and backwards coordinates :math:`r, u, b` of a point and
-    :math:`c_r, c_u, c_b` of the camera, the point is in the picture when
-    :math:`|r - c_r| \le s_r (c_b - b)` and the same for :math:`u`. The largest
-    :math:`r + s_r b` and :math:`-r + s_r b` over all points therefore give
-    :math:`c_r` and the least :math:`c_b` directly; the larger of the two
-    :math:`c_b` is taken.
+    With right, up and backwards coordinates :math:`r, u, b` of a point and :math:`c_r, c_u, c_b` of the camera, the
+    point is in the picture when :math:`|r - c_r| \le s_r (c_b - b)` and the same for :math:`u`. The largest :math:`r +
+    s_r b` and :math:`-r + s_r b` over all points therefore give :math:`c_r` and the least :math:`c_b` directly; the
+    larger of the two :math:`c_b` is taken.
 
     Parameters
     ----------

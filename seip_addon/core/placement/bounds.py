@@ -1,22 +1,18 @@
 r"""Upper bounds by Lagrangian relaxation, and the candidates that they rule out.
 
-Let the i-th sensor that sees target j add at most :math:`a_{ji}` to the objective,
-:math:`a_{j1} \ge a_{j2} \ge …`; for coverage :math:`a_{j1} = w_j` and the others are 0
-(`multi_cover`). Relaxing the number of sensors that see a target with multipliers
-:math:`0 \le \lambda_j \le a_{j1}` leaves
+Let the i-th sensor that sees target j add at most :math:`a_{ji}` to the objective, :math:`a_{j1} \ge a_{j2} \ge …`; for
+coverage :math:`a_{j1} = w_j` and the others are 0 (`multi_cover`). Relaxing the number of sensors that see a target
+with multipliers :math:`0 \le \lambda_j \le a_{j1}` leaves
 
 .. math::
     L(\lambda) = \sum_j \sum_i \max(0, a_{ji} - \lambda_j) + \max_{x \in X} \sum_i s_i x_i,
     \qquad s_i = \sum_j V_{ij} \lambda_j,
 
-where X keeps the number of sensors and a partition into cliques (one sensor at
-most in each), and the budget and the mandatory groups are relaxed with
-multipliers of their own. Every L is an upper bound; subgradients lead to the
-smallest, which equals that of the linear relaxation (Galvão and ReVelle 1996;
-deflected steps: Camerini, Fratta and Maffioli 1975).
+where X keeps the number of sensors and a partition into cliques (one sensor at most in each), and the budget and the
+mandatory groups are relaxed with multipliers of their own. Every L is an upper bound; subgradients lead to the
+smallest, which equals that of the linear relaxation (Galvão and ReVelle 1996; deflected steps: Camerini, Fratta and
+Maffioli 1975).
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Generator
@@ -39,14 +35,9 @@ MIN_STEP = 1e-3
 REDUCTION_INTERVAL, MAX_KEPT_SHARE = 25, 0.8
 """Every so many steps candidates are ruled out, where no more than such a share of them would be left."""
 
-MAX_LISTED_CHOICES = 10_000
-"""The search ends when no more choices than these are left."""
-
-FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)
-"""Factors by which the budget's multiplier may change in a step."""
-
-PRICES_TRIED = 200
-"""Multipliers of the price that are tried for a bound on it."""
+MAX_LISTED_CHOICES = 10_000  # the search ends when no more choices than these are left
+FACTORS = (0.8, 0.95, 1.0, 1.05, 1.25)  # factors by which the budget's multiplier may change in a step
+PRICES_TRIED = 200  # multipliers of the price that are tried for a bound on it
 
 
 class HasValue(Protocol):
@@ -91,8 +82,6 @@ class Bound:
         Multipliers of the targets.
     groups : (g,) float64
         Multipliers of the mandatory groups.
-    selection : Selection
-        The relaxed problem's solution.
     """
 
     value: float
@@ -104,8 +93,7 @@ class Bound:
 def select(instance: Instance, score: Float, near: float = 0.0) -> Selection:
     """Choose the candidates of largest scores, one per clique, within the number and the budget.
 
-    The budget is relaxed; its multiplier minimises the bound, by bisection,
-    or is the best of a few near the one given.
+    The budget is relaxed; its multiplier minimises the bound, by bisection, or is the best of a few near the one given.
     """
     free = _select(instance, score, 0.0)
     if instance.affordable(float(instance.price[free.picked].sum())):
@@ -227,12 +215,8 @@ def lagrangian_bound(
     ----------
     goal : float
         Objective value to reach; the search ends when the bound falls below.
-    clock : Clock
-        Ends the search when the time is up.
     start : (t,) float64, optional
         Multipliers of the targets to begin from.
-    iterations : int
-        At most so many steps.
     layers : (top, t) float64, optional
         As for `bound_from`.
 
@@ -259,7 +243,7 @@ def lagrangian_bound(
         due = iteration % REDUCTION_INTERVAL == REDUCTION_INTERVAL - 1
         if due and len(can_reach(instance, best, goal)) <= MAX_KEPT_SHARE * len(keep):
             within = can_reach(instance, bound_from(instance, best.targets, best.groups, layers), goal)
-            if _few(instance, within):
+            if math.comb(len(within), min(instance.count, len(within) // 2)) <= MAX_LISTED_CHOICES:
                 break
             keep, instance = keep[within], instance.of(within)
             descent.restart(bound_from(instance, best.targets, best.groups, layers, exact=False))
@@ -270,8 +254,7 @@ def lagrangian_bound(
         seen = instance.visible[picked].sum(axis=0)
         # the subgradient nearest to zero: where a multiplier meets layers any number of these may count
         slope = np.maximum(
-            seen - (layers >= current.targets).sum(axis=0),
-            np.minimum(seen - (layers > current.targets).sum(axis=0), 0),
+            seen - (layers >= current.targets).sum(axis=0), np.minimum(seen - (layers > current.targets).sum(axis=0), 0)
         )
         group_slope = stretch * (instance.mandatory[:, picked].sum(axis=1) - 1.0)
         change = descent.move(np.concatenate([slope, group_slope]), goal)
@@ -291,9 +274,8 @@ def lagrangian_bound(
 def least_price(instance: Instance, bound: Bound, goal: float) -> float:
     r"""Return a price below which no placement covers ``goal``.
 
-    With the bound's multipliers and a multiplier :math:`\mu > 0` of the
-    price, a placement of price C covers at most :math:`L(\lambda, \mu) +
-    \mu C`, so that :math:`C \ge (goal - L(\lambda, \mu)) / \mu`.
+    With the bound's multipliers and a multiplier :math:`\mu > 0` of the price, a placement of price C covers at most
+    :math:`L(\lambda, \mu) + \mu C`, so that :math:`C \ge (goal - L(\lambda, \mu)) / \mu`.
     """
     score = bound.selection.net + bound.selection.multiplier * instance.price
     fixed = bound.value - bound.selection.value
@@ -310,9 +292,8 @@ def least_price(instance: Instance, bound: Bound, goal: float) -> float:
 def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     """Return the candidates that some placement reaching ``goal`` may contain, (k,) int64.
 
-    A candidate is ruled out when the bound, with that candidate forced into
-    the selection, falls short of the goal by more than `TIE_TOLERANCE`: all optimal
-    placements survive, ties included.
+    A candidate is ruled out when the bound, with that candidate forced into the selection, falls short of the goal by
+    more than `TIE_TOLERANCE`: all optimal placements survive, ties included.
     """
     picked, net = bound.selection.picked, bound.selection.net
     in_clique = np.zeros(int(instance.clique.max()) + 1)
@@ -321,10 +302,6 @@ def can_reach(instance: Instance, bound: Bound, goal: float) -> Integer:
     in_clique[instance.clique[picked]] = net[picked]
     forced = bound.value + np.minimum(net - in_clique[instance.clique], 0.0)
     return np.flatnonzero(forced >= goal - instance.margin)
-
-
-def _few(instance: Instance, candidates: Integer) -> bool:
-    return math.comb(len(candidates), min(instance.count, len(candidates) // 2)) <= MAX_LISTED_CHOICES
 
 
 def _select(instance: Instance, score: Float, multiplier: float) -> Selection:

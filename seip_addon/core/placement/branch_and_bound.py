@@ -1,37 +1,27 @@
 r"""Best-first branch and bound on the marginal gains of sensors, for coverage and multi-cover.
 
-A placement is built in greedy order: each sensor adds no more than the one
-before it, because coverage is submodular. At a node with k sensors still to
-come the best completion adds at most the sum of the k largest gains; these
-sums fall along the sorted candidates, so all children below the first that
-falls short are cut at once (cf. Nemhauser and Wolsey 1981 on maximising
-submodular set functions). The gains on top of all children come from one
-matrix product, and cut most of them before they become nodes. Where rings of
-beams overlap a little everywhere the relaxed integer program is weak and this
-bound is strong.
+A placement is built in greedy order: each sensor adds no more than the one before it, because coverage is submodular.
+At a node with k sensors still to come the best completion adds at most the sum of the k largest gains; these sums fall
+along the sorted candidates, so all children below the first that falls short are cut at once (cf. Nemhauser and Wolsey
+1981 on maximising submodular set functions). The gains on top of all children come from one matrix product, and cut
+most of them before they become nodes. Where rings of beams overlap a little everywhere the relaxed integer program is
+weak and this bound is strong.
 
-The value φ of a target by the number of sensors that see it (`multi_cover`)
-need not be concave: where two sensors must see it, one is worth nothing. With
-S chosen and l sensors still to come, a target seen n times is worth φ(n), and
-what follows adds to it no more than the least concave function
-:math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
+The value φ of a target by the number of sensors that see it (`multi_cover`) need not be concave: where two sensors must
+see it, one is worth nothing. With S chosen and l sensors still to come, a target seen n times is worth φ(n), and what
+follows adds to it no more than the least concave function :math:`φ_{n,l}` above :math:`φ(n), …, φ(n + l)`,
 
 .. math::
     F(S \cup R) \le F(S) + \sum_j w_j\, φ_{n_j(S),\,l}(n_j(R)), \quad |R| \le l,
 
-which is submodular in R, and tighter in every branch than above it: who has
-been seen once counts in full or not at all, who cannot be seen often enough
-any more counts no longer, and for the last sensor it is exact.
+which is submodular in R, and tighter in every branch than above it: who has been seen once counts in full or not at
+all, who cannot be seen often enough any more counts no longer, and for the last sensor it is exact.
 
-The largest bound among the open nodes holds for every placement that the
-search has not seen: it falls as the search goes on, and a search that is
-stopped can be continued.
+The largest bound among the open nodes holds for every placement that the search has not seen: it falls as the search
+goes on, and a search that is stopped can be continued.
 
-Weights are whole numbers, so a search meets the same placements in the same
-order on every machine.
+Weights are whole numbers, so a search meets the same placements in the same order on every machine.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Generator
@@ -47,8 +37,7 @@ from .problem import TIE_TOLERANCE
 from .reduced_problem import MAX_EXACT_DOUBLE, Instance, Numbers
 from .search_limits import Clock
 
-MIN_SENSORS = 3
-"""With so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well."""
+MIN_SENSORS = 3  # with so many sensors to come, or more, a node is bounded by Lagrangian relaxation as well
 
 MIN_CHILDREN = 60
 """... where at least so many children are left, and each sensor adds no more than the one before it ...
@@ -59,14 +48,9 @@ Elsewhere branching itself tightens the bound, and sooner.
 TRIALS, MAX_KEPT_SHARE = 4, 0.5
 """... and, after so many trials with as many sensors to come, where it leaves no more than such a share of them."""
 
-FIRST_STEPS, LATER_STEPS = 300, 100
-"""Steps that the multipliers of the first node may take, and of each later one from its parent's."""
-
-MAX_ENTRIES = 30_000_000
-"""Entries of V up to which the search keeps V as numbers: 240 MB, or twice that where weights are uneven."""
-
-OPERATIONS_PER_FETCH = 8
-"""Multiplications that take as long as fetching an entry of V."""
+FIRST_STEPS, LATER_STEPS = 300, 100  # of the multipliers of the first node, and of later ones from their parent's
+MAX_ENTRIES = 30_000_000  # entries of V that the search keeps as numbers at most: 240 MB, or twice that
+OPERATIONS_PER_FETCH = 8  # multiplications that take as long as fetching an entry of V
 
 MAX_WAITING_FOLLOWERS = 16_000_000
 """Followers of nodes that wait to be taken by their bounds: 200 MB. With so many, new nodes are searched first."""
@@ -147,12 +131,7 @@ class Search:
     """
 
     def __init__(
-        self,
-        instance: Instance,
-        goal: float,
-        *,
-        depth_first: bool = False,
-        root: tuple[Integer, Bound] | None = None,
+        self, instance: Instance, goal: float, *, depth_first: bool = False, root: tuple[Integer, Bound] | None = None
     ) -> None:
         self.instance = instance
         self.goal = instance.attainable(goal) - instance.slack
@@ -461,9 +440,8 @@ class BestPlacements(Search):
 class FirstInOrder(Search):
     """Keeps the first by `merit` of the placements that cover a goal with as many sensors as are allowed.
 
-    What is dearer or doubly covers less is cut. What is covered once and what
-    is covered twice are together a submodular function too: the largest gains
-    bound it in the same way.
+    What is dearer or doubly covers less is cut. What is covered once and what is covered twice are together a
+    submodular function too: the largest gains bound it in the same way.
 
     Parameters
     ----------

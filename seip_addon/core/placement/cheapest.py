@@ -1,7 +1,5 @@
 """The cheapest placement that reaches a coverage: partial set covering."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import replace
@@ -21,8 +19,7 @@ from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .solver import prove, scale_notes, solve_within
 from .tie_breaking import fewest
 
-MIN_TIE_BREAKING_LIMIT = 1.0
-"""Seconds, or units of work, that choosing among equally cheap placements may always take."""
+MIN_TIE_BREAKING_LIMIT = 1.0  # seconds, or units of work, that choosing among equally cheap placements may always take
 
 
 def cheapest_for_coverage(
@@ -30,10 +27,9 @@ def cheapest_for_coverage(
 ) -> Generator[Progress, None, Placement]:
     """Choose the cheapest placement that covers a share of all weight.
 
-    Among the cheapest the one that covers most is returned, and among those
-    the one that `solve` prefers. Where all prices are equal, zero included,
-    the number of sensors stands for the price: the placement has the fewest
-    that suffice. The result's objective, bound and gap are prices.
+    Among the cheapest the one that covers most is returned, and among those the one that `solve` prefers. Where all
+    prices are equal, zero included, the number of sensors stands for the price: the placement has the fewest that
+    suffice. The result's objective, bound and gap are prices.
 
     Parameters
     ----------

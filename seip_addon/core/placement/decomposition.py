@@ -1,20 +1,16 @@
 r"""Upper bounds on coverage by Lagrangian decomposition of the candidates into parts, for many sensors.
 
-The linear relaxation is weak where sensors overlap. Here the candidates are
-partitioned, and only targets that several parts see are relaxed: with
-multipliers :math:`0 \le \lambda_j \le w_j`,
+The linear relaxation is weak where sensors overlap. Here the candidates are partitioned, and only targets that several
+parts see are relaxed: with multipliers :math:`0 \le \lambda_j \le w_j`,
 
 .. math::
     L(\lambda) = \sum_j (w_j - \lambda_j) + \max_{\sum_d m_d \le N} \sum_d F_d(m_d),
 
-where :math:`F_d(m)` bounds the weight :math:`\lambda` that m sensors of part d
-cover: the optimum for one and two sensors; for more the smaller of :math:`m/2`
-times the optimum for two (coverage is submodular) and the weight of all
-targets of the part. This is Lagrangian decomposition (Guignard and Kim 1987)
-with overlaps within a part kept in its subproblem.
+where :math:`F_d(m)` bounds the weight :math:`\lambda` that m sensors of part d cover: the optimum for one and two
+sensors; for more the smaller of :math:`m/2` times the optimum for two (coverage is submodular) and the weight of all
+targets of the part. This is Lagrangian decomposition (Guignard and Kim 1987) with overlaps within a part kept in its
+subproblem.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Generator
@@ -31,8 +27,7 @@ from .search_limits import Clock
 
 MAX_ITERATIONS = 2000
 
-SENSORS_PER_PART = 1.8
-"""Sensors of a placement for each part; about two, as the overlap of pairs is computed exactly."""
+SENSORS_PER_PART = 1.8  # sensors of a placement for each part; about two, as the overlap of pairs is computed exactly
 
 
 @dataclass(frozen=True, eq=False)

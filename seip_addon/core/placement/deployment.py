@@ -1,7 +1,5 @@
 """A deployment: the chosen sensors with their coverage and price."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -87,7 +85,6 @@ class Deployment:
     weighted : float
         Share of the targets' weight that is seen.
     price : float, dollars
-        Of all sensors together.
     """
 
     sensors: tuple[Sensor, ...]
@@ -106,10 +103,7 @@ def deploy(
 
     Parameters
     ----------
-    models : mapping of str to LidarModel
-        The sensor types by catalogue key.
     visible : (c, t) bool
-        Which pose sees which target.
     chosen : (k,) int
         Indices of the chosen poses; their order breaks ties between labels.
     """

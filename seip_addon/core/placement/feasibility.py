@@ -1,24 +1,20 @@
 """A first feasible choice for mandatory groups, or the reason why there is none."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..arrays import Integer
 from ..errors import SeipError
 from ..progress import Progress
-from .integer_program import CoverProgram
+from .integer_program import CoverProgram, Expression
 from .problem import PlacementProblem
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-TIME_LIMIT = 20.0
-"""Time for a program without targets: far more than it takes, and apart from the user's time limit."""
+TIME_LIMIT = 20.0  # time for a program without targets: far more than it takes, and apart from the user's time limit
 
 
 def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) -> Generator[Progress, None, Integer]:
@@ -27,8 +23,7 @@ def starting_choice(problem: PlacementProblem, instance: Instance, solver: str) 
     Raises
     ------
     SeipError
-        The groups cannot all be served; the limit that prevents it is
-        named. Or the time was too short to tell.
+        The groups cannot all be served; the limit that prevents it is named. Or the time was too short to tell.
     """
     if len(instance.mandatory) == 0:
         return np.zeros(0, np.int64)
@@ -73,10 +68,7 @@ def _least(
 
 
 def _decide(
-    problem: PlacementProblem,
-    program: CoverProgram,
-    objective: Any,  # noqa: ANN401 -- PuLP's expressions are untyped
-    solver: str,
+    problem: PlacementProblem, program: CoverProgram, objective: Expression, solver: str
 ) -> Generator[Progress, None, Integer | None]:
     """Return the choice of largest objective, or None where there is none."""
     outcome = yield from program.maximise(objective, solver, Clock(TIME_LIMIT))

@@ -1,7 +1,5 @@
 """Greedy selection with its certificate, and swap local search."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Iterable, Iterator
 
@@ -14,11 +12,8 @@ from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-GREEDY_STARTS = 8
-"""Candidates to begin a greedy choice with, before swaps."""
-
-TABU_STEPS_PER_CANDIDATE = 2
-"""Swaps of a tabu search for each candidate."""
+GREEDY_STARTS = 8  # candidates to begin a greedy choice with, before swaps
+TABU_STEPS_PER_CANDIDATE = 2  # swaps of a tabu search for each candidate
 
 ADDED_TENURE, DROPPED_TENURE = 4, 12
 """A candidate added stays for fewer steps than the first; one dropped stays out for one to two times the second."""
@@ -112,8 +107,7 @@ def tabu_search(
 ) -> Generator[Progress, None, Integer]:
     """Make the best swap again and again, even for the worse, and return the best choice met (Glover 1989).
 
-    Who went cannot come back for a while, and who came cannot go, unless that
-    leads to a choice better than any before.
+    Who went cannot come back for a while, and who came cannot go, unless that leads to a choice better than any before.
     """
     best, end = chosen, clock.elapsed + seconds
     covered = most = instance.value(chosen)

@@ -1,7 +1,5 @@
 """The integer program in PuLP, and the solvers it can be given to by name."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import math
 import os
@@ -27,24 +25,13 @@ from .problem import TIE_TOLERANCE
 from .reduced_problem import Instance
 from .search_limits import OPERATIONS_PER_UNIT, Clock
 
-TOTAL_WEIGHT = 1e4
-"""Total weight in a program: far above the solvers' absolute tolerances of 1e-6."""
-
-TOLERANCE = 2e-6
-"""Share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled."""
-
-SOLVERS = ("highs", "cbc", "gurobi")
-"""What `solver_name` knows beside ``auto``."""
-
-
-MIN_SECONDS = 0.01
-"""Seconds that a solver is given where none are left."""
-
-OPERATIONS_PER_ENTRY = 1e4
-"""Multiplications for each entry of a program that count as the work of one branch of a solver."""
-
-UNLIMITED_SECONDS = 1e7
-"""Seconds that solvers are given where there is no limit: not all of them take infinity."""
+Expression = Any  # of PuLP, which has no types
+TOTAL_WEIGHT = 1e4  # total weight in a program: far above the solvers' absolute tolerances of 1e-6
+TOLERANCE = 2e-6  # share of all weight that a solver's tolerance of 1e-6 on every variable may add up to, doubled
+SOLVERS = ("highs", "cbc", "gurobi")  # what `solver_name` knows beside ``auto``
+MIN_SECONDS = 0.01  # seconds that a solver is given where none are left
+OPERATIONS_PER_ENTRY = 1e4  # multiplications per entry of a program that count as the work of one branch of a solver
+UNLIMITED_SECONDS = 1e7  # seconds that solvers are given where there is no limit: not all of them take infinity
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +59,8 @@ class Outcome:
 class CoverProgram:
     """The integer program of an instance, to which requirements are added stage by stage.
 
-    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z``
-    of each target are continuous: at an optimum they are integral by themselves.
-    ``z`` is right wherever the covered weight is required to be the largest
+    ``x`` are binary, the covered share ``y`` and the doubly covered share ``z`` of each target are continuous: at an
+    optimum they are integral by themselves. ``z`` is right wherever the covered weight is required to be the largest
     possible.
     """
 
@@ -83,17 +69,25 @@ class CoverProgram:
         self.model = pulp.LpProblem("placement", pulp.LpMaximize)
         self.x = [self.model.add_variable(f"x{i}", cat=pulp.LpBinary) for i in range(len(instance))]
         self._checks: list[Callable[[Integer], bool]] = [instance.feasible]
-        self._constrain()
+        self.model.setObjective(self.number)
+        if instance.count < len(instance):
+            self.model += self.number <= instance.count
+        if math.isfinite(instance.budget):
+            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
+        for group in instance.mandatory:
+            self.model += self.number_among(np.flatnonzero(group)) >= 1
+        for clique in cover_by_cliques(instance.conflict):
+            self.model += self.number_among(clique) <= 1
 
     @cached_property
-    def covered(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def covered(self) -> Expression:
         """The covered weight, scaled as `weight_scale` says."""
         for y, seen in zip(self._y, self._seen, strict=True):
             self.model += y <= seen
         return _linear(self._y, self.instance.weight * self.weight_scale)
 
     @cached_property
-    def doubly_covered(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def doubly_covered(self) -> Expression:
         """The weight covered twice or more, scaled alike; `covered` must be required to be at its maximum."""
         z = [self.model.add_variable(f"z{j}", 0, 1) for j in range(len(self.instance.weight))]
         for z_j, y, seen in zip(z, self._y, self._seen, strict=True):
@@ -106,12 +100,12 @@ class CoverProgram:
         return TOTAL_WEIGHT / self.instance.total if self.instance.total > 0 else 1.0
 
     @property
-    def number(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def number(self) -> Expression:
         """The number of sensors."""
         return _linear(self.x, np.ones(len(self.x)))
 
     @property
-    def price(self) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def price(self) -> Expression:
         """The total price, scaled as `price_scale` says."""
         return _linear(self.x, self.instance.price * self.price_scale)
 
@@ -121,11 +115,11 @@ class CoverProgram:
         dearest = float(self.instance.price.max(initial=0.0))
         return 1e4 / dearest if dearest > 0 else 1.0
 
-    def number_among(self, candidates: Integer, factors: Float | None = None) -> Any:  # noqa: ANN401 -- as above
+    def number_among(self, candidates: Integer, factors: Float | None = None) -> Expression:
         """Return the (weighted) number of sensors among some candidates."""
         return _linear([self.x[i] for i in candidates], np.ones(len(candidates)) if factors is None else factors)
 
-    def require(self, constraint: Any, check: Callable[[Integer], bool] | None = None) -> None:  # noqa: ANN401
+    def require(self, constraint: Expression, check: Callable[[Integer], bool] | None = None) -> None:
         """Add a constraint for this and all later solves, and what it means in exact arithmetic."""
         self.model += constraint
         if check is not None:
@@ -148,11 +142,7 @@ class CoverProgram:
         self.require(self.price <= limit * self.price_scale, lambda c: math.fsum(prices[c]) <= limit)
 
     def maximise(
-        self,
-        objective: Any,  # noqa: ANN401 -- as above
-        solver: str,
-        clock: Clock,
-        share: float = 1.0,
+        self, objective: Expression, solver: str, clock: Clock, share: float = 1.0
     ) -> Generator[Progress, None, Outcome]:
         """Solve for the largest objective within a share of what is left of the limits.
 
@@ -184,7 +174,7 @@ class CoverProgram:
         outcome = yield from self.maximise(self.covered, solver, clock, share)
         return replace(outcome, bound=outcome.bound / self.weight_scale)
 
-    def _at_least(self, covered: Any, goal: float) -> Any:  # noqa: ANN401 -- as above
+    def _at_least(self, covered: Expression, goal: float) -> Expression:
         """Return the requirement of a weight, lowered by what a solver may miss it by."""
         margin = max(self.instance.step / 2, TOLERANCE * self.instance.total)
         return covered >= (goal - margin) * self.weight_scale
@@ -211,18 +201,6 @@ class CoverProgram:
     def _seen(self) -> list[Any]:
         return [self.number_among(np.flatnonzero(column)) for column in self.instance.visible.T]
 
-    def _constrain(self) -> None:
-        instance = self.instance
-        self.model.setObjective(self.number)
-        if instance.count < len(instance):
-            self.model += self.number <= instance.count
-        if math.isfinite(instance.budget):
-            self.model += self.price <= instance.budget * self.price_scale * (1 + TIE_TOLERANCE)
-        for group in instance.mandatory:
-            self.model += self.number_among(np.flatnonzero(group)) >= 1
-        for clique in cover_by_cliques(instance.conflict):
-            self.model += self.number_among(clique) <= 1
-
 
 def reaching(instance: Instance, goal: float) -> CoverProgram:
     """Return the program of an instance whose placements cover at least ``goal``."""
@@ -232,7 +210,7 @@ def reaching(instance: Instance, goal: float) -> CoverProgram:
 
 
 def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
-    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen.
+    """Cover all conflicts by cliques, of each of which one candidate at most can be chosen, (k,) int64.
 
     Cliques bound the linear relaxation more tightly than the pairs they are
     made of. They are grown greedily, in order, so the result is always the same.
@@ -241,10 +219,6 @@ def cover_by_cliques(conflict: Boolean) -> Iterator[Integer]:
     ----------
     conflict : (c, c) bool
         Symmetric, false on the diagonal.
-
-    Yields
-    ------
-    (k,) int64
     """
     left = np.triu(conflict)
     for first in range(len(conflict)):
@@ -287,7 +261,7 @@ def check_solver(solver: str) -> str:
     return f"{_PULP_NAME[solver]} {importlib.metadata.version(_PACKAGE[solver])}, PuLP {pulp.__version__}"
 
 
-def _linear(variables: list[Any], factors: Float) -> Any:  # noqa: ANN401 -- PuLP's expressions are untyped
+def _linear(variables: list[Any], factors: Float) -> Expression:
     return pulp.LpAffineExpression(list(zip(variables, factors.tolist(), strict=True)))
 
 

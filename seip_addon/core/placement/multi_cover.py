@@ -1,7 +1,5 @@
 """Multi-cover objective: value of a target by the number of sensors that see it, and its upper bound."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

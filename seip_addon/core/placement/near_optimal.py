@@ -1,7 +1,5 @@
 """The near-optimal set: all placements whose coverage is within a share of the best."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -17,9 +15,7 @@ from .reduced_problem import Instance, make_instance
 from .search_limits import Clock
 
 MAX_LISTED = 10_000  # placements that are listed at most
-
-MAX_BRANCHES = 300
-"""Branches that are searched at most: no clock decides what is found."""
+MAX_BRANCHES = 300  # branches that are searched at most: no clock decides what is found
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +47,6 @@ class NearOptimalSet:
     positions: int
 
     def __len__(self) -> int:
-        """Return how many were found."""
         return len(self.placements)
 
     @property

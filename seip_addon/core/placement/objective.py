@@ -1,7 +1,5 @@
 """Objective and constraints of a placement, and the problem that they make of a site."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Generator, Mapping, Sequence
@@ -20,12 +18,8 @@ from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_g
 from .deployment import Deployment, deploy
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 
-DEFAULT_COUNT = 4
-"""Sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four."""
-
-
-MOVED = "moved by hand"
-"""Status of a placement whose sensors hang where a hand has put them."""
+DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
+MOVED = "moved by hand"  # status of a placement whose sensors hang where a hand has put them
 MOVED_MESSAGE = "Moved by hand: evaluated where the sensors hang; nothing is proven of it."
 CHOSEN_FOR = "chosen "  # how a note begins that says what was optimised in place of nominal coverage
 
@@ -98,12 +92,8 @@ class Solution:
     ----------
     objective : Objective
         With the number of sensors filled in where none was asked for.
-    placement : Placement
-        With its certificate.
     greedy : Placement or None
         The greedy answer to the same question; None for the reverse problem.
-    deployment : Deployment
-        The chosen sensors and what they see.
     """
 
     objective: Objective
@@ -127,12 +117,8 @@ def certificate(status: str, gap: float | None, *, cheapest: bool) -> str:
 
     Parameters
     ----------
-    status : str
-        Of the placement.
     gap : float or None
         Between bound and objective, as a share of the objective; None or infinite where nothing bounds it.
-    cheapest : bool
-        Whether the least price was sought.
     """
     if status == MOVED:
         return MOVED_MESSAGE
@@ -162,9 +148,6 @@ def placement_problem(
     Parameters
     ----------
     visible : (c, t) bool
-        The visibility grid.
-    models : mapping of str to LidarModel
-        By catalogue key.
 
     Raises
     ------
@@ -211,9 +194,6 @@ def optimise(
     Parameters
     ----------
     visible : (c, t) bool
-        The visibility grid.
-    models : mapping of str to LidarModel
-        By catalogue key.
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """The placement problem and its solution."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -10,8 +8,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer, Text
 from ..errors import SeipError
 
-TIE_TOLERANCE = 1e-9
-"""Placements count as equal when they differ by less than this fraction of all weight, or of the price."""
+TIE_TOLERANCE = 1e-9  # placements are equal that differ by less than this share of all weight, or of the price
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +21,8 @@ class PlacementProblem:
         \sum_i x_i \le N, \quad \sum_i p_i x_i \le C, \quad
         x_i \in \{0, 1\},\; 0 \le y_j \le 1,
 
-    with at most one pose per position, at least one pose of each mandatory
-    group, and no two poses closer than the minimum distance. The vanilla
-    problem has unit weights.
+    with at most one pose per position, at least one pose of each mandatory group, and no two poses closer than the
+    minimum distance. The vanilla problem has unit weights.
 
     Parameters
     ----------
@@ -41,13 +37,10 @@ class PlacementProblem:
     xyz : (c, 3) float64, metres
         Position of each pose's sensor.
     labels : (c,) str
-        Sensor type of each pose. Poses are put into the order of x, y, z and
-        label before anything else, so that the order in which they are given
-        never matters.
+        Sensor type of each pose. Poses are put into the order of x, y, z and label before anything else, so that the
+        order in which they are given never matters.
     mandatory : (g, c) bool, optional
         Each row is a group of poses of which at least one must be chosen.
-    mandatory_names : (g,) str, optional
-        Names of those groups.
     forbidden : (c,) bool, optional
         Poses that must not be chosen.
     count : int, optional
@@ -77,7 +70,6 @@ class PlacementProblem:
     min_distance: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise SeipError on contradictions that can be told without solving."""
         self._check_values()
         self._check_limits()
         for group, name in zip(self.mandatory_groups & self.allowed, self.group_names, strict=True):
@@ -172,12 +164,8 @@ class Placement:
         ``optimal`` (proven) or ``feasible``.
     solver : str
         Name and version of what solved it.
-    seconds : float
-        Time it took.
     covered : float
         Weight of the targets that some chosen sensor sees.
-    price : float
-        Total price.
     notes : tuple of str
         Notes on the solution, one sentence each.
     """

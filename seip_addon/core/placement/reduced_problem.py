@@ -16,23 +16,15 @@ from ..errors import SeipError
 from .multi_cover import COVERAGE, MultiCover
 from .problem import TIE_TOLERANCE, PlacementProblem, canonical_order
 
-MAX_EXACT_DOUBLE = 2**53
-"""Sums of whole numbers up to here are exact in double precision."""
-
-MAX_EXACT_SINGLE = 2**24
-"""Sums of whole numbers up to here are exact in single precision, whatever the order of summation."""
+MAX_EXACT_DOUBLE = 2**53  # sums of whole numbers up to here are exact in double precision
+MAX_EXACT_SINGLE = 2**24  # sums of whole numbers up to here are exact in single precision, in any order
 
 INCOMMENSURABLE_TOTAL = 2**50
 """Total of weights that have no common unit: sums stay exact in double precision, rounding below `TIE_TOLERANCE`."""
 
-MICROMETRE = 1e-6
-"""Metres to which positions are rounded: posts as far apart as asked for are not too close by less than this."""
-
-WHOLE_SLACK = 0.25
-"""Whole weights differ by one or not at all."""
-
-DENOMINATORS = range(1, 13)
-"""A common unit of all weights is sought among these parts of the smallest one."""
+MICROMETRE = 1e-6  # metres to which positions are rounded: posts may be too close by less than this
+WHOLE_SLACK = 0.25  # whole weights differ by one or not at all
+DENOMINATORS = range(1, 13)  # a common unit of all weights is sought among these parts of the smallest one
 
 
 Numbers = NDArray[np.floating[Any]]
@@ -47,8 +39,7 @@ class Instance:
     visible : (c, t) bool
         No column is empty and no two are equal.
     weight : (t,) float64
-        Weights of the merged targets: whole numbers, so that sums are exact and
-        ties are ties on every machine.
+        Weights of the merged targets: whole numbers, so that sums are exact and ties are ties on every machine.
     step : float
         Smallest difference between two covered weights that counts.
     slack : float
@@ -87,7 +78,6 @@ class Instance:
     cover: MultiCover = COVERAGE
 
     def __len__(self) -> int:
-        """Return the number of candidates."""
         return len(self.visible)
 
     @cached_property
@@ -287,11 +277,10 @@ def _cliques(conflict: Boolean) -> Integer:
 def _superfluous(instance: Instance, positions: Integer) -> Boolean:
     """Mark candidates that no canonical optimum contains.
 
-    A candidate that sees nothing and serves no mandatory group only adds to
-    the number of sensors. A candidate at the same position as another that
-    sees all it sees, is in all its groups, excludes nothing more and is
-    cheaper (or costs the same and comes first) can always give way to it:
-    coverage, number, price, double coverage and order all stay or improve.
+    A candidate that sees nothing and serves no mandatory group only adds to the number of sensors. A candidate at the
+    same position as another that sees all it sees, is in all its groups, excludes nothing more and is cheaper (or costs
+    the same and comes first) can always give way to it: coverage, number, price, double coverage and order all stay or
+    improve.
     """
     superfluous: Boolean = ~instance.visible.any(axis=1) & ~instance.mandatory.any(axis=0)
     excluded = instance.conflict | np.eye(len(instance), dtype=bool)

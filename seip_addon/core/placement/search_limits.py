@@ -8,14 +8,9 @@ from dataclasses import dataclass
 
 from ..errors import SeipError
 
-OPERATIONS_PER_UNIT = 1e10
-"""Multiplications that make a unit of work: about a second of one processor core."""
-
-OVERHEAD_OPERATIONS = 3e6
-"""Multiplications that take as long as what goes on around each counted step."""
-
-MIN_PART = 0.01
-"""Seconds, or units of work, of a part of a limit where nothing is left."""
+OPERATIONS_PER_UNIT = 1e10  # multiplications that make a unit of work: about a second of one processor core
+OVERHEAD_OPERATIONS = 3e6  # multiplications that take as long as what goes on around each counted step
+MIN_PART = 0.01  # seconds, or units of work, of a part of a limit where nothing is left
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Maximal covering: an optimal placement, or the best found with a bound."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, replace
@@ -21,29 +19,17 @@ from .reduced_problem import Instance, common_unit, make_instance
 from .search_limits import DEFAULT_LIMITS, Clock, SolverLimits
 from .tie_breaking import MAX_SEARCHED_TIES, canonical_optimum
 
-BRANCHING_SHARE = 0.15
-"""Share of what is left of the limits for a first branch and bound, which goes on after the other methods."""
+BRANCHING_SHARE = 0.15  # of what is left of the limits, for a first branch and bound, which goes on after other methods
 
 TABU_SEARCH_SHARE, FIRST_DECOMPOSITION_SHARE, FULL_DECOMPOSITION_SHARE = 0.1, 0.05, 0.4
 """Shares for a tabu search of swaps, for a first bound by decomposition, and for a full one where the first gains."""
 
-MIN_BOUND_GAIN = 0.05
-"""Share of the gap that the first bound by decomposition must close for the full one to be worth its time."""
-
-PROGRAM_SHARE = 0.5
-"""Share for the integer program, beside branch and bound."""
-
-MAX_RELAXATION_GAP = 0.01
-"""Gap of the linear relaxation up to which the integer program is tried beside branch and bound."""
-
-MIN_TIE_BREAKING_WORK = 2.0
-"""Units of work that the choice among equally good placements may take, or as many as their proof took."""
-
-MIN_GAP_PROGRESS = 0.02
-"""Share of the gap that closes in the second half of the time where more time is of use."""
-
-MAX_PROGRAM_ENTRIES = 1_000_000
-"""Entries of V up to which the whole program is given to the solver: PuLP takes some 0.5 kB for each."""
+MIN_BOUND_GAIN = 0.05  # share of the gap that the first bound by decomposition must close for a full one to be worth it
+PROGRAM_SHARE = 0.5  # share for the integer program, beside branch and bound
+MAX_RELAXATION_GAP = 0.01  # gap of the linear relaxation up to which the program is tried, beside branch and bound
+MIN_TIE_BREAKING_WORK = 2.0  # units of work for the choice among equally good placements, or as many as the proof took
+MIN_GAP_PROGRESS = 0.02  # share of the gap that closes in the second half of the time where more time is of use
+MAX_PROGRAM_ENTRIES = 1_000_000  # entries of V up to which the solver gets a program whole: PuLP takes 0.5 kB for each
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,23 +57,19 @@ class Proof:
 def solve(problem: PlacementProblem, limits: SolverLimits = DEFAULT_LIMITS) -> Generator[Progress, None, Placement]:
     """Choose the placement that covers most.
 
-    Among optimal placements the one with fewest sensors is returned, then the
-    cheapest, then the one with the largest doubly covered weight, then the
-    first in the canonical order of candidates: always the same one, however
-    candidates and targets are ordered.
+    Among optimal placements the one with fewest sensors is returned, then the cheapest, then the one with the largest
+    doubly covered weight, then the first in the canonical order of candidates: always the same one, however candidates
+    and targets are ordered.
 
-    Reductions that lose nothing come first; a greedy choice improved by
-    swaps gives an incumbent, a Lagrangian relaxation a bound; candidates
-    that the bound rules out are dropped. Among the rest branch and bound
-    decides; where it does not soon, a tabu search improves the incumbent,
-    decomposition and an integer program the bound where they can, and branch and
-    bound goes on with the time that is left, its bound falling all the while.
+    Reductions that lose nothing come first; a greedy choice improved by swaps gives an incumbent, a Lagrangian
+    relaxation a bound; candidates that the bound rules out are dropped. Among the rest branch and bound decides; where
+    it does not soon, a tabu search improves the incumbent, decomposition and an integer program the bound where they
+    can, and branch and bound goes on with the time that is left, its bound falling all the while.
 
     Raises
     ------
     SeipError
-        The constraints cannot be met together, no candidate sees any target,
-        or the solver is not available.
+        The constraints cannot be met together, no candidate sees any target, or the solver is not available.
     """
     return (yield from solve_within(problem, limits.solver, limits.clock()))
 
@@ -131,12 +113,10 @@ def solve_within(problem: PlacementProblem, solver: str, clock: Clock) -> Genera
 def solve_greedy(problem: PlacementProblem) -> Placement:
     """Choose greedily, with a certificate.
 
-    With the number of sensors alone and one pose per position, greedy covers
-    at least 1 - 1/e (63 %) of the optimum (Nemhauser, Wolsey and Fisher
-    1978); with several poses per position at least a half (Fisher, Nemhauser
-    and Wolsey 1978); the better of gain and gain per price, under a budget
-    alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor 1999). The bound of
-    the result is computed from the data and is usually far closer.
+    With the number of sensors alone and one pose per position, greedy covers at least 1 - 1/e (63 %) of the optimum
+    (Nemhauser, Wolsey and Fisher 1978); with several poses per position at least a half (Fisher, Nemhauser and Wolsey
+    1978); the better of gain and gain per price, under a budget alone, at least (1 - 1/e)/2 (Khuller, Moss and Naor
+    1999). The bound of the result is computed from the data and is usually far closer.
 
     Raises
     ------

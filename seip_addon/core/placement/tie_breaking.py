@@ -1,16 +1,12 @@
 """Tie-breaking: the canonical one among equally good placements.
 
-Stages, each within the optima of those before: largest coverage, fewest
-sensors, lowest price, largest doubly covered weight, and first in the
-canonical order of candidates.
+Stages, each within the optima of those before: largest coverage, fewest sensors, lowest price, largest doubly covered
+weight, and first in the canonical order of candidates.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Generator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -19,18 +15,13 @@ from ..progress import Progress
 from .bounds import lagrangian_bound
 from .branch_and_bound import BestPlacements, FirstInOrder, is_worthwhile, merit
 from .greedy import drop_redundant, drop_weakest, swap_search
-from .integer_program import reaching
+from .integer_program import Expression, reaching
 from .reduced_problem import Instance
 from .search_limits import Clock
 
-MAX_SEARCHED_TIES = 2_000
-"""Ties that branch and bound lists; of more it looks for the first in order."""
-
-MAX_LISTED_TIES = 12
-"""Ties that are listed by one program each; beyond, each stage is a program of its own."""
-
-BLOCK_SIZE = 10
-"""Candidates whose order is settled by one program: powers of two up to 512 stay far above all tolerances."""
+MAX_SEARCHED_TIES = 2_000  # ties that branch and bound lists; of more it looks for the first in order
+MAX_LISTED_TIES = 12  # ties that are listed by one program each; beyond, each stage is a program of its own
+BLOCK_SIZE = 10  # candidates whose order is settled by one program: powers of two up to 512 are far above tolerances
 
 
 def canonical_optimum(
@@ -134,7 +125,7 @@ class _Stages:
         self._solver = solver
         self._clock = clock
 
-    def maximise(self, objective: Any) -> Generator[Progress, None, None]:  # noqa: ANN401 -- PuLP's expressions are untyped
+    def maximise(self, objective: Expression) -> Generator[Progress, None, None]:
         if self.settled:
             outcome = yield from self.program.maximise(objective, self._solver, self._clock)
             self.settled = outcome.finished and outcome.chosen is not None

@@ -1,7 +1,5 @@
 """``candidates.csv``: every candidate pose with what it sees, for a spreadsheet."""
 
-from __future__ import annotations
-
 import csv
 import os
 from collections.abc import Mapping
@@ -16,27 +14,10 @@ from ..storage.files import whole_file
 from .headings import degrees, tilt_degrees
 
 COLUMNS = (
-    "pose",
-    "position",
-    "on_pole",
-    "pole_source",
-    "sensor",
-    "height_m",
-    "x_m",
-    "y_m",
-    "z_m",
-    "map_x_m",
-    "map_y_m",
-    "map_z_m",
-    "yaw_deg",
-    "tilt_deg",
-    "price_usd",
-    "targets_seen",
-    "coverage",
-    "weighted_coverage",
-    "rank",
-    "chosen",
-)
+    "pose", "position", "on_pole", "pole_source", "sensor", "height_m", "x_m", "y_m", "z_m",
+    "map_x_m", "map_y_m", "map_z_m", "yaw_deg", "tilt_deg", "price_usd",
+    "targets_seen", "coverage", "weighted_coverage", "rank", "chosen",
+)  # fmt: skip
 
 
 def save_candidate_table(
@@ -50,12 +31,7 @@ def save_candidate_table(
 
     Parameters
     ----------
-    path : path-like
-        The file to write.
-    models : mapping of str to LidarModel
-        The sensor types by catalogue key.
     visible : (c, t) bool
-        Which pose sees which target.
     deployment : Deployment
         The chosen sensors; their labels stand in the column ``chosen``.
     """

@@ -1,18 +1,15 @@
 """The chosen sensors as CARLA LiDAR actors: blueprint, transform and attributes.
 
-CARLA stands on Unreal's left-handed axes. A town's world coordinates are those
-of its OpenDRIVE map with y negated, so a yaw that is counter-clockwise here is
-clockwise there [1]_; its pitch turns the nose up where it is positive, so that a
-tilt has the opposite sign, and a roll the same [3]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
-``upper_fov`` to ``lower_fov``, both included, and
-``points_per_second / rotation_frequency / channels`` steps over a turn [2]_.
+CARLA stands on Unreal's left-handed axes. A town's world coordinates are those of its OpenDRIVE map with y negated, so
+a yaw that is counter-clockwise here is clockwise there [1]_; its pitch turns the nose up where it is positive, so that
+a tilt has the opposite sign, and a roll the same [3]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
+``upper_fov`` to ``lower_fov``, both included, and ``points_per_second / rotation_frequency / channels`` steps over a
+turn [2]_.
 
 .. [1] CARLA documentation, "Coordinates and transformations".
 .. [2] CARLA documentation, "Sensors reference", LIDAR sensor.
 .. [3] CARLA documentation, class ``carla::geom::RightHandedRotation``.
 """
-
-from __future__ import annotations
 
 import math
 import os

@@ -1,7 +1,5 @@
 """Comparison of two placements on the same targets."""
 
-from __future__ import annotations
-
 import base64
 import binascii
 import zlib

@@ -1,7 +1,5 @@
 """Angles as files write them: degrees to the millionth, which hides the last bits in which platforms differ."""
 
-from __future__ import annotations
-
 import math
 
 

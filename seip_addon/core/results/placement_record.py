@@ -1,7 +1,5 @@
 """``placement.json``: a placement with all that it takes to read it, check it and make it again."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import math
@@ -45,7 +43,6 @@ class Provenance:
     created : datetime
         With its time zone.
     durations : mapping of str to float, seconds
-        How long each step took.
     versions : mapping of str to str
         Of the program and what it stands on; see `versions`.
     """
@@ -206,9 +203,6 @@ class PlacementRecord:
     sensors : tuple of RecordedSensor
         In the order of their labels.
     price_usd : float, dollars
-        Of all sensors together.
-    greedy : RecordedGreedy or None
-        None where there is no greedy answer.
     settings : mapping
         All that could have been set, by name; `asked` is the part that this program reads again.
     inputs : mapping of str to str
@@ -257,8 +251,6 @@ def placement_record(
 
     Parameters
     ----------
-    solution : Solution
-        Of that site.
     settings : mapping
         All that the user could have set, defaults included, by name; values that JSON can hold.
     inputs : mapping of str to str

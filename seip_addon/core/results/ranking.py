@@ -1,7 +1,5 @@
 """Candidates ranked by coverage, alone or added to a placement."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,8 +30,6 @@ def rank_alone(visible: Boolean, weight: Float, most: int) -> list[Ranked]:
     ----------
     visible : (c, t) bool
     weight : (t,) float64
-    most : int
-        How many to return.
     """
     return _ranked(visible, weight, np.zeros(visible.shape[1], dtype=bool), most)
 
@@ -49,8 +45,6 @@ def rank_added(visible: Boolean, weight: Float, seen: Boolean, free: Boolean, mo
         What the placement sees.
     free : (c,) bool
         Poses at positions that it leaves free.
-    most : int
-        How many to return.
     """
     return [one for one in _ranked(visible, weight, seen, len(visible)) if free[one.pose]][:most]
 

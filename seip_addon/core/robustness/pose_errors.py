@@ -28,10 +28,7 @@ from ..site.scene_geometry import Mesh
 
 _MICROMETRE = 1e-6
 _KINDS_DRAWN = 6  # x, y, z, yaw, pitch, roll
-
-
-MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0
-"""Metres and radians; larger standard deviations are taken for typing errors."""
+MAX_OFFSET_STD, MAX_ANGLE_STD = 100.0, 1.0  # metres and radians; larger standard deviations are taken for typing errors
 
 
 @dataclass(frozen=True)
@@ -55,12 +52,7 @@ class PoseErrors:
         0.3, "as of the position if not given", unit="m", maximum=MAX_OFFSET_STD, option="height-error", metavar="M"
     )
     yaw: float = setting(
-        math.radians(2.0),
-        "as of the tilt if not given",
-        unit="rad",
-        maximum=math.pi,
-        option="yaw-error",
-        metavar="DEG",
+        math.radians(2.0), "as of the tilt if not given", unit="rad", maximum=math.pi, option="yaw-error", metavar="DEG"
     )
     tilt: float = setting(
         math.radians(2.0),
@@ -107,7 +99,6 @@ class PoseDraws:
     roll: Float
 
     def __len__(self) -> int:
-        """Return the number of draws."""
         return len(self.shift)
 
     def orientations(self, planned_yaw: Float, planned_tilt: Float) -> Float:
@@ -129,9 +120,8 @@ def require_draws(draws: int) -> None:
 def draw_errors(errors: PoseErrors, foot: Float, draws: int, seed: int) -> PoseDraws:
     """Draw random pose errors of sensors.
 
-    What is drawn for a sensor follows from the seed, the number of the draw and
-    the sensor's position alone: whichever type hangs there at whichever height,
-    whatever hangs elsewhere, and however many draws there are. Errors of other
+    What is drawn for a sensor follows from the seed, the number of the draw and the sensor's position alone: whichever
+    type hangs there at whichever height, whatever hangs elsewhere, and however many draws there are. Errors of other
     sizes are the same draws, scaled.
 
     Parameters
@@ -173,15 +163,10 @@ def out_of_objects(draws: PoseDraws, xyz: Float, objects: Sequence[Mesh]) -> tup
         Which draws would have put a sensor inside an object.
     """
     shift = draws.shift.copy()
-    blocked = _inside(xyz + shift, objects)
+    blocked: Boolean = inside_any((xyz + shift).reshape(-1, 3), objects).reshape(shift.shape[:-1])
     shift[blocked] *= -1
     still = np.zeros_like(blocked)
     where = np.broadcast_to(xyz, shift.shape)
     still[blocked] = inside_any(where[blocked] + shift[blocked], objects)
     shift[still] = 0.0
     return replace(draws, shift=shift), blocked
-
-
-def _inside(points: Float, objects: Sequence[Mesh]) -> Boolean:
-    inside: Boolean = inside_any(points.reshape(-1, 3), objects).reshape(points.shape[:-1])
-    return inside

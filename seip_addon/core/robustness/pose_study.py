@@ -1,12 +1,9 @@
 """Coverage of a placement under pose errors, jointly, per sensor and per kind of error.
 
-All sensors err in each draw. The same draws tell what comes of it when one
-sensor alone errs: a first-order effect, that of its own row of V beside the
-planned rows of the others. Draws with one kind of error alone, scaled from the
-same standard ones, tell which kind hurts most.
+All sensors err in each draw. The same draws tell what comes of it when one sensor alone errs: a first-order effect,
+that of its own row of V beside the planned rows of the others. Draws with one kind of error alone, scaled from the same
+standard ones, tell which kind hurts most.
 """
-
-from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
@@ -24,8 +21,7 @@ from .visibility_under_errors import Surroundings, draws_for, visibility_under_e
 
 QUANTILES = (0.05, 0.5, 0.95)
 
-NOTABLE_LOSS = 0.01
-"""Share of the targets whose loss, in one of twenty draws, is worth a warning."""
+NOTABLE_LOSS = 0.01  # share of the targets whose loss, in one of twenty draws, is worth a warning
 
 
 @dataclass(frozen=True)
@@ -68,8 +64,6 @@ class PoseStudy:
 
     Parameters
     ----------
-    labels : (s,) tuple of str
-        Of the sensors.
     planned : Coverages
         Of the poses as planned: n = 1.
     together : Coverages
@@ -120,9 +114,7 @@ class PoseStudy:
 
 
 def pose_study(
-    around: Surroundings,
-    deployment: Deployment,
-    settings: PoseStudySettings,
+    around: Surroundings, deployment: Deployment, settings: PoseStudySettings
 ) -> Generator[Progress, None, PoseStudy]:
     """Compute the coverage of a placement under draws of pose errors.
 

@@ -6,9 +6,8 @@ outcome of the scenario is the weight of the targets seen often enough,
 .. math::
     f_k(S) = \sum_j w_j\, [n_{jk}(S) \ge κ],
 
-or what is left of it after one of the sensors failed: at worst
-:math:`\min_{i \in S} f_k(S \setminus i)`, or on average, each of the N sensors
-that are allowed failing alike (had the chosen alone part in it, a sensor that sees
+or what is left of it after one of the sensors failed: at worst :math:`\min_{i \in S} f_k(S \setminus i)`, or on
+average, each of the N sensors that are allowed failing alike (had the chosen alone part in it, a sensor that sees
 nothing would be worth adding). Of K outcomes the mean of the m smallest counts, :math:`m = \lceil αK \rceil`:
 
 .. math::
@@ -100,7 +99,7 @@ class Risk:
         return max(1, math.ceil(self.tail * scenarios - 1e-9))
 
     def outcomes(self, seen: NDArray[np.uint8], weight: Float, sensors: int) -> Float:
-        """Return the outcome of a placement in each scenario.
+        """Return the outcome of a placement in each scenario, (K,) float64.
 
         Parameters
         ----------
@@ -109,10 +108,6 @@ class Risk:
         weight : (t,) float64
         sensors : int
             N, the largest number of sensors.
-
-        Returns
-        -------
-        (K,) float64
         """
         times = seen.sum(axis=1, dtype=np.uint8)
         whole: Float = (times >= self.seen_by) @ weight
@@ -136,9 +131,8 @@ class Risk:
     def cover(self, sensors: int) -> MultiCover:
         r"""Return the value of a target by the sensors that see it: on average, or more than at worst.
 
-        A target seen n times is worth 1 from n = κ on. After a failure among N
-        sensors it is worth :math:`1 - κ/N` on average at n = κ and 1 from
-        :math:`κ + 1` on, which no failure of the worst kind exceeds.
+        A target seen n times is worth 1 from n = κ on. After a failure among N sensors it is worth :math:`1 - κ/N` on
+        average at n = κ and 1 from :math:`κ + 1` on, which no failure of the worst kind exceeds.
 
         Parameters
         ----------

@@ -7,27 +7,23 @@ With K scenarios of pose errors, V of each known for every candidate,
     \quad\text{subject to}\quad
     κ\, y_{jk} \le \sum_i V_{ijk} x_i, \quad y_{jk} \in \{0, 1\},
 
-X being the placements of the problem (number, budget, one sensor per position,
-mandatory and forbidden places, least distance) and P that of `risk`. The
-expectation is the maximal covering location problem of K × t targets. Any p in P
+X being the placements of the problem (number, budget, one sensor per position, mandatory and forbidden places, least
+distance) and P that of `risk`. The expectation is the maximal covering location problem of K × t targets. Any p in P
 gives an upper bound,
 
 .. math::
     \max_{x \in X} T(x) \le \max_{x \in X} F_p(x),
 
-of which p = 1/K says that nothing exceeds the largest expectation. A p with a
-small bound comes of fictitious play (Brown 1951): placements answer the mean of
-the scenarios that were worst for the placements before. Branch and bound on F_p
-then proves the best T (`robust_search`), where it comes to an end. Another bound
-knows each scenario beforehand (Madansky 1960), and takes K problems of t targets:
+of which p = 1/K says that nothing exceeds the largest expectation. A p with a small bound comes of fictitious play
+(Brown 1951): placements answer the mean of the scenarios that were worst for the placements before. Branch and bound on
+F_p then proves the best T (`robust_search`), where it comes to an end. Another bound knows each scenario beforehand
+(Madansky 1960), and takes K problems of t targets:
 
 .. math::
     \max_{x \in X} T(x) \le \min_{p \in P} \sum_k p_k \max_{x \in X} f_k(x),
 
 the mean of the m smallest of the K largest coverages.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Generator, Sequence
@@ -50,15 +46,9 @@ from .risk import Risk
 from .robust_search import BestUnderRisk, swap_search_by_risk, swap_search_from_pairs
 from .scenario_visibility import ScenarioVisibility
 
-ROUNDS = 16
-"""Of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)."""
-
-
-SCENARIO_SHARE = 0.5
-"""Share of the time for the problems of single scenarios."""
-
-MIN_SECONDS = 1.0
-"""Or units of work, for what comes after them, however slow they were."""
+ROUNDS = 16  # of fictitious play; weights of scenarios are multiples of 1 / (ROUNDS · m)
+SCENARIO_SHARE = 0.5  # share of the time for the problems of single scenarios
+MIN_SECONDS = 1.0  # or units of work, for what comes after them, however slow they were
 
 
 UNPROVEN_MESSAGE = "the time was too short to prove this placement the best: the gap says how far"
@@ -79,8 +69,6 @@ def solve_robust(
         With the visibility of the poses as planned.
     scenarios : ScenarioVisibility
         Of all candidates.
-    risk : Risk
-        The risk measure to maximise.
     foreseen : sequence of Placement, optional
         See `foresee`; found within the time limit if not given, and only of use where one look is enough.
 

@@ -13,8 +13,6 @@ An instance is here one of all scenarios' targets, whose weights are whole numbe
 value is F in whole units.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator
 
@@ -31,8 +29,7 @@ from ..progress import Progress
 STARTING_PAIRS, MAX_FIRST_CANDIDATES = 8, 100
 """Starting pairs where a single sensor gains nothing, and candidates that may be the first of a pair."""
 
-SWAPS_TRIED = 24
-"""Swaps of a sensor for which T is computed, those with the largest F."""
+SWAPS_TRIED = 24  # swaps of a sensor for which T is computed, those with the largest F
 
 
 def swap_search_from_pairs(

@@ -1,7 +1,5 @@
 """Price and benefit of robust placements, evaluated on unseen draws."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, astuple, dataclass, field, replace
 
@@ -19,11 +17,8 @@ from .risk import Risk
 from .robust_placement import at_least, foresee, outcomes_of, solve_robust
 from .visibility_under_errors import Surroundings, draws_for, visibility_under_errors
 
-LOW_QUANTILE = 0.05
-"""Quantile of coverage by which placements are compared."""
-
-COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))
-"""Compared by default."""
+LOW_QUANTILE = 0.05  # quantile of coverage by which placements are compared
+COMPARED_RISKS = (Risk(), Risk(tail=0.25), Risk(tail=0.0))  # compared by default
 
 
 @dataclass(frozen=True)
@@ -32,10 +27,6 @@ class RobustnessSettings:
 
     Parameters
     ----------
-    risk : Risk
-        The risk measure to maximise.
-    errors : PoseErrors
-        Of the sensors' poses.
     scenarios : int
         Draws to choose on.
     draws : int
@@ -155,8 +146,6 @@ def robust_study(
         Of all candidates of the site.
     risks : sequence of Risk
         A risk measure for each placement that is compared.
-    limits : SolverLimits
-        For each placement.
     """
     every = np.flatnonzero(problem.allowed)  # what may not be chosen need not be looked from
     drawn, _ = draws_for(around, every, settings.errors, settings.scenarios, settings.seed)

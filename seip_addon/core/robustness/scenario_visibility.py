@@ -32,7 +32,6 @@ class ScenarioVisibility:
     targets: int
 
     def __len__(self) -> int:
-        """Return the number of scenarios."""
         return len(self.packed)
 
     def seen(self, number: int) -> Boolean:

@@ -15,14 +15,9 @@ from ..scans.motion import rotations
 from ..traffic import Snapshot, Trajectories
 from ..traffic.bodies import fitted_body
 
-WARM_UP = 2.0
-"""Seconds from the first sample of a run to the first instant that is used."""
-
-BATCH_SECONDS = 12.0
-"""Seconds of a run whose instants count as one draw, since the same queues block the view at them."""
-
-_MARGIN = 1e-3
-"""Metres by which bounding boxes are larger than what they bound: ray casters compute in float32."""
+WARM_UP = 2.0  # seconds from the first sample of a run to the first instant that is used
+BATCH_SECONDS = 12.0  # seconds of a run whose instants count as one draw, since the same queues block the view at them
+_MARGIN = 1e-3  # metres by which bounding boxes are larger than what they bound: ray casters compute in float32
 
 _CORNERS = np.array(np.meshgrid((0, 1), (0, 1), (0, 1), indexing="ij")).reshape(3, 8).T
 
@@ -69,7 +64,6 @@ class Instants:
     batch: Integer
 
     def __len__(self) -> int:
-        """Return n."""
         return len(self.time)
 
     def obstacles(self) -> list[TrafficObstacles]:

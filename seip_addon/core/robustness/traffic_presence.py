@@ -1,7 +1,5 @@
 """Time that road users spend on each target's square."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 
 import numpy as np
@@ -13,8 +11,7 @@ from ..site.targets import Targets
 from ..traffic import Trajectories
 from .traffic_instants import WARM_UP
 
-INTERVAL = 0.2
-"""Seconds between samples: a car at 50 km/h moves 2.8 m, less than its length."""
+INTERVAL = 0.2  # seconds between samples: a car at 50 km/h moves 2.8 m, less than its length
 
 _ALONG, _ACROSS = 12, 4
 """Points of a footprint, evenly spread, each for its share: whole numbers of shares keep weights commensurable."""

@@ -24,13 +24,9 @@ from .traffic_instants import NO_TRAFFIC, Instants, TrafficObstacles
 from .visibility_in_traffic import LAYER_HEIGHT, TrafficLayer, visibility_in_traffic
 from .visibility_under_errors import Surroundings
 
-NOTABLE_LOSS = 0.01
-"""Share of the targets' weight whose loss in traffic is worth a warning."""
-
+NOTABLE_LOSS = 0.01  # share of the targets' weight whose loss in traffic is worth a warning
 IN_TRAFFIC = "in traffic"  # first words of a `traffic_message`, and of no other
-
-MOSTLY_SEEN_SHARE = 0.9
-"""Share of time from which on a target counts as mostly seen."""
+MOSTLY_SEEN_SHARE = 0.9  # share of time from which on a target counts as mostly seen
 
 LAYER_NAMES: Mapping[TrafficLayer, str] = {"road": "road", "height": f"points {LAYER_HEIGHT:g} m above the road"}
 """For messages and charts."""
@@ -136,10 +132,6 @@ class TrafficStudy:
         Number of instants that the traffic-aware placement was optimised on.
     road_users : float
         Mean number of road users at the evaluated instants.
-    empty : TrafficEvaluation
-        Optimised for the empty road.
-    traffic : TrafficEvaluation
-        Optimised on traffic.
     """
 
     layer: TrafficLayer
@@ -185,8 +177,6 @@ def traffic_study(
         Of all candidates of the site; what they see is taken from the scenarios.
     evaluation : Instants
         Of runs that are not those of the scenarios.
-    limits : SolverLimits
-        For each placement.
     """
     problem = replace(problem, visible=scenarios.empty)
     empty = yield from solve(problem, limits)

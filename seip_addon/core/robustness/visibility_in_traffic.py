@@ -14,8 +14,6 @@ cast that pass through the bounding box of a road user, at the bodies alone, and
 target's answer is looked at again only where one of its own rays was stopped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
@@ -39,9 +37,7 @@ from .visibility_under_errors import Surroundings
 
 TrafficLayer = Literal["road", "height"]
 
-LAYER_HEIGHT = 1.5
-"""Metres above its target at which a car has its roof, and a van or a truck its side."""
-
+LAYER_HEIGHT = 1.5  # metres above its target at which a car has its roof, and a van or a truck its side
 _RAYS_AT_ONCE = 1 << 17  # bounds the memory of a full scan
 _POINTS_AT_ONCE = 128  # bounds that of the rays past points
 _CUBE_SLACK = 1e-6  # share by which a cube about a ball is larger, so that rounding leaves no ray out
@@ -162,7 +158,8 @@ class _StaticScan:
         self._matters[self.through(np.where(_CORNERS > 0, high, low)[None])[1]] = True
         self.distance = np.full(self.rays, np.inf)
         self.counts = np.zeros(self.rays, dtype=bool)
-        for ray in self._in_parts(np.flatnonzero(self._matters)):
+        matters = np.flatnonzero(self._matters)
+        for ray in np.array_split(matters, max(1, -(-len(matters) // _RAYS_AT_ONCE))):
             directions = self.directions(ray)
             self.distance[ray], triangle = place.caster.cast(place.origin, directions, self.model.max_range)
             self.counts[ray] = place.counting(self.model, directions, self.distance[ray], triangle)
@@ -210,10 +207,6 @@ class _StaticScan:
         ray, distance = ray[sooner], distance[sooner]
         bodies = replace(self.place, caster=present.caster, reflectivity=present.reflectivity)
         return _BlockedRays(ray, distance, bodies.counting(self.model, directions[sooner], distance, triangle[sooner]))
-
-    @staticmethod
-    def _in_parts(ray: Integer) -> list[Integer]:
-        return np.array_split(ray, max(1, -(-len(ray) // _RAYS_AT_ONCE)))
 
 
 class _LayerVisibility(Protocol):

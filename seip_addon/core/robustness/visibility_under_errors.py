@@ -1,7 +1,5 @@
 """Visibility grids of poses under draws of pose errors."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 

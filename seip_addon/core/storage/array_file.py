@@ -1,7 +1,5 @@
 """Files of named arrays with a header, validated before use."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
@@ -21,20 +19,11 @@ from numpy.typing import NDArray
 from ..errors import SeipError
 from .files import digest, whole_file
 
-MAX_BYTES = 1 << 32
-"""Bytes of all arrays of a file together at most: 4 GiB."""
-
-MAX_HEADER_BYTES = 1 << 27
-"""Bytes of the header, four for each of its characters: 128 MiB."""
-
-MAX_TEXT_LENGTH = 256
-"""Characters of an entry of an array of text at most."""
-
-_OLD_VERSION = 1
-"""The version of files that hold no digest."""
-
-_MAX_DEFLATE_RATIO = 1032
-"""Bytes that one byte of DEFLATE can stand for (RFC 1951)."""
+MAX_BYTES = 1 << 32  # bytes of all arrays of a file together at most: 4 GiB
+MAX_HEADER_BYTES = 1 << 27  # bytes of the header, four for each of its characters: 128 MiB
+MAX_TEXT_LENGTH = 256  # characters of an entry of an array of text at most
+_OLD_VERSION = 1  # the version of files that hold no digest
+_MAX_DEFLATE_RATIO = 1032  # bytes that one byte of DEFLATE can stand for (RFC 1951)
 
 _NPY = re.compile(
     rb"\x93NUMPY\x01\x00.."
@@ -132,8 +121,7 @@ class ArrayFile:
     def reading(self, path: str | os.PathLike[str]) -> Iterator[tuple[dict[str, Any], dict[str, NDArray[Any]]]]:
         """Yield the header and the arrays; what a block trips over in them is the file's fault.
 
-        Sizes are compared with the rules and with each other before any array
-        is read.
+        Sizes are compared with the rules and with each other before any array is read.
 
         Raises
         ------
@@ -143,20 +131,18 @@ class ArrayFile:
         try:
             with Path(path).open("rb") as file, _archive(file) as archive:
                 header = _read_header(archive)
-                known = header["schema"] == self.schema and header["version"] in self._versions()
+                versions = (_OLD_VERSION, self.version) if self.undigested else (self.version,)
+                known = header["schema"] == self.schema and header["version"] in versions
                 if known:
                     yield header, self._read_arrays(archive, header)
         except FileNotFoundError as error:
             raise SeipError(f"there is no {self.what} {path}; {self.remedy}") from error
         except ContentError as error:
             raise SeipError(f"{path} is no {self.what}, or is damaged: {error}; {self.remedy}") from error
-        except _READ_ERRORS as error:
+        except READ_ERRORS as error:
             raise SeipError(f"{path} is no {self.what}, or is damaged; {self.remedy}") from error
         if not known:
             raise SeipError(f"{path} is no {self.what} of this version; {self.remedy}")
-
-    def _versions(self) -> tuple[int, ...]:
-        return (_OLD_VERSION, self.version) if self.undigested else (self.version,)
 
     def _read_arrays(self, archive: zipfile.ZipFile, header: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         members = {f"{name}.npy": name for name in self.arrays}
@@ -240,17 +226,8 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ContentError(f"its header holds the number {name}")
 
 
-_READ_ERRORS = (
-    OSError,
-    EOFError,
-    ArithmeticError,
-    AttributeError,
-    ValueError,
-    LookupError,
-    TypeError,
-    RuntimeError,
-    MemoryError,
-    zipfile.BadZipFile,
-    zlib.error,
+READ_ERRORS = (
+    *(OSError, EOFError, ArithmeticError, AttributeError, ValueError, LookupError, TypeError, RuntimeError),
+    *(MemoryError, zipfile.BadZipFile, zlib.error),
 )
 """What reading an npz, or taking from it what should be there, raises where the file is not what it should be."""

@@ -1,7 +1,5 @@
 """Atomic file writes, folder locks and digests."""
 
-from __future__ import annotations
-
 import errno
 import functools
 import hashlib
@@ -25,10 +23,9 @@ from ..errors import SeipError
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary name beside ``path`` that becomes ``path`` once all is written.
 
-    The temporary name keeps the suffix of ``path``, so that libraries which
-    choose a format by suffix do the same for both. Nothing is left behind when
-    the block raises, `KeyboardInterrupt` included; what a killed process left
-    in the folder is removed.
+    The temporary name keeps the suffix of ``path``, so that libraries which choose a format by suffix do the same for
+    both. Nothing is left behind when the block raises, `KeyboardInterrupt` included; what a killed process left in the
+    folder is removed.
 
     Parameters
     ----------
@@ -151,11 +148,8 @@ def digest(*parts: NDArray[Any] | str | bytes | float | None) -> str:
     return state.hexdigest()
 
 
-_PREFIX = ".seip-"
-"""How the names of unfinished files begin; the number of the process that writes them follows."""
-
-_STALE_SECONDS = 86400.0
-"""Seconds after which an unfinished file counts as abandoned, where processes cannot be queried."""
+_PREFIX = ".seip-"  # how the names of unfinished files begin; the number of the process that writes them follows
+_STALE_SECONDS = 86400.0  # seconds after which an unfinished file counts as abandoned where processes cannot be queried
 
 _LOCK_ERRORS = {errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 

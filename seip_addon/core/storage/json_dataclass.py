@@ -1,10 +1,8 @@
 """Dataclasses from JSON, each value held to the type of its field."""
 
-from __future__ import annotations
-
 import reprlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
@@ -32,8 +30,6 @@ def from_json(kind: type[Value], content: object, where: str = "") -> Value:
 
     Parameters
     ----------
-    kind : type
-        The dataclass.
     where : str
         What stands before the names of fields in messages.
 
@@ -107,6 +103,4 @@ def _at(where: str, name: str) -> str:
     return f"{where}.{name}" if where else name
 
 
-@cache
-def _hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind)
+_hints: Callable[[type], dict[str, Any]] = cache(get_type_hints)

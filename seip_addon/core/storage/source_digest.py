@@ -1,7 +1,5 @@
 """Digests of program code, as part of the keys of stored results."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import importlib.util
@@ -12,8 +10,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from ..errors import SeipError
 from .files import digest
 
-CORE = __package__.rpartition(".")[0]
-"""The core's full name: Blender gives extensions another than a checkout has."""
+CORE = __package__.rpartition(".")[0]  # the core's full name: Blender gives extensions another than a checkout has
 
 _OURS = (CORE, "headless")
 

@@ -1,7 +1,5 @@
 """TOML files of users, checked against the keys that their tables may have."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import tomllib
@@ -11,9 +9,7 @@ from typing import Any, TypeGuard
 
 from ..errors import SeipError
 
-Reader = Callable[[Any], Any]
-"""Turns a value into what it stands for; a `ValueError` of it says what the value must be instead."""
-
+Reader = Callable[[Any], Any]  # from a value to what it stands for; its `ValueError` says what it must be instead
 REQUIRED = object()  # the default of a key that must be there
 
 

@@ -1,7 +1,5 @@
 """The approaches of a junction: its streets, as far as a distance along the road."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,15 +13,10 @@ from ..arrays import Float
 from ..opendrive import LaneSurface
 from .road_surface import by_road, cut_along, in_groups
 
-JOINT_GAP, MIN_JOINT = 0.3, 0.5
-"""Ends of roads within so many metres, along so many metres of their width, lead into each other."""
-MIN_HEIGHT_STEP = 1.0
-"""Metres of height between ends that do not."""
-MAX_STRAIGHT_TURN = math.radians(35.0)
-"""An approach goes on through other junctions on lanes that turn by less than this."""
-
-Key = tuple[str, int]
-"""A road and one of its ends: 0 where it starts, 1 where it stops."""
+JOINT_GAP, MIN_JOINT = 0.3, 0.5  # ends of roads within so many metres, along so many of their width, are joined
+MIN_HEIGHT_STEP = 1.0  # metres of height between ends that do not
+MAX_STRAIGHT_TURN = math.radians(35.0)  # an approach goes on through other junctions on lanes that turn by less
+Key = tuple[str, int]  # a road and one of its ends: 0 where it starts, 1 where it stops
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +41,7 @@ class _ApproachRoad:
 def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: float) -> tuple[LaneSurface, ...]:
     """Return the driving lanes of a junction, and of its approaches up to a distance.
 
-    An approach goes on over the roads that join on to it, and straight on
-    through other junctions.
+    An approach goes on over the roads that join on to it, and straight on through other junctions.
 
     Parameters
     ----------

@@ -4,8 +4,6 @@ The keys are explained in docs/site-description.md. Coordinates are map
 coordinates in metres; headings are degrees in the file and radians here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -24,16 +22,10 @@ from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, rea
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
 
-MAX_SIZE = 100_000.0
-"""Metres (or degrees, or a weight) that nothing described may exceed."""
-
+MAX_SIZE = 100_000.0  # metres (or degrees, or a weight) that nothing described may exceed
 MAX_HEIGHT = 1_000.0  # metres that nothing described is high
-
-MAX_RADIUS = 5_000.0
-"""Metres from the middle of the place to the end of its region at most."""
-
-MAX_ROW_LENGTH = 10_000
-"""Limit on the trees or lights of a row."""
+MAX_RADIUS = 5_000.0  # metres from the middle of the place to the end of its region at most
+MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +101,6 @@ class SiteDescription:
     ----------
     name : str
         Title of the place; empty: the map's name.
-    map : Path or None
-        The OpenDRIVE file.
     near : (x, y) or None
         Middle of the place, map coordinates.
     junction : str or None
@@ -118,9 +108,8 @@ class SiteDescription:
     radius : float or None, metres
         The region of interest is the driving surface this near to the middle.
     approaches : float or None, metres
-        Instead of the radius: the driving surface of the junction, and of its
-        approaches this far along the roads. Without either a junction has
-        approaches of `DEFAULT_RADIUS`, and another place that radius.
+        Instead of the radius: the driving surface of the junction, and of its approaches this far along the roads.
+        Without either a junction has approaches of `DEFAULT_RADIUS`, and another place that radius.
     region : shapely geometry or None
         Instead of both: the driving surface within this area.
     level : tuple of str

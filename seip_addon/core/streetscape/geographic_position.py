@@ -1,7 +1,5 @@
 """A place that is given as latitude and longitude, on a map that counts in metres."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,12 +12,10 @@ from ..opendrive import LaneSurface, RoadMap
 from ..opendrive.geo_reference import middle_of_reference, projection
 from .description import SiteDescription
 
-MAX_ROAD_DISTANCE = 1000.0
-"""Metres beyond the roads of a map within which a place may be meant."""
+MAX_ROAD_DISTANCE = 1000.0  # metres beyond the roads of a map within which a place may be meant
 ALTERNATIVE_DISTANCE = 10.0
 """A pair of numbers that is the same place in degrees and in metres, but for so much (metres), is meant in metres."""
-MAX_ORIGIN_OFFSET = 0.05
-"""Degrees from the origin of a map's reference within which its roads lie."""
+MAX_ORIGIN_OFFSET = 0.05  # degrees from the origin of a map's reference within which its roads lie
 
 
 def in_metres(
@@ -33,8 +29,7 @@ def in_metres(
     Raises
     ------
     SeipError
-        The numbers are latitude and longitude by all looks, and the map has no
-        projection to convert them with.
+        The numbers are latitude and longitude by all looks, and the map has no projection to convert them with.
     """
     if description.near is None or not looks_like_degrees(description.near):
         return description, ()

@@ -1,7 +1,5 @@
 """Grade separation: the roads on the studied level of a place, from their connections and heights."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,12 +15,9 @@ from ..opendrive import LaneSurface
 from .road_surface import MAX_SEAM, by_road, group, is_near
 from .terrain import Terrain
 
-MAX_JOINT_STEP = 1.0
-"""Roads that meet within so many metres of height lead into each other."""
-MIN_LEVEL_HEIGHT = 2.0
-"""A road that lies more than this (metres) above another one crosses it on a level of its own."""
-MIN_OVERLAP = 1.0
-"""Square metres in plan: roads that overlap less do not cross."""
+MAX_JOINT_STEP = 1.0  # roads that meet within so many metres of height lead into each other
+MIN_LEVEL_HEIGHT = 2.0  # a road that lies more than this (metres) above another one crosses it on a level of its own
+MIN_OVERLAP = 1.0  # square metres in plan: roads that overlap less do not cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +30,6 @@ class Crossing:
     place: tuple[float, float]
 
     def __str__(self) -> str:
-        """Return the crossing in words."""
         x, y = (round(value) + 0 for value in self.place)
         return f"road {self.above} lies {self.height:.1f} m above road {self.below} at ({x}, {y})"
 
@@ -62,16 +56,12 @@ class Levels:
 
 
 def split_levels(
-    surfaces: Sequence[LaneSurface],
-    around: BaseGeometry,
-    anchors: Iterable[str],
-    level: Sequence[str] = (),
+    surfaces: Sequence[LaneSurface], around: BaseGeometry, anchors: Iterable[str], level: Sequence[str] = ()
 ) -> Levels:
     """Divide lanes into those on the level of a place and those that cross above or below.
 
-    Of two crossing roads the one that is fewer joints away from the anchors in
-    the graph of roads is on the studied level. Each other road takes the level of
-    the crossing road that is fewer joints away; ties are decided by height.
+    Of two crossing roads the one that is fewer joints away from the anchors in the graph of roads is on the studied
+    level. Each other road takes the level of the crossing road that is fewer joints away; ties are decided by height.
 
     Parameters
     ----------
@@ -87,13 +77,14 @@ def split_levels(
     Raises
     ------
     SeipError
-        Roads cross and neither is nearer to the place (both are named), or a
-        road of ``level`` is not here.
+        Roads cross and neither is nearer to the place (both are named), or a road of ``level`` is not here.
     """
     shapely.prepare(around)
     near = [lane for lane in surfaces if group(lane) and is_near(lane, around)]
     roads = _roads(near, around)
-    _check_level(level, roads)
+    for road in level:
+        if road not in roads:
+            raise SeipError(f"no road {road!r} at this place: the level is named by the id of a road that lies on it")
     crossings = _crossings(roads) if roads else ()
     if not crossings:
         return Levels(tuple(surfaces), (), ())
@@ -141,12 +132,6 @@ def _roads(lanes: Sequence[LaneSurface], around: BaseGeometry) -> dict[str, _Roa
             heights = (float(triangles[:, :, 2].min()), float(triangles[:, :, 2].max()))
             roads[road] = _RoadArea(outline, heights, Terrain(triangles))
     return roads
-
-
-def _check_level(level: Sequence[str], roads: Mapping[str, _RoadArea]) -> None:
-    for road in level:
-        if road not in roads:
-            raise SeipError(f"no road {road!r} at this place: the level is named by the id of a road that lies on it")
 
 
 def _pairs(roads: Mapping[str, _RoadArea], distance: float) -> list[tuple[str, str]]:

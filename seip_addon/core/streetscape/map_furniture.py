@@ -1,7 +1,5 @@
 """Objects of a map as parts of the site: buildings, trees, walls, posts and street lights."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable
@@ -18,20 +16,17 @@ from .object_kinds import MAX_POST_THICKNESS, SIGN_WORDS, VAGUE_TYPES, Kind, Pos
 from .parts import Part, Role
 from .street_furniture import Solid
 
-MIN_HEIGHT = 0.2
-"""Outlines lower than this (metres) hide nothing that matters."""
+MIN_HEIGHT = 0.2  # outlines lower than this (metres) hide nothing that matters
 POLE_HEIGHT, POLE_THICKNESS = 3.0, 0.08
 """Posts from this height and thickness up (metres) can carry a sensor: a traffic sign's of 5 to 6 cm cannot."""
 
 TREE_HEIGHT, CROWN_SHARE = 8.0, 0.6
-MIN_CROWN_SHARE = 0.15
-"""A tree that is more slender than this is given by its trunk: its crown follows from its height."""
+MIN_CROWN_SHARE = 0.15  # a tree that is more slender than this is given by its trunk: its crown follows from its height
 LIGHT_HEIGHT, LIGHT_ARM = 8.0, 1.5
 POST_RADIUS, FENCE_WIDTH = 0.06, 0.1
 """Sizes (metres) of what a map gives no size; the crown's diameter as a share of the tree's height."""
 
-MAX_FACADE_AREA = 200_000.0
-"""Square metres of walls beyond which a building has no windows: there would be too many."""
+MAX_FACADE_AREA = 200_000.0  # square metres of walls beyond which a building has no windows: there would be too many
 FACADES = ("facade brick", "facade plaster", "facade sand", "facade grey")
 
 
@@ -116,7 +111,10 @@ def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tup
         return _post(name, placed, post, carriageway)
     if placed.outlines:
         return tuple(part for outline in placed.outlines for part in _outlined(placed, outline, name, number))
-    return _boxed(placed, name, number) if size > 0 and placed.height >= MIN_HEIGHT else ()
+    if size <= 0 or placed.height < MIN_HEIGHT:
+        return ()
+    base = _footprint(placed) + placed.position
+    return _block(placed, name, number, base, np.full(len(base), placed.height))
 
 
 def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
@@ -124,11 +122,6 @@ def _is_single_tree(kind: Kind, height: float, size: float) -> bool:
     if kind is Kind.TREE:
         return size <= (height or TREE_HEIGHT)
     return kind is Kind.PLANTS and size <= max(height, 1.0)
-
-
-def _boxed(placed: PlacedObject, name: str, number: int) -> tuple[Part, ...]:
-    base = _footprint(placed) + placed.position
-    return _block(placed, name, number, base, np.full(len(base), placed.height))
 
 
 def _outlined(placed: PlacedObject, outline: Outline, name: str, number: int) -> tuple[Part, ...]:

@@ -1,7 +1,5 @@
 """From a map and a site description to the parts of a scene, in local axes."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,14 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.plan import outline, signed_area, without
-from ..opendrive import (
-    LaneSurface,
-    PlacedObject,
-    RoadMap,
-    lane_surfaces,
-    placed_objects,
-    placed_signals,
-)
+from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.scene_geometry import ASSUMED, DESCRIBED
@@ -43,21 +34,15 @@ from .road_surface import Roadside
 from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
 
-STAGES = 6
-"""Pieces of work that a model is made in once the map's lanes are known."""
+STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
-CANDIDATE_MARGIN = 15.0
-"""How far outside the region of interest (metres) a new post may stand."""
-VERGE_STRIP = (0.8, 2.3)
-"""Where new posts may stand beside a road without pavements: metres from the carriageway."""
+CANDIDATE_MARGIN = 15.0  # how far outside the region of interest (metres) a new post may stand
+VERGE_STRIP = (0.8, 2.3)  # where new posts may stand beside a road without pavements: metres from the carriageway
 VERGE_BELOW = 0.03
-GROUND_MARGIN = 5.0
-"""How far the ground goes on around what stands outside the extent (metres)."""
-MAX_GROUND_DISTANCE = 300.0
-"""How far from the extent (metres) it goes on at most: a wall may run on along the whole map."""
+GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
+MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
 VERGE_SPACING = 12.0
-OVERLAY_SPACING = 4.0
-"""As the surface of junctions: coarser veils would rise through the coverage where the road is curved."""
+OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
     Role.WEIGHTED_REGIONS: (0.04, "weighted veil"),
@@ -134,10 +119,6 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     Progress
         Roads of the map laid out, then stages of the model, of all.
 
-    Returns
-    -------
-    SiteModel
-
     Raises
     ------
     SeipError
@@ -183,10 +164,11 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
         *furniture,
-        _region_part(street),
+        _area_part("Region of interest", street.region, Role.REGION, street),
         *_weighted_parts(weighted, street, described=bool(description.weighted_regions)),
         *_area_parts(description, street),
     ]
+    occluders = [part for part in (*furniture, *other_levels) if Role.OCCLUDERS in part.roles]
     yield next(stages)
     return SiteModel(
         name=description.name or road_map.name,
@@ -196,12 +178,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         parts=tuple(part for part in parts if part.solid.faces),
         region=street.region,
         notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
-        warnings=() if any(_hides(part) for part in (*furniture, *other_levels)) else (NO_OBSTACLES_MESSAGE,),
+        warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
     )
-
-
-def _hides(part: Part) -> bool:
-    return Role.OCCLUDERS in part.roles and can_hide(part.solid.vertices)
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
@@ -350,10 +328,6 @@ def _marking_part(street: _Surroundings, *, stop_lines: bool) -> Part:
     return Part("Lane markings", _solid(quads, "marking"), (Role.DRESSING,))
 
 
-def _region_part(street: _Surroundings) -> Part:
-    return _area_part("Region of interest", street.region, Role.REGION, street)
-
-
 def _weighted_parts(
     areas: Sequence[tuple[str, BaseGeometry, float]], street: _Surroundings, *, described: bool
 ) -> Iterator[Part]:
@@ -368,10 +342,7 @@ def _weighted_parts(
 
 
 def _area_parts(description: SiteDescription, street: _Surroundings) -> list[Part]:
-    kinds = (
-        (description.forbidden_areas, Role.FORBIDDEN_AREAS),
-        (description.mandatory_areas, Role.MANDATORY_AREAS),
-    )
+    kinds = ((description.forbidden_areas, Role.FORBIDDEN_AREAS), (description.mandatory_areas, Role.MANDATORY_AREAS))
     return [
         _area_part(area.name, shifted(area.polygon, -street.origin), role, street)
         for areas, role in kinds

@@ -1,7 +1,5 @@
 """Classification of a map's objects: by type where there is one, else by name and shape."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from enum import Enum
@@ -35,8 +33,7 @@ KIND_OF_TYPE = {
     "streetlamp": Kind.LAMP,
     "building": Kind.BUILDING,
 }
-UNTYPED = {"-1", "none", ""}
-"""Types that say nothing: name and shape decide."""
+UNTYPED = {"-1", "none", ""}  # types that say nothing: name and shape decide
 VAGUE_TYPES = UNTYPED | {"obstacle"}  # types of which name and shape say more
 
 WORDS_OF_KIND = {

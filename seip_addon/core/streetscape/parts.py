@@ -1,7 +1,5 @@
 """The parts that a modelled site is made of."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

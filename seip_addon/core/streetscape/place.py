@@ -1,7 +1,5 @@
 """The place of a map that is studied: its middle, its region of interest and its level, in map coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,10 +18,8 @@ from .description import DEFAULT_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
 from .levels import Levels, split_levels
 
-SCENE_MARGIN = 40.0
-"""Metres that the scene extends beyond the region of interest, for occluders at its edge."""
-MAX_ROAD_DISTANCE = 10.0
-"""Roads this near to the middle of the place (metres) may each be the one that is meant."""
+SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
+MAX_ROAD_DISTANCE = 10.0  # roads this near to the middle of the place (metres) may each be the one that is meant
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,5 @@
 """Lanes of a map as the surfaces of a street: carriageways, pavements, kerbs and lane markings."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -33,8 +31,7 @@ GROUPS = {
 
 CARRIAGEWAY = ("driving", "shoulder", "parking", "biking", "track")
 MAX_STEP = 10.0
-CORNER_NOTCH = 3.0
-"""Notches up to twice this (metres) at the corners of a junction are pavement."""
+CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junction are pavement
 MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
@@ -45,24 +42,14 @@ MARKING_ABOVE = 0.012
 DASH_LENGTH, DASH_GAP = 3.0, 6.0
 STOP_LINE_WIDTH = 0.4
 STOP_LINE_SETBACK = 1.0
-SNAP_GRID = 1e-4
-"""Grid (metres) that plans snap to when they are joined."""
-MIN_MARKED_WIDTH = 1.0
-"""Lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them."""
-MAX_SEAM = 0.05
-"""Gaps up to twice this (metres) between the lanes of two roads are closed in outlines."""
-
-MAX_ISLAND_AREA = 400.0
-"""Holes of the carriageway smaller than this (m²) are islands, on which no post is assumed."""
-MAX_MEDIAN_WIDTH = 12.0
-"""Holes narrower than this (metres) are medians: likewise."""
-MAX_OPEN_MEDIAN_WIDTH = 6.0
-"""Gaps between carriageways narrower than this (metres) are medians though no junction closes them."""
-
-MAX_PAVEMENT_DISTANCE = 6.0
-"""A pavement within this (metres) of the carriageway lies beside it, whatever verge is between."""
-SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0
-"""Metres: sampling step along sides of roads, and least length of a side without pavement."""
+SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
+MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
+MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
+MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
+MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
+MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
+MAX_PAVEMENT_DISTANCE = 6.0  # a pavement within this (metres) of the carriageway lies beside it, whatever is between
+SIDE_STEP, MIN_SIDE_LENGTH = 2.0, 10.0  # metres: sampling step along sides of roads, and least side without pavement
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +59,6 @@ class Roadside:
     Parameters
     ----------
     carriageway : shapely geometry
-        In plan.
     filled : shapely geometry
         The carriageway with its islands and medians: holes between the lanes of
         a junction, small ones and narrow ones, and narrow gaps.
@@ -167,9 +153,7 @@ def cut_along(surface: LaneSurface, low: float, high: float) -> LaneSurface | No
     known = np.arange(len(surface.s))
     inside = known[(surface.s > low) & (surface.s < high)]
     ends = np.interp([low, high], surface.s, known)
-    rows = np.concatenate([ends[:1], inside, ends[1:]])
-    s = np.interp(rows, known, surface.s)
-    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+    return _at_rows(surface, np.concatenate([ends[:1], inside, ends[1:]]))
 
 
 def group(surface: LaneSurface) -> str | None:
@@ -210,10 +194,9 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
 def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
     """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
 
-    Lanes that cross each other in a junction differ in height by some
-    centimetres: there the group is laid anew as one layer at their mean
-    height, and groups other than driving lanes give way to these. Elsewhere
-    lanes meet edge to edge and stay as they are.
+    Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as one
+    layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge to edge
+    and stay as they are.
     """
     lanes = in_groups(surfaces, [name])
     pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
@@ -243,10 +226,9 @@ def kerb_faces(pavement: Float) -> Float:
 def corner_pavements(pavement: Float, surfaces: Sequence[LaneSurface], carriageway: BaseGeometry) -> Float:
     """Return (n, 3, 3) triangles that close pavements (m, 3, 3) round the corners of junctions.
 
-    Many maps end the pavements where the junction begins. A notch between the
-    ends of two pavements and the carriageway is filled at the pavements' height,
-    unless the map has a pavement of its own there: within the junction, or
-    beside the carriageway, beyond a verge. A median is no corner either.
+    Many maps end the pavements where the junction begins. A notch between the ends of two pavements and the carriageway
+    is filled at the pavements' height, unless the map has a pavement of its own there: within the junction, or beside
+    the carriageway, beyond a verge. A median is no corner either.
     """
     inside = _plan([lane for lane in in_groups(surfaces, CARRIAGEWAY) if lane.junction_id is not None])
     if inside.is_empty or len(pavement) == 0:
@@ -346,13 +328,13 @@ def _moved(surface: LaneSurface, origin: Float) -> LaneSurface:
 def _densified(surface: LaneSurface) -> LaneSurface:
     steps = np.hypot(*np.diff((surface.left + surface.right)[:, :2] / 2, axis=0).T)
     pieces = np.maximum(1, np.ceil(steps / MAX_STEP).astype(int))
-    rows = np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))])
-    s = np.interp(rows, np.arange(len(surface.s)), surface.s)
-    return dataclasses.replace(surface, s=s, left=_at_rows(surface.left, rows), right=_at_rows(surface.right, rows))
+    return _at_rows(surface, np.concatenate([[0.0], *(i + np.arange(1, k + 1) / k for i, k in enumerate(pieces))]))
 
 
-def _at_rows(points: Float, rows: Float) -> Float:
-    return _interpolated(rows, np.arange(len(points)), points)
+def _at_rows(surface: LaneSurface, rows: Float) -> LaneSurface:
+    known = np.arange(len(surface.s))
+    left, right = (_interpolated(rows, known, edge) for edge in (surface.left, surface.right))
+    return dataclasses.replace(surface, s=np.interp(rows, known, surface.s), left=left, right=right)
 
 
 def _interpolated(at: Float, known: Float | Integer, points: Float) -> Float:

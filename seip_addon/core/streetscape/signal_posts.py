@@ -1,9 +1,7 @@
 """The posts of a map's traffic lights: the map's own where it has them, else assumed ones beside the carriageway."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,16 +17,13 @@ from .parts import Part, Role
 from .road_surface import Roadside
 from .terrain import Terrain
 
-DEFAULT_HEIGHT = 6.0
-"""Of a post (metres) whose height the map does not give."""
+DEFAULT_HEIGHT = 6.0  # of a post (metres) whose height the map does not give
 MAST_ARM, MAX_ARM = 4.5, 12.0
-MIN_HEIGHT_FOR_ARM = 4.5
-"""A lower post (metres) has no arm over traffic."""
+MIN_HEIGHT_FOR_ARM = 4.5  # a lower post (metres) has no arm over traffic
 KERB_CLEARANCE = 0.6
 SAME_POLE_DISTANCE = 3.0
 """Signals whose poles would stand nearer than this (metres) share one; a post of any kind so near carries a signal."""
-MAST_REACH = 12.0
-"""A post whose name tells of signals carries one up to so far away (metres)."""
+MAST_REACH = 12.0  # a post whose name tells of signals carries one up to so far away (metres)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +71,9 @@ def signal_parts(
 ) -> tuple[Part, ...]:
     """Return the posts of traffic lights, with their heads and arms.
 
-    A post of the map stands where the map has it. Without one a signal beside
-    the carriageway is its post, and one over it hangs on a mast arm from the
-    nearest place beside. Heights of signals in the map are not used, as maps
-    give posts below the road and lamps above it.
+    A post of the map stands where the map has it. Without one a signal beside the carriageway is its post, and one over
+    it hangs on a mast arm from the nearest place beside. Heights of signals in the map are not used, as maps give posts
+    below the road and lamps above it.
 
     Parameters
     ----------
@@ -91,17 +85,15 @@ def signal_parts(
         pole = _post_for(signal, own, roadside)
         if all(np.hypot(*(pole.foot - other.foot)) > SAME_POLE_DISTANCE for other in poles):
             poles.append(pole)
-    return tuple(_parts(poles, terrain))
-
-
-def _parts(poles: Sequence[_SignalPost], terrain: Terrain) -> Iterator[Part]:
+    parts = []
     for number, pole in enumerate(poles, start=1):
         shape = street_furniture.signal_pole(pole.height, pole.arm, faces_left=pole.faces_left)
         x, y = pole.foot.tolist()
         z = float(terrain.height(pole.foot[None])[0])
         role = Role.POLES if pole.carries else Role.OCCLUDERS
         name = f"{'Assumed signal' if pole.source == ASSUMED else 'Signal'} pole {number}"
-        yield Part(name, shape, (role,), (x, y, z), pole.heading, source=pole.source)
+        parts.append(Part(name, shape, (role,), (x, y, z), pole.heading, source=pole.source))
+    return tuple(parts)
 
 
 def _own_post(signal: PlacedSignal, posts: Sequence[tuple[int, Post]], roadside: Roadside) -> tuple[int, Post | None]:

@@ -1,10 +1,7 @@
 """Procedural street furniture as plain arrays: few faces, true outlines.
 
-Every solid stands with its foot in the origin and z up; what has an arm
-reaches along +x. Sizes are in metres.
+Every solid stands with its foot in the origin and z up; what has an arm reaches along +x. Sizes are in metres.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -13,11 +10,9 @@ import numpy as np
 from ..arrays import Float
 
 POST_SIDES = 6
-TRUNK_SIDES = 6
 STOREY_HEIGHT = 3.2
 WINDOW_SPACING = 3.4
-WINDOW_OFFSET = 0.03
-"""How far window panes stand before the wall, so that they are drawn before it."""
+WINDOW_OFFSET = 0.03  # how far window panes stand before the wall, so that they are drawn before it
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,21 +53,10 @@ def from_faces(faces_xyz: Float, material: str) -> Solid:
     return Solid(vertices, faces, (material,) * len(faces))
 
 
-def prism(outline: Float, base: float, top: float, *, side: str, cap: str | None = None) -> Solid:
-    """Return the upright block above a simple outline.
-
-    Parameters
-    ----------
-    outline : (k, 2) float64, metres
-        Corners in plan, in any sense of turn, not closed.
-    base, top : float, metres
-        Lower and upper height.
-    side, cap : str
-        Materials of the sides and of the upper face; without ``cap`` that of the sides.
-    """
-    count = len(outline)
-    floor = np.column_stack([outline, np.full(count, base)])
-    return block(floor, np.full(count, top - base), side=side, cap=cap)
+def prism(outline: Float, base: float, top: float, *, side: str) -> Solid:
+    """Return the upright block of one material between two heights (metres) of an outline (k, 2) that is not closed."""
+    floor = np.column_stack([outline, np.full(len(outline), base)])
+    return block(floor, np.full(len(outline), top - base), side=side)
 
 
 def block(base: Float, height: Float, *, side: str, cap: str | None = None) -> Solid:
@@ -180,9 +164,7 @@ def tree(height: float, crown_diameter: float, variant: int) -> Solid:
     """
     crown_height = min(0.68 * height, 1.35 * crown_diameter)
     middle = height - crown_height / 2
-    trunk = tube(
-        np.array([0, 0, 0]), np.array([0, 0, middle]), (0.025 * height, 0.012 * height), "bark", sides=TRUNK_SIDES
-    )
+    trunk = tube(np.array([0, 0, 0]), np.array([0, 0, middle]), (0.025 * height, 0.012 * height), "bark")
     random = np.random.default_rng(variant)
     directions, faces = _icosphere()
     bumps = 1.0 - 0.22 * random.random(len(directions))

@@ -1,7 +1,5 @@
 """The height of the ground: looked up on triangles, and areas in plan laid on them."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -10,10 +8,8 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..geometry.plan import plane_height, signed_area
 
-MIN_AREA = 1e-6
-"""Triangles smaller than this in plan (m²) carry nothing and are left out."""
-SNAP_GRID = 1e-6
-"""Grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated."""
+MIN_AREA = 1e-6  # triangles smaller than this in plan (m²) carry nothing and are left out
+SNAP_GRID = 1e-6  # grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated
 
 
 class Terrain:

@@ -1,7 +1,5 @@
 """Bodies of road users: closed meshes of few triangles, stretched to a road user's size."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,18 +30,12 @@ REFLECTIVITY: Mapping[str, float] = {
 """Share of near infrared (905 nm) that each material sends back, assumed; paint and clothes have the road user's."""
 
 PAINT_COLOURS = (
-    (0.12, "black"),
-    (0.24, "blue"),
-    (0.34, "green"),
-    (0.44, "red"),
-    (0.56, "grey"),
-    (0.70, "silver"),
+    *((0.12, "black"), (0.24, "blue"), (0.34, "green"), (0.44, "red"), (0.56, "grey"), (0.70, "silver")),
     (1.00, "white"),
 )
 """Up to which reflectivity paint and clothes are shown in which colour."""
 
-PAINTED_MATERIALS = ("paint", "cloth")
-"""Materials that have the road user's reflectivity; in a body a colour follows: ``paint red``."""
+PAINTED_MATERIALS = ("paint", "cloth")  # have the road user's reflectivity; in a body a colour follows: ``paint red``
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +59,6 @@ class Body:
     material: Text
 
     def __len__(self) -> int:
-        """Return the number of triangles."""
         return len(self.triangles)
 
 
@@ -76,10 +67,6 @@ def fitted_body(user: RoadUser) -> Body:
 
     Road users of one category, size and paint get the same object, and those
     of one category and size the same array of triangles.
-
-    Returns
-    -------
-    Body
 
     Raises
     ------

@@ -1,12 +1,9 @@
 """SUMO's floating car data (FCD): where each road user was at each step of a simulation.
 
-A vehicle's position is the middle of its front bumper, its angle is counted
-clockwise from north in degrees, and coordinates are those of the network: the
-map's plus the network's offset (SUMO's documentation, "FCDOutput"). A person's
-position is taken as the person's middle, as SUMO draws it.
+A vehicle's position is the middle of its front bumper, its angle is counted clockwise from north in degrees, and
+coordinates are those of the network: the map's plus the network's offset (SUMO's documentation, "FCDOutput"). A
+person's position is taken as the person's middle, as SUMO draws it.
 """
-
-from __future__ import annotations
 
 import csv
 import io
@@ -28,9 +25,7 @@ from .sumo_files import MAX_COORDINATE, Attributes, opened, quoted, read_tags, s
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 
-_MAX_NAMED = 5
-"""As many road users a message names; the others it counts."""
-
+_MAX_NAMED = 5  # as many road users a message names; the others it counts
 _LINES_PER_REPORT = 20_000  # of csv between two reports of progress
 
 
@@ -89,10 +84,6 @@ def read_floating_car_data(
         Of the network: map = network − offset.
     window : Extent, optional
         What lies outside is not kept in memory.
-
-    Returns
-    -------
-    FloatingCarData
 
     Raises
     ------

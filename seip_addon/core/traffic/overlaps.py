@@ -1,7 +1,5 @@
 """Removal of overlapping road users from simulated traffic."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 
@@ -12,8 +10,7 @@ from ..arrays import Float, Integer
 from ..progress import Progress
 from .trajectories import Snapshot, Trajectories
 
-MIN_OVERLAP = 0.02
-"""Square metres of two footprints in one place below which they only touch."""
+MIN_OVERLAP = 0.02  # square metres of two footprints in one place below which they only touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +24,6 @@ class Overlaps:
     area : (k,) float64, square metres
         The largest overlap of their footprints at any of the instants.
     time : (k,) float64, seconds
-        When that is.
     """
 
     pair: Integer
@@ -35,7 +31,6 @@ class Overlaps:
     time: Float
 
     def __len__(self) -> int:
-        """Return the number of pairs."""
         return len(self.pair)
 
 

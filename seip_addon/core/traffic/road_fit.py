@@ -1,7 +1,5 @@
 """Fit of road users to the road surface of a scene: heights, slopes, and removal where there is no road."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,11 +20,8 @@ ROAD_TOLERANCE = 1.0
 As far as that a bus of 12 m, which simulations move like a rod on its lane, cuts a tight corner.
 """
 
-WHEELBASE_SHARE = 0.6
-"""Of the length of a vehicle: its pitch is that of the road between two axles this far apart."""
-
-MAX_GAP = 2.5
-"""Sampling intervals; between samples further apart than this a road user was somewhere else."""
+WHEELBASE_SHARE = 0.6  # of the length of a vehicle: its pitch is that of the road between two axles this far apart
+MAX_GAP = 2.5  # sampling intervals; between samples further apart than this a road user was somewhere else
 
 _DIGITS = {"time": 3, "position": 3, "yaw": 4, "pitch": 4, "speed": 2}
 """Of what is kept: a millimetre and a ten-thousandth of a radian, as fine as simulations write."""

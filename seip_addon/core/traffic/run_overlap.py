@@ -1,7 +1,5 @@
 """Overlap of two runs of traffic: share of vehicles at the same place at the same instant."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -12,8 +10,7 @@ from ..arrays import Float
 from ..errors import SeipError
 from .trajectories import Trajectories
 
-MATCH_RADIUS = 1.0
-"""Metres in plan within which two vehicles are in one place."""
+MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are in one place
 
 MAX_OVERLAP = 0.5
 """Share of the vehicles beyond which two runs are held to be copies. Independent runs queue in the same places."""

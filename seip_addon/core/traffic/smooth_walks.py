@@ -1,7 +1,5 @@
 """Smoothing of SUMO's pedestrians, who leap by a metre or two where a crossing begins, and turn on the spot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +7,8 @@ import numpy as np
 from ..arrays import Boolean, Float
 from .trajectories import Trajectories
 
-WINDOW_SECONDS = 1.8
-"""Seconds over which a pedestrian's position and heading are averaged."""
-
-MAX_LEAP = 4.0
-"""Metres beyond what its speed explains: who moves further than that between two samples was put somewhere else."""
+WINDOW_SECONDS = 1.8  # seconds over which a pedestrian's position and heading are averaged
+MAX_LEAP = 4.0  # metres beyond what its speed explains: who moves further between two samples was put elsewhere
 
 
 def out_of_reach(trajectories: Trajectories) -> Boolean:

@@ -1,7 +1,5 @@
 """Traffic for a scene, out of a user's files: trajectories, or SUMO's floating car data put on the road."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Generator
@@ -21,14 +19,9 @@ from .sumo_files import read_net_offset
 from .trajectories import CATEGORIES, LoadedTraffic, Trajectories
 from .vehicle_types import read_vehicle_types
 
-MAX_REGION_DISTANCE = 500.0
-"""Metres from the region beyond which traffic is another place's."""
-
-ROAD_MARGIN = 20.0
-"""Metres beyond the road of the scene within which traffic is read."""
-
-OVERLAP_INTERVAL = 1.0
-"""Seconds between the instants that are searched for overlapping road users."""
+MAX_REGION_DISTANCE = 500.0  # metres from the region beyond which traffic is another place's
+ROAD_MARGIN = 20.0  # metres beyond the road of the scene within which traffic is read
+OVERLAP_INTERVAL = 1.0  # seconds between the instants that are searched for overlapping road users
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """SUMO's XML files, read as they stream by: they may be larger than memory, and nothing in them is trusted."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import os
@@ -20,9 +18,7 @@ from ..progress import Progress
 
 Attributes = dict[str, str]
 
-MAX_COORDINATE = 1e8
-"""Metres of a coordinate at most: more than the circumference of the Earth."""
-
+MAX_COORDINATE = 1e8  # metres of a coordinate at most: more than the circumference of the Earth
 _MAX_QUOTED = 60  # characters of a file that a message repeats
 _CHUNK = 1 << 20
 _GZIP = b"\x1f\x8b"

@@ -13,14 +13,9 @@ from ..arrays import Float, Integer
 from ..storage.array_file import ArrayFile, ArrayRule, ContentError
 from ..storage.files import digest
 
-MAX_USER_SIZE = 100.0
-"""Metres of length, width or height of a road user at most."""
-
-MAX_DURATION = 30.0 * 86400.0
-"""Seconds from the first sample of trajectories to the last at most: 30 days."""
-
-MAX_EXTENT = 1e6
-"""Metres from one sample to another at most, along each axis."""
+MAX_USER_SIZE = 100.0  # metres of length, width or height of a road user at most
+MAX_DURATION = 30.0 * 86400.0  # seconds from the first sample of trajectories to the last at most: 30 days
+MAX_EXTENT = 1e6  # metres from one sample to another at most, along each axis
 
 _ARRAYS = {
     "origin": ArrayRule("f8", (3,), -1e8, 1e8),
@@ -35,8 +30,7 @@ FILE = ArrayFile(
     "seip.trajectories", 2, "file of trajectories", "import or simulate them again", _ARRAYS, undigested=True
 )
 
-CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")
-"""What a road user can be; labels and bodies go by these."""
+CATEGORIES = ("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian")  # of road users
 
 
 @dataclass(frozen=True)
@@ -88,7 +82,6 @@ class Snapshot:
     speed: Float
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.user)
 
 
@@ -126,7 +119,6 @@ class Trajectories:
     source: str = ""
 
     def __len__(self) -> int:
-        """Return the number of road users."""
         return len(self.users)
 
     @cached_property
@@ -246,5 +238,4 @@ def _check_samples(read: Trajectories) -> None:
         raise ContentError(f"its road users are up to {widest / 1e3:,.0f} km apart")
 
 
-_TURN_TOLERANCE = 1e-3
-"""Radians by which rounding may widen a turn."""
+_TURN_TOLERANCE = 1e-3  # radians by which rounding may widen a turn

@@ -1,7 +1,5 @@
 """Category and size of SUMO's vehicle types."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Generator, Sequence
@@ -30,11 +28,8 @@ class VehicleType:
     height: float
 
 
-CAR = VehicleType("car", 5.0, 1.8, 1.5)
-"""What SUMO drives where nothing else is said."""
-
-PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)
-"""What SUMO lets walk where nothing else is said."""
+CAR = VehicleType("car", 5.0, 1.8, 1.5)  # what SUMO drives where nothing else is said
+PERSON = VehicleType("pedestrian", 0.215, 0.478, 1.719)  # what SUMO lets walk where nothing else is said
 
 _CLASSES = {
     "pedestrian": PERSON,
@@ -53,32 +48,18 @@ _CLASSES = {
 }
 """Sizes that a vClass brings with it (SUMO's "Vehicle Type Parameter Defaults"); all others are cars."""
 
-_SHAPES = {
-    "pedestrian": "pedestrian",
-    "bicycle": "bicycle",
-    "scooter": "bicycle",
-    "moped": "motorcycle",
-    "motorcycle": "motorcycle",
-    "passenger": "car",
-    "passenger/sedan": "car",
-    "passenger/hatchback": "car",
-    "passenger/wagon": "car",
-    "passenger/van": "van",
-    "taxi": "car",
-    "evehicle": "car",
-    "police": "car",
-    "delivery": "van",
-    "emergency": "van",
-    "firebrigade": "truck",
-    "truck": "truck",
-    "truck/semitrailer": "truck",
-    "truck/trailer": "truck",
-    "bus": "bus",
-    "bus/coach": "bus",
-    "bus/flexible": "bus",
-    "bus/trolley": "bus",
+_SHAPES_OF = {
+    "pedestrian": ("pedestrian",),
+    "bicycle": ("bicycle", "scooter"),
+    "motorcycle": ("moped", "motorcycle"),
+    "car": ("passenger", "passenger/sedan", "passenger/hatchback", "passenger/wagon", "taxi", "evehicle", "police"),
+    "van": ("passenger/van", "delivery", "emergency"),
+    "truck": ("firebrigade", "truck", "truck/semitrailer", "truck/trailer"),
+    "bus": ("bus", "bus/coach", "bus/flexible", "bus/trolley"),
 }
-"""Categories by guiShape, which says more than the vClass where both are given."""
+"""Values of guiShape, which says more than the vClass where both are given, by category."""
+
+_SHAPES = {shape: category for category, shapes in _SHAPES_OF.items() for shape in shapes}
 
 BUILT_IN = {
     "DEFAULT_VEHTYPE": CAR,
@@ -89,9 +70,7 @@ BUILT_IN = {
 """Types that SUMO knows without a file."""
 
 
-def read_vehicle_types(
-    paths: Sequence[str | os.PathLike[str]],
-) -> Generator[Progress, None, dict[str, VehicleType]]:
+def read_vehicle_types(paths: Sequence[str | os.PathLike[str]]) -> Generator[Progress, None, dict[str, VehicleType]]:
     """Read the types from route and additional files, those within distributions included.
 
     Parameters

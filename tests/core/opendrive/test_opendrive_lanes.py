@@ -310,11 +310,6 @@ def test_a_two_sided_section_ends_the_lanes_of_both_sides(folder):
     assert [(surface.section, surface.lane_id) for surface in found] == [(0, 1), (0, -1), (1, -1)]
 
 
-def test_a_tolerance_must_be_above_zero(folder):
-    with pytest.raises(SeipError, match="tolerance of 0 m"):
-        surfaces(folder, road(), tolerance=0.0)
-
-
 def test_a_road_that_cannot_be_followed_is_named(folder):
     wild = road(number="17", elevation='<elevation s="0" a="0" b="0" c="0" d="1e8"/>')
     with pytest.raises(SeipError, match="road 17, lane section at s=0 winds too tightly"):
