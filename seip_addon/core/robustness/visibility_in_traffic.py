@@ -14,6 +14,8 @@ cast that pass through the bounding box of a road user, at the bodies alone, and
 target's answer is looked at again only where one of its own rays was stopped.
 """
 
+from __future__ import annotations
+
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
