@@ -18,9 +18,10 @@ from headless.calibration.comparison import compare, pair
 from headless.calibration.reference import load_reference
 from headless.calibration.report import describe, save_calibration
 from headless.charts.calibration import save_fate_chart, save_ground_chart, save_noise_chart, save_vertical_chart
-from headless.options import new_parser
+from headless.options import add_settings, new_parser
 
 from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.workflows.survey import SurveySettings
 
 CHARTS = {
     "ground.png": save_ground_chart,
@@ -61,7 +62,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="MEASURED=KEY",
         help="models of measured sensors whose name is no key of the catalogue",
     )
-    parser.add_argument("--catalogue", nargs="+", type=Path, default=[], metavar="TOML", help="catalogues of your own")
+    add_settings(parser, SurveySettings, "catalogue")
     return parser
 
 
