@@ -143,11 +143,11 @@ def _ouster(text: str) -> UnitBeams:
     beams = _object(content["beam_intrinsics"], "beam_intrinsics") if nested else content
     lidar = _object(content.get("config_params", {}), "config_params") if nested else content
     sensor = _object(content.get("sensor_info", {}), "sensor_info") if nested else content
-    layout = _object(content.get("lidar_data_format" if nested else "data_format", {}), "data format")
+    layout = content.get("lidar_data_format" if nested else "data_format")
     elevations = _angles(beams, "beam_altitude_angles")
     offsets = _angles(beams, "beam_azimuth_angles")
-    rows = layout.get("pixels_per_column", len(elevations))
-    if rows != len(elevations):
+    rows = layout.get("pixels_per_column") if isinstance(layout, dict) else None  # old firmware has a text there
+    if rows not in (None, len(elevations)):  # whatever JSON holds there
         raise ValueError(f"has {len(elevations)} beam_altitude_angles for {rows!r} pixels_per_column")
     mode = str(lidar.get("lidar_mode", ""))
     known = re.fullmatch(r"(\d{3,5})x(\d{1,3})", mode)

@@ -81,6 +81,7 @@ def robosense(elevations=ELEVATIONS, offsets=OFFSETS):
 FILES = {
     "nested.json": json.dumps(ouster()),
     "flat.json": json.dumps(ouster(nested=False)),
+    "old.json": json.dumps(ouster() | {"lidar_data_format": "error: Command not recognized."}),
     "db.xml": xml(),
     "braces.yaml": yaml(),
     "lines.yml": yaml(braces=False),
@@ -189,6 +190,7 @@ LAUGHS = (
         ("u.json", changed(ouster(), 3, "beam_intrinsics"), "has a beam_intrinsics that is no object"),
         ("u.json", changed(ouster(), [1.0], "beam_intrinsics", "beam_azimuth_angles"), "4 elevations and 1 azimuth"),
         ("u.json", changed(ouster(), 64, "lidar_data_format", "pixels_per_column"), "for 64 pixels_per_column"),
+        ("u.json", changed(ouster(), [4], "lidar_data_format", "pixels_per_column"), "for \\[4\\] pixels_per_column"),
         ("u.json", changed(ouster(), "fast", "config_params", "lidar_mode"), "the lidar_mode 'fast', which is not"),
         ("u.json", ouster([0.0] * 4, [0.0] * 4), "the same angles for its beams 1 and 2"),
         ("u.json", ouster([90.0, 1, 2, 3]), "has an elevation that is not between -90 and 90"),
