@@ -17,6 +17,7 @@ VERBS = {
     "evaluate": "average precision of types × numbers",
     "train": "train and test one detector",
     "compare-detectors": "average precision against time of other detector settings",
+    "calibrate": "compare LiDAR models with measured sweeps",
     "stability": "drive every method to where it fails (laboratory)",
     "benchmark": "measure speed and error (laboratory)",
 }

@@ -28,6 +28,7 @@ from seip_addon.core.scans.run_folder import Record, Run, check_run_folder
 from seip_addon.core.site.weather import weather_of
 from seip_addon.core.traffic.source import load_trajectories
 from seip_addon.core.workflows.recording import RecordingSettings, dataset_folder, make_run, record, simulation_of
+from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.sensors import read_sensors
@@ -103,7 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the run")
     parser.add_argument("--traffic", type=Path, metavar="NPZ", help="trajectories (those animated in the scene)")
-    parser.add_argument("--catalogue", nargs="+", type=Path, default=[], metavar="TOML", help="catalogues of your own")
+    add_settings(parser, SurveySettings, "catalogue")
     when = parser.add_argument_group("frames")
     add_settings(when, RecordingSettings, "start", "duration", "rate")
     how = parser.add_argument_group("measurement")

@@ -204,6 +204,41 @@ def _read_catalogue(path: Path, _: bytes) -> None:
         assert np.isfinite([model.max_range, model.points_per_second, model.rotation_rate]).all(), "a model in no range"
 
 
+# --- calibration files of units, and measurements of sensors
+
+
+def _units(suffix: str) -> Callable[[Path], list[bytes]]:
+    def samples(_: Path) -> list[bytes]:
+        from unit_text import FILES  # noqa: PLC0415
+
+        return [text.encode() for name, text in FILES.items() if name.endswith(suffix)]
+
+    return samples
+
+
+def _read_unit(path: Path, _: bytes) -> None:
+    from seip_addon.core.lidar.unit_files import read_unit_file  # noqa: PLC0415
+
+    beams = read_unit_file(path)
+    assert np.isfinite([beams.elevations, beams.azimuth_offsets]).all(), "beams that are not finite"
+
+
+def _measurements(_: Path) -> list[bytes]:
+    from measured_sensor import LAW, measured  # noqa: PLC0415
+
+    return [json.dumps(measured(LAW)).encode()]
+
+
+def _mutate_text(random: Random, content: bytes) -> Case:
+    return Case(mutated_text(random, content))
+
+
+def _read_measurements(path: Path, _: bytes) -> None:
+    from headless.calibration.reference import load_reference  # noqa: PLC0415
+
+    load_reference(path)
+
+
 # --- SUMO's files
 
 
@@ -486,6 +521,11 @@ FORMATS = {
     "map": Format((".xodr",), _maps, _mutate_map, _read_map),
     "site": Format((".toml",), _descriptions, _mutate_description, _read_description),
     "catalogue": Format((".toml",), _catalogues, _mutate_catalogue, _read_catalogue),
+    **{
+        f"unit{suffix}": Format((suffix,), _units(suffix), _mutate_text, _read_unit)
+        for suffix in (".json", ".xml", ".yaml", ".yml", ".csv")
+    },
+    "measurements": Format((".json",), _measurements, _mutate_text, _read_measurements),
     "fcd": Format((".xml",), _floating_car_data, _mutate_floating_car_data, _read_floating_car_data),
     "routes": Format((".xml",), _routes, _mutate_routes, _read_routes),
     "npz": Format((".npz",), _arrays, _mutate_arrays, _read_arrays),

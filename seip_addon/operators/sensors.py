@@ -33,13 +33,13 @@ class SEIP_OT_list_sensor_types(bpy.types.Operator):
 
 
 class SEIP_OT_add_catalogue(bpy.types.Operator):
-    """Add a catalogue of your own: a TOML file of LiDAR models, as docs/sensors.md describes"""
+    """Add a catalogue of your own, or a unit's calibration file: docs/sensors.md describes both"""
 
     bl_idname = "seip.add_catalogue"
     bl_label = "Add Catalogue"
 
     filepath: bpy.props.StringProperty(name="File", description="The catalogue", subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default="*.toml;*.json;*.xml;*.yaml;*.yml;*.csv", options={"HIDDEN"})
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:

@@ -1,4 +1,4 @@
-"""The catalogue of LiDAR models: TOML files, the shipped one and those that users add."""
+"""The catalogue of LiDAR models: TOML files, the shipped one and those that users add, and beams of single units."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from ..storage.toml_table import Key, parse_toml, read_table
 from .carla_dropoff import CarlaDropoff
 from .model import LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
+from .unit_files import is_unit_file, read_unit_file
 
 
 def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, LidarModel]:
@@ -25,7 +26,9 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     Parameters
     ----------
     extra : iterable of path-like
-        TOML files in the form of the shipped ``catalogue.toml``.
+        TOML files in the form of the shipped ``catalogue.toml``, and calibration files of units (`unit_files`), whose
+        beams take the place of those of the model that ``KEY=`` before the path names, or else the product's name in
+        the file, or the file's name.
 
     Returns
     -------
@@ -39,9 +42,13 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
     """
     shipped = resources.files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8")
     catalogue = _parse(shipped, "catalogue.toml")
-    for path in extra:
+    for path in map(Path, extra):
+        if is_unit_file(path):
+            model = _unit(path, catalogue)
+            catalogue[model.key] = model
+            continue
         try:
-            content = Path(path).read_text(encoding="utf-8")
+            content = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise SeipError(f"cannot read the LiDAR catalogue {path}: {error}; name a TOML file") from error
         catalogue |= _parse(content, str(path))
@@ -55,6 +62,18 @@ def find_models(catalogue: Mapping[str, LidarModel], keys: Sequence[str]) -> dic
             close = difflib.get_close_matches(key, catalogue, n=3, cutoff=0.4) or list(catalogue)
             raise SeipError(f"no LiDAR '{key}' in the catalogue; did you mean {', '.join(close)}?")
     return {key: catalogue[key] for key in keys}
+
+
+def _unit(named: Path, catalogue: Mapping[str, LidarModel]) -> LidarModel:
+    """Return the model of a catalogue with the beams of a unit, named by its file or as ``KEY=path``."""
+    key, _, rest = str(named).partition("=")
+    path = named if named.exists() or not rest else Path(rest)
+    beams = read_unit_file(path)
+    if path is named:
+        key = beams.key or path.stem.lower()
+        if key not in catalogue:
+            raise SeipError(f"{path} does not say which LiDAR it is of: name one, as in --catalogue KEY={path.name}")
+    return beams.as_model(find_models(catalogue, [key])[key], path.name)
 
 
 def _parse(content: str, file: str) -> dict[str, LidarModel]:

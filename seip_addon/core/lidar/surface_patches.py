@@ -7,16 +7,22 @@ the place alone: the sum of a number for each of some cubic lattices that the pl
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float
 from .noisy_returns import normal
 
-PATCH_SIZES = (0.35, 1.4, 5.6)
-PATCH_VARIANCES = (0.35, 0.35, 0.3)
+PATCH_SIZES = (0.35, 1.4, 16.0)
+PATCH_VARIANCES = (0.15, 0.5, 0.35)
 """Edges of the lattices' cubes in metres, and their shares of the variance: fitted to how alike the fates of
-neighbouring rays on roads are, at 20 to 100 m."""
+neighbouring rays on roads are, at 20 to 100 m, and to how far sectors of 10° differ there."""
+
+PHASE = (3.0 - math.sqrt(5.0)) / 2.0
+"""Where the lattices begin, in edges: at no round coordinate, lest rounding share the hits on a level road at height 0,
+or on a wall, out to the cubes on either side."""
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
@@ -38,7 +44,7 @@ def surface_deviation(xyz: Float, seed: tuple[int, ...]) -> Float:
     """
     total = np.zeros(len(xyz))
     for number, (size, variance) in enumerate(zip(PATCH_SIZES, PATCH_VARIANCES, strict=True)):
-        cell = np.floor(xyz / size).astype(np.int64).view(np.uint64)
+        cell = np.floor(xyz / size + PHASE).astype(np.int64).view(np.uint64)
         bits = np.zeros(len(xyz), dtype=np.uint64)
         for one in (*seed, number):
             bits = _mixed(bits ^ np.uint64(one % 2**64))

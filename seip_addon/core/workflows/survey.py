@@ -70,7 +70,7 @@ class SurveySettings:
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
     weather: Weather = field(default_factory=Weather)
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
-    catalogue: tuple[Path, ...] = setting((), "catalogues of your own", metavar="TOML")
+    catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
     engine: Engine = setting("auto", "ray caster")
     solver: str = setting("auto", "auto (HiGHS where it is installed, else CBC), highs, cbc or gurobi")
     time_limit: float = 60.0

@@ -1,0 +1,1 @@
+"""Comparison of LiDAR models with measured sweeps."""

@@ -1,0 +1,148 @@
+"""Comparison of a LiDAR model with a measured sensor: shares returned, beams, range noise, and fates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import LidarModel, RangeEquation, find_models
+
+from .fate import FateCorrelation, simulate_fates
+from .reference import MeasuredSensor, NoiseBin
+from .share_fit import Fits, fit
+
+CHART_LAGS = tuple(range(1, 11))
+"""Rays apart for which charts show how alike fates are."""
+
+
+@dataclass(frozen=True)
+class BeamDifference:
+    """Largest and root mean square differences of beams, in degrees.
+
+    Those of azimuth are what is left after the common rotation, counted in the sense of turning that fits better.
+    """
+
+    elevation_largest: float
+    elevation_rms: float
+    azimuth_largest: float
+    azimuth_rms: float
+
+
+@dataclass(frozen=True)
+class NoiseRatio:
+    """Range noise of a model over the measured one, in a bin of ranges."""
+
+    bin: NoiseBin
+    ratio: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a model and a measured sensor have in common.
+
+    Parameters
+    ----------
+    name : str
+        Of the measured sensor.
+    fits : Fits or None
+        None where no bin has rays enough.
+    """
+
+    name: str
+    sensor: MeasuredSensor
+    model: LidarModel
+    fits: Fits | None
+    beams: BeamDifference
+    ground_noise: tuple[NoiseRatio, ...]
+    vertical_noise: tuple[NoiseRatio, ...]
+    fates: FateCorrelation
+
+
+def pair(
+    measured: Mapping[str, MeasuredSensor], catalogue: Mapping[str, LidarModel], asked: Sequence[str]
+) -> dict[str, LidarModel]:
+    """Return the model that each measured sensor is compared with.
+
+    Those are models of the same key; ``asked`` names others as ``MEASURED=KEY``.
+
+    Raises
+    ------
+    SeipError
+        A name is unknown, or there is nothing to compare.
+    """
+    keys = {name: name for name in measured if name in catalogue}
+    for one in asked:
+        name, equals, key = one.partition("=")
+        if not equals or name not in measured:
+            raise SeipError(f"--sensor {one}: write MEASURED=KEY, where MEASURED is {' or '.join(measured)}")
+        keys[name] = key
+    if not keys:
+        raise SeipError(
+            f"no measured sensor ({', '.join(measured)}) has the name of one in the catalogue: name a pair, as in "
+            f"--sensor {next(iter(measured))}=vls128"
+        )
+    models = find_models(catalogue, list(keys.values()))
+    return {name: models[key] for name, key in keys.items()}
+
+
+def compare(name: str, sensor: MeasuredSensor, model: LidarModel) -> Comparison:
+    """Compare a model with a measured sensor.
+
+    Raises
+    ------
+    SeipError
+        The model does not follow the range equation.
+    """
+    law = model.law
+    if not isinstance(law, RangeEquation):
+        raise SeipError(
+            f"LiDAR '{model.key}' follows the drop-off of CARLA, not the range equation: name another model"
+        )
+    lags = sorted({*sensor.fate_correlation, *CHART_LAGS})
+    return Comparison(
+        name=name,
+        sensor=sensor,
+        model=model,
+        fits=fit(sensor, law),
+        beams=_beam_difference(sensor, model),
+        ground_noise=_noise_ratios(sensor.range_noise_ground, model),
+        vertical_noise=_noise_ratios(sensor.range_noise_vertical, model),
+        fates=simulate_fates(sensor, law.spread, lags),
+    )
+
+
+def _beam_difference(sensor: MeasuredSensor, model: LidarModel) -> BeamDifference:
+    """Match beams by elevation: in order where there are as many, else each measured one with the nearest."""
+    measured = np.asarray(sensor.beams.elevation_deg)
+    published = np.degrees(model.elevations)
+    if len(measured) == len(published):
+        rows = np.argsort(measured, kind="stable")
+        partner = np.argsort(published, kind="stable")
+    else:
+        rows = np.arange(len(measured))
+        partner = np.abs(measured[:, None] - published).argmin(axis=1)
+    elevation = np.abs(measured[rows] - published[partner])
+    offsets, of_model = np.asarray(sensor.beams.azimuth_offset_deg)[rows], np.degrees(model.azimuth_offsets[partner])
+    azimuth = min((_unrotated(of_model - sense * offsets) for sense in (1.0, -1.0)), key=_rms)
+    return BeamDifference(float(elevation.max()), _rms(elevation), float(azimuth.max()), _rms(azimuth))
+
+
+def _unrotated(difference: Float) -> Float:
+    """Return the sizes (n,) of differences of angles, in degrees, less their common rotation, the circular mean."""
+    turns = np.exp(1j * np.radians(difference))
+    rest: Float = np.abs(np.degrees(np.angle(turns * np.conj(turns.mean()))))
+    return rest
+
+
+def _rms(values: Float) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _noise_ratios(bins: Sequence[NoiseBin], model: LidarModel) -> tuple[NoiseRatio, ...]:
+    closed = [one for one in bins if one.middle < np.inf]
+    noise = model.range_noise(np.array([one.middle for one in closed]))
+    return tuple(NoiseRatio(one, float(std) / one.robust_std_m) for one, std in zip(closed, noise, strict=True))
