@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from ..geometry.orientation import describe_tilt
 from ..site.scene_geometry import ASSUMED, FROM_MAP
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
@@ -87,7 +86,7 @@ class PlanLegend:
         for sensor in deployment.sensors[:rows]:
             self._mark(marker=markers[sensor.model.key], **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
             self._text(0.34, sensor.label, weight="bold")
-            mounting = f", {sensor.height:.3g} m{describe_tilt(sensor.tilt)}"
+            mounting = f", {sensor.height:.3g} m{sensor.turned}"
             self._text(0.70, _short(sensor.model.name, min(28, 37 - len(mounting))) + mounting)
             self._text(LEGEND_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
             if detailed:
