@@ -168,15 +168,15 @@ class Evaluator:
     def __init__(self, geometry: SceneGeometry, settings: SurveySettings, objective: Objective) -> None:
         spacing = max(EVALUATION_SPACING, math.sqrt(geometry.region.area / MAX_EVALUATION_TARGETS))
         wide = replace(settings.candidates, spacing=max(CANDIDATE_SPACINGS))
-        self.site = make_site(geometry, wide, spacing, settings.reach())
+        self._models = settings.models()
+        self.site = make_site(geometry, wide, spacing, settings.reach(), self._models)
         self.weights = target_weights(self.site, objective)
         self.geometry, self._objective = geometry, objective
-        self._models = settings.models()
         self._visibility: VisibilityModel = visibility_model(self.site, settings.visibility, settings.engine)
 
     def answer(self, settings: SurveySettings) -> Generator[Progress, None, Answer]:
         """Find the best placement under some settings, and evaluate it."""
-        site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach())
+        site = make_site(self.geometry, settings.candidates, settings.grid_spacing, settings.reach(), self._models)
         solution = yield from self.solve(site, settings)
         seen = solution.deployment.seen_by > 0
         return Answer(

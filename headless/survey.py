@@ -19,7 +19,6 @@ from headless.options import add_settings, name_only, read_settings
 import bpy
 import numpy as np
 
-from seip_addon.core.geometry.orientation import describe_tilt
 from seip_addon.core.placement.deployment import Sensor
 from seip_addon.core.placement.objective import Solution
 from seip_addon.core.progress import Progress, finish
@@ -73,7 +72,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     sensors = parser.add_argument_group("sensors")
     add_settings(sensors, CandidateSettings, "sensors")
     add_settings(sensors, SurveySettings, "catalogue")
-    add_settings(sensors, CandidateSettings, "heights", "tilts", "assumed_poles")
+    add_settings(sensors, CandidateSettings, "heights", "tilts", "yaws", "assumed_poles")
     metres = parser.add_argument_group("grid and candidates, in metres")
     add_settings(metres, SurveySettings, "grid_spacing")
     add_settings(metres, VisibilitySettings, "delta")
@@ -169,9 +168,8 @@ def save_solution(
 
 
 def describe_sensor(sensor: Sensor) -> str:
-    """Describe a sensor: type, position, height and tilt."""
-    tilt = describe_tilt(sensor.tilt)
-    return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{tilt}, {sensor.position_name}"
+    """Describe a sensor: type, position, height and how it is turned."""
+    return f"{sensor.label}  {sensor.model.key} at {sensor.height:g} m{sensor.turned}, {sensor.position_name}"
 
 
 def _settings(options: argparse.Namespace) -> SurveySettings:

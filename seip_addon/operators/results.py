@@ -13,7 +13,7 @@ from mathutils import Vector
 
 from .. import live_coverage, preferences, scene_status, scene_survey, selection
 from ..core.errors import SeipError
-from ..core.geometry.orientation import describe_tilt
+from ..core.placement.deployment import sensor_at
 from ..core.placement.objective import Objective, target_weights
 from ..core.progress import Progress
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
@@ -121,15 +121,14 @@ class SEIP_OT_rank_candidates(ForPlacement, LongWork[tuple[SceneState, list[Rank
         """Fill the list."""
         state, lines = result
         session.keep_state(scene, state)
-        candidates = state.layout.site.candidates
+        layout = state.layout
         ranking = scene.seip.result.ranking
         ranking.clear()
         for one in lines:
             line = ranking.add()
             line.pose, line.share = one.pose, one.share
-            position = candidates.position_name[candidates.position_of[one.pose]]
-            tilt = describe_tilt(candidates.tilt[one.pose])
-            line.name = f"{candidates.sensor[one.pose]} {candidates.height[one.pose]:g} m{tilt} {position}"
+            sensor = sensor_at(layout.site, layout.models, "", one.pose)
+            line.name = f"{sensor.model.key} {sensor.height:g} m{sensor.turned} {sensor.position_name}"
 
 
 def _ranked(

@@ -1,4 +1,4 @@
-"""The panel of the sensors: which types to choose from, at which heights, and how far tilted."""
+"""The panel of the sensors: which types to choose from, at which heights, how far tilted and turned."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         row.separator()
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list, the heights and the tilts."""
+        """Draw the list, the heights, the tilts and the yaws."""
         survey = context.scene.seip.survey
         layout = self.layout
         if session.catalogue_error:
@@ -76,6 +76,7 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         column = settings_column(layout)
         column.prop(survey, "heights")
         column.prop(survey, "tilts")
+        column.prop(survey, "yaws")
 
 
 class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
@@ -120,7 +121,8 @@ def _figures(model: LidarModel) -> list[tuple[str, str]]:
         ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
         ("Points", f"{model.points_per_second:,.0f} /s"),
         ("Rotation", f"{model.rotation_rate:g} Hz"),
-        ("Azimuth", f"{360 / model.azimuth_count:.2g}°"),
+        ("Azimuth", f"{math.degrees(model.azimuth_step):.2g}°"),
+        ("Field of view", f"{math.degrees(model.field_of_view):.4g}°"),
         ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}–{dear:,.0f}"),
     ]
 

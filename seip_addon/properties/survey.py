@@ -50,6 +50,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         "FROM:TO:STEP; 0 is upright, a negative tilt points up",
         default=_TILTS,
     )
+    yaws: of_setting(CandidateSettings, "yaws", "Yaws", soft_max=36)
     grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
     delta: of_setting(VisibilitySettings, "delta", "δ", min=0.01, soft_max=5.0, step=10)
     min_intensity: of_setting(VisibilitySettings, "min_intensity", "Minimum Intensity", subtype="FACTOR")
@@ -118,6 +119,7 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
                 sensors=used if len(self.types) else _CANDIDATES.sensors,
                 heights=heights_of(self.heights.split()),
                 tilts=tilts_of(self.tilts.split()),
+                yaws=self.yaws,
                 spacing=as_typed(self.spacing),
                 setback=as_typed(self.setback),
                 clearance=as_typed(self.clearance),

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..core.arrays import Integer
 from ..core.errors import SeipError
-from ..core.geometry.orientation import describe_tilt
 from ..core.pictures.coverage_colours import Aspect, Colouring, as_placed, colouring
 from ..core.placement.deployment import Deployment, Sensor
 from ..core.site.site import Site, Targets
@@ -123,7 +122,7 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
 
 
 def _name(sensor: Sensor) -> str:
-    return f"{sensor.model.key} @ {sensor.height:.3g} m{describe_tilt(sensor.tilt)} · {sensor.position_name}"
+    return f"{sensor.model.key} @ {sensor.height:.3g} m{sensor.turned} · {sensor.position_name}"
 
 
 def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:

@@ -219,6 +219,9 @@ def test_cores_are_those_that_the_user_allows(own):
 
 def test_tilts_are_degrees_in_the_panel_and_radians_inside(survey):
     assert survey.settings().candidates.tilts == (0.0,)
+    assert survey.settings().candidates.yaws == 8
+    survey.yaws = 12
+    assert survey.settings().candidates.yaws == 12
     survey.tilts = "-5 0:10:5"
     assert np.degrees(survey.settings().candidates.tilts) == pytest.approx([-5, 0, 5, 10])
     for text, sentence in (

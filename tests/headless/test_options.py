@@ -40,6 +40,8 @@ def test_options_left_alone_give_the_defaults(kind):
         (["--heights", "4:5:0.5", "8"], CandidateSettings, {"heights": (4.0, 4.5, 5.0, 8.0)}),
         (["--tilts", "0", "90:1"], CandidateSettings, None),
         (["--tilts", "0", "45"], CandidateSettings, {"tilts": (0.0, math.pi / 4)}),
+        (["--yaws", "12"], CandidateSettings, {"yaws": 12}),
+        (["--yaws", "1.5"], CandidateSettings, None),
         (["--setback", "0.7", "--assumed-poles"], CandidateSettings, {"setback": 0.7, "assumed_poles": True}),
         (["--setback", "near"], CandidateSettings, None),
         (["--delta", "0.5"], VisibilitySettings, {"delta": 0.5}),
@@ -73,7 +75,7 @@ def test_help_names_the_options_of_a_survey_where_another_command_explains_them(
     parser = new_parser("robust", "Place sensors.")
     add_options(parser)
     text = parser.format_help()
-    assert "  --sensor --catalogue --heights --tilts --assumed-poles (see: seip place --help)\n" in text
+    assert "  --sensor --catalogue --heights --tilts --yaws --assumed-poles (see: seip place --help)\n" in text
     assert "types to choose from" not in text
 
 

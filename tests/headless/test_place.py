@@ -150,6 +150,37 @@ def test_tilts_are_given_in_degrees_and_stand_with_each_sensor(tmp_path, run):
     assert pitches == [-sensor.tilt_deg + 0.0 for sensor in record.sensors]
 
 
+CORNER = """
+[corner]
+name = "Corner"
+manufacturer = "Test"
+source = "Test"
+channels = 32
+field_of_view_deg = [-25.0, 5.0]
+horizontal_field_of_view_deg = 100.0
+range_m = [0.5, 100.0]
+points_per_second = 120_000
+rotation_rate_hz = 10.0
+price_usd = [2_000, 2_000]
+"""
+
+
+def test_a_sensor_that_looks_one_way_is_turned_where_it_sees_most(tmp_path, run):
+    (tmp_path / "mine.toml").write_text(CORNER, encoding="utf-8")
+    mine = ["--catalogue", str(tmp_path / "mine.toml"), "--sensor", "corner", "--count", "2"]
+    one, several = (run(tmp_path / f"{yaws}", *mine, "--yaws", str(yaws)) for yaws in (1, 8))
+    assert several.settings["candidates"]["yaws"] == 8
+    assert one.counts.poses < several.counts.poses < 8 * one.counts.poses
+    assert several.coverage.whole > one.coverage.whole
+    rows = list(csv.DictReader((tmp_path / "8" / "candidates.csv").read_text(encoding="utf-8").splitlines()))
+    spawned = json.loads((tmp_path / "8" / "carla_spawn.json").read_text(encoding="utf-8"))
+    for sensor, spawn in zip(several.sensors, spawned, strict=True):
+        assert float(rows[sensor.pose]["yaw_deg"]) == pytest.approx(sensor.yaw_deg, abs=1e-3)
+        assert (spawn["transform"]["rotation"]["yaw"] + sensor.yaw_deg) % 360 == pytest.approx(0.0, abs=1e-5)
+        assert spawn["attributes"]["horizontal_fov"] == "100"
+    assert len({row["yaw_deg"] for row in rows if row["position"] == several.sensors[0].position}) > 2
+
+
 def test_the_reverse_problem_by_command(tmp_path, run):
     record = run(tmp_path, "--coverage", "0.2")
     assert record.coverage.whole >= 0.2

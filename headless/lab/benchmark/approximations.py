@@ -113,7 +113,7 @@ def _coarser(
 ) -> Approximation:
     """Lay a coarser grid; each target of the finer one takes the answer of the nearest."""
     spacing = site.targets.spacing * factor
-    coarse = make_site(geometry, layout, spacing)
+    coarse = make_site(geometry, layout, spacing, models=models)
     gap = site.targets.xyz[:, None, :2] - coarse.targets.xyz[None, :, :2]
     nearest = (gap**2).sum(axis=2).argmin(axis=1)
     return Approximation(f"grid of {spacing:g} m", "grid", coarse, models, nearest)

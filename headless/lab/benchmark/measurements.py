@@ -84,8 +84,8 @@ def measure(
 ) -> tuple[Findings, tuple[str, str, str]]:
     """Measure everything; return the findings and the names of the synthetic instances."""
     layout, settings = scope.layout, VisibilitySettings()
-    site = make_site(geometry, layout)
     models = find_models(load_catalogue(), layout.sensors)
+    site = make_site(geometry, layout, models=models)
     simpler = approximations(geometry, site, models, layout)
     LOG.info(f"{site.name}: full scans and lazy ones from {samples} places")
     costs = visibility_costs(site, models, settings, samples, simpler)
@@ -158,11 +158,11 @@ def growth(
     """Measure growth with one size at a time, then with all: copies of the scene side by side."""
     LOG.info("growth, each size in a process of its own")
     models = find_models(load_catalogue(), scope.layout.sensors)
-    site = make_site(geometry, scope.layout)
+    site = make_site(geometry, scope.layout, models=models)
     rows = {copies: repeated(site, copies) for copies in scope.copies}
     pitch = float(np.ptp(site.triangles[:, :, 0])) / 1000
     every = len(sampled_places(site, len(site.candidates)))
-    finer = [make_site(geometry, scope.layout, spacing) for spacing in scope.spacings]
+    finer = [make_site(geometry, scope.layout, spacing, models=models) for spacing in scope.spacings]
     positions, targets, blocks = scope.street
     posts = [positions * times // scope.multiples[-1] for times in scope.multiples]
     points = [targets * times // 2 for times in scope.multiples]

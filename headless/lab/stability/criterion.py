@@ -192,7 +192,7 @@ def criterion_study(
     """
     objective, random = Objective(count=count), np.random.default_rng(seed)
     models = settings.models()
-    site = make_site(geometry, settings.candidates, settings.grid_spacing)
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, models=models)
     reach = float(np.hypot(*np.ptp(site.targets.xyz[:, :2], axis=0)))
     heights = sorted(set(settings.candidates.heights))
     borders = ring_borders(models, heights, DELTAS, reach)
@@ -319,7 +319,7 @@ def _by_delta(
 ) -> Generator[Progress, None, list[DeltaAnswer]]:
     """Vary δ for one sensor type at one height."""
     evaluator = Evaluator(geometry, settings, objective)
-    site = make_site(geometry, settings.candidates, settings.grid_spacing)
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, models=settings.models())
     caster = make_ray_caster(site.triangles, settings.engine)
     (sensor,), (height,) = settings.candidates.sensors, settings.candidates.heights
     asked = yield from within(Progress(0, 0, f"{sensor}: the δ asked for"), evaluator.solve(site, settings))

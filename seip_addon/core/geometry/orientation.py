@@ -72,6 +72,14 @@ def rotated(vectors: Float, matrix: Float) -> Float:
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=1)
 
 
-def describe_tilt(tilt: float) -> str:
-    """Return a tilt as words to be put after a height: empty for a sensor that hangs upright."""
-    return f", tilted {np.degrees(tilt):.3g}°" if tilt else ""
+def describe_turn(tilt: float, yaw: float | None = None) -> str:
+    """Return how a sensor is turned as words to be put after a height: empty for one that hangs upright.
+
+    Parameters
+    ----------
+    tilt : float, radians
+    yaw : float, radians, optional
+        Of a sensor that does not look all round.
+    """
+    tilted = f", tilted {np.degrees(tilt):.3g}°" if tilt else ""
+    return tilted if yaw is None else f"{tilted}, yaw {np.degrees(yaw) % 360:.3g}°"

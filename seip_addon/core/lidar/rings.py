@@ -1,4 +1,4 @@
-"""The rings that a LiDAR's beams draw on a flat road, and the edges of its vertical field of view."""
+"""The rings that a LiDAR's beams draw on a flat road, and the edges of its field of view."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ class BeamRings:
     wide : (n,) bool
         Whether the next ring inwards is farther away than asked: what is there may lie between two rings.
     cone : (m, 2, 3) float64, metres
-        Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range.
+        Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range, at a few
+        azimuths; first and last are those of a limited field of view.
     """
 
     rings: Float
@@ -55,18 +56,22 @@ def beam_rings(model: LidarModel, place: Float, axes: Float, ground: float, gap:
     inwards[1:] = np.linalg.norm(hits[1:, :, :2] - hits[:-1, :, :2], axis=-1)
     inwards[1:][~meets[:-1]] = 0.0
     inwards[0] = 0.0
-    following = np.roll(np.arange(RING_AZIMUTHS), -1)
-    drawn = meets & meets[:, following]
-    rings = np.stack([hits, hits[:, following]], axis=2)[drawn]
+    drawn = meets[:, :-1] & meets[:, 1:]
+    rings = np.stack([hits[:, :-1], hits[:, 1:]], axis=2)[drawn]
     ends = place + np.where(meets, reach, model.max_range)[..., None] * beams
-    edges = ends[[0, -1], :: RING_AZIMUTHS // 12].reshape(-1, 3)
+    across = np.arange(0, RING_AZIMUTHS if model.all_round else RING_AZIMUTHS + 1, RING_AZIMUTHS // 12)
+    edges = ends[[0, -1]][:, across].reshape(-1, 3)
     cone = np.stack([np.broadcast_to(place, edges.shape), edges], axis=1)
-    return BeamRings(rings, (np.maximum(inwards, inwards[:, following]) > gap)[drawn], cone)
+    return BeamRings(rings, (np.maximum(inwards[:, :-1], inwards[:, 1:]) > gap)[drawn], cone)
 
 
 def _directions(model: LidarModel) -> Float:
-    """Return unit directions (channels, `RING_AZIMUTHS`, 3) in the sensor's axes, the lowest channel first."""
-    steps = np.arange(RING_AZIMUTHS) * model.azimuth_count // RING_AZIMUTHS
+    """Return unit directions (channels, `RING_AZIMUTHS` + 1, 3) in the sensor's axes, the lowest channel first.
+
+    The last azimuth is the first again where the model looks all round.
+    """
+    span = model.azimuth_count if model.all_round else model.azimuth_count - 1
+    steps = np.arange(RING_AZIMUTHS + 1) * span // RING_AZIMUTHS % model.azimuth_count
     channels = np.argsort(model.elevations, kind="stable")
     rays = channels[:, None] * model.azimuth_count + steps
-    return BeamPattern(model).directions(rays.ravel()).reshape(model.channels, RING_AZIMUTHS, 3)
+    return BeamPattern(model).directions(rays.ravel()).reshape(model.channels, RING_AZIMUTHS + 1, 3)

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..arrays import Boolean, Float
-from ..geometry.orientation import describe_tilt
 from ..placement.deployment import Deployment
 from ..site.site import Site
 from ..storage.files import whole_file
@@ -77,7 +76,7 @@ def draw_sensors(
         Sensors behind something, which are marked by an outline alone.
     """
     if 0 < len(points) <= MAX_LABELLED:
-        words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{describe_tilt(s.tilt)}" for s in deployment.sensors]
+        words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" for s in deployment.sensors]
         _draw_callouts(axes, points, words, road, zorder - 0.5)
     markers = markers_of(deployment)
     hidden = np.zeros(len(points), dtype=bool) if hidden is None else hidden

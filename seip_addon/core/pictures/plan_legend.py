@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 
-from ..geometry.orientation import describe_tilt
 from ..placement.deployment import Deployment
 from ..site.scene_geometry import ASSUMED, FROM_MAP, SceneGeometry
 from ..site.site import Site
@@ -75,7 +74,7 @@ class PlanLegend:
         for sensor in deployment.sensors[:rows]:
             self._mark(marker=markers[sensor.model.key], **SENSOR_MARK | {"markersize": 8.0, "mew": 0.8})
             self._text(0.34, sensor.label, weight="bold")
-            mounting = f", {sensor.height:.3g} m{describe_tilt(sensor.tilt)}"
+            mounting = f", {sensor.height:.3g} m{sensor.turned}"
             self._text(0.70, _short(sensor.model.name, min(28, 37 - len(mounting))) + mounting)
             self._text(LEGEND_WIDTH, f"{sensor.alone:.0%}", ha="right", weight="bold")
             if detailed:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.patches import PathPatch, Rectangle, Wedge
 from matplotlib.path import Path
 from shapely.geometry.base import BaseGeometry
 
@@ -28,7 +28,7 @@ from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MA
 
 DPI = 160
 MARGIN, HEAD = 0.3, 0.95  # inches
-ARROW_LENGTH = 0.34  # inches
+ARROW_LENGTH, WEDGE_LENGTH = 0.34, 0.5  # inches
 MIN_MAP_WIDTH, MAX_MAP_WIDTH = 9.6, 15.0  # inches
 MIN_MAP_HEIGHT, MAX_MAP_HEIGHT = 6.6, 10.5  # inches
 MARGIN_SHARE = 0.06  # of the region's size, shown around it
@@ -184,10 +184,14 @@ def _draw_candidates(plan: Axes, geometry: SceneGeometry, site: Site) -> None:
 
 
 def _draw_headings(plan: Axes, deployment: Deployment, inch: float) -> None:
-    """Draw an arrow from each tilted sensor, the way it looks; upright ones look all round."""
+    """Draw an arrow from each sensor that does not look all round alike, and a wedge of a limited field of view."""
     for sensor in deployment.sensors:
-        if sensor.tilt != 0.0:
-            x, y, _ = sensor.xyz.tolist()
+        x, y, _ = sensor.xyz.tolist()
+        if not sensor.model.all_round:
+            yaw, half = math.degrees(sensor.yaw), math.degrees(sensor.model.field_of_view) / 2
+            wedge = Wedge((x, y), WEDGE_LENGTH * inch, yaw - half, yaw + half, facecolor=INK, edgecolor=INK, alpha=0.25)
+            plan.add_patch(wedge).set_zorder(SENSOR - 0.3)
+        if sensor.tilt != 0.0 or not sensor.model.all_round:
             ahead = (x + ARROW_LENGTH * inch * math.cos(sensor.yaw), y + ARROW_LENGTH * inch * math.sin(sensor.yaw))
             style = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0}
             plan.annotate("", xy=ahead, xytext=(x, y), arrowprops=style, zorder=SENSOR - 0.2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..geometry.orientation import orientation
+from ..geometry.orientation import describe_turn, orientation
 from ..lidar import LidarModel
 from ..site.site import Site
 
@@ -64,6 +64,11 @@ class Sensor:
     def orientation(self) -> Float:
         """Rotation from the sensor's axes to the site's, (3, 3) float64."""
         return orientation(self.yaw, self.tilt, self.roll)
+
+    @property
+    def turned(self) -> str:
+        """How it is turned, as words to be put after its height."""
+        return describe_turn(self.tilt, None if self.model.all_round else self.yaw)
 
 
 @dataclass(frozen=True, eq=False)

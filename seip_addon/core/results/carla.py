@@ -3,8 +3,8 @@
 CARLA stands on Unreal's left-handed axes. A town's world coordinates are those of its OpenDRIVE map with y negated, so
 a yaw that is counter-clockwise here is clockwise there [1]_; its pitch turns the nose up where it is positive, so that
 a tilt has the opposite sign, and a roll the same [3]_. ``sensor.lidar.ray_cast`` spreads its channels evenly from
-``upper_fov`` to ``lower_fov``, both included, and ``points_per_second / rotation_frequency / channels`` steps over a
-turn [2]_.
+``upper_fov`` to ``lower_fov``, both included, and ``points_per_second / rotation_frequency / channels`` steps over
+``horizontal_fov``, half of it on each side of its x axis [2]_.
 
 .. [1] CARLA documentation, "Coordinates and transformations".
 .. [2] CARLA documentation, "Sensors reference", LIDAR sensor.
@@ -79,7 +79,7 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
         "rotation_frequency": model.rotation_rate,
         "upper_fov": math.degrees(model.elevations.max()),
         "lower_fov": math.degrees(model.elevations.min()),
-        "horizontal_fov": 360.0,
+        "horizontal_fov": math.degrees(model.field_of_view),
         "atmosphere_attenuation_rate": dropoff.attenuation,
         "noise_stddev": model.range_noise_std,
         "dropoff_general_rate": dropoff.general,

@@ -31,10 +31,13 @@ ASSUMED_POLES = "assumed poles"
 MAX_TILT = 90.0
 """Degrees: tilts are less than this, up or down."""
 
+MAX_YAWS = 360
+"""Yaws over the circle; more are taken for a typing error."""
+
 
 @dataclass(frozen=True)
 class CandidateSettings:
-    """Settings of candidate poses: sensor types, heights, tilts, spacing and clearances.
+    """Settings of candidate poses: sensor types, heights, tilts, yaws, spacing and clearances.
 
     Parameters
     ----------
@@ -45,6 +48,9 @@ class CandidateSettings:
     tilts : tuple of float, radians
         How far a sensor's nose is turned down towards the region, the way that a
         bracket points; negative is up. At 0 it hangs upright.
+    yaws : int
+        How many ways, evenly over the circle, sensors of a limited horizontal field of view may look; the first is
+        towards the region, and tilts are about each of them.
     spacing : float, metres
         Least distance between two positions on the pavement.
     setback : float, metres
@@ -75,6 +81,13 @@ class CandidateSettings:
         metavar="DEG",
         read=lambda texts: tilts_of(texts),  # noqa: PLW0108 -- as above
     )
+    yaws: int = setting(
+        8,
+        "directions, evenly over the circle, of sensors that do not look all round",
+        minimum=1,
+        maximum=MAX_YAWS,
+        metavar="N",
+    )
     spacing: float = setting(4.0, "distance between new posts on the pavement", unit="m", minimum=0.1, maximum=1000.0)
     setback: float = setting(0.5, "distance of new posts from the kerb", unit="m", minimum=0.0, maximum=100.0)
     clearance: float = setting(
@@ -103,6 +116,8 @@ class CandidateSettings:
                     f"a mounting height must be a positive number of metres up to {MAX_SENSOR_HEIGHT:g}, not {height}"
                 )
         self._check_tilts()
+        if not 1 <= self.yaws <= MAX_YAWS:
+            raise SeipError(f"there must be 1 to {MAX_YAWS} yaws, not {self.yaws}")
         if not 0.1 <= self.spacing <= 1000:
             raise SeipError(f"the candidate spacing must be 0.1 to 1000 m, not {self.spacing}")
         for name in ("setback", "clearance", "bracket"):
@@ -183,7 +198,7 @@ def _named_by(text: str, above: float, most: float) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """The p mounting positions of a site and its c candidate poses (position × height × tilt × sensor type).
+    """The p mounting positions of a site and its c candidate poses (position × height × tilt × sensor type × yaw).
 
     Parameters
     ----------
@@ -204,9 +219,10 @@ class Candidates:
     xyz : (c, 3) float64, metres
         Optical centre. On a pole it stands off the shaft by the bracket.
     yaw : (c,) float64, radians
-        Direction of azimuth zero of the beam pattern, counter-clockwise from +x. An upright sensor sees all around
-        alike, and its azimuth zero is +x. A tilted one looks towards the region: to the nearest point of it, or to
-        its middle from within.
+        Direction of azimuth zero of the beam pattern, counter-clockwise from +x. An upright sensor that sees all
+        around alike has its azimuth zero along +x. A tilted one looks towards the region: to the nearest point of
+        it, or to its middle from within. One of a limited horizontal field of view looks there or elsewhere; see
+        `with_yaws`.
     tilt : (c,) float64, radians
         How far azimuth zero is turned down, nose first, towards where the yaw points; see `orientation`.
     mandatory : (g, p) bool
@@ -372,13 +388,15 @@ def _towards(point: Float, region: BaseGeometry) -> Float:
     return way / length if length > 0 else np.array((1.0, 0.0))
 
 
+def headings(foot: Float, region: BaseGeometry) -> Float:
+    """Return the direction in plan from each foot to the region, or to its middle from within, (p,) radians."""
+    way = np.array([_towards(point[:2], region) for point in foot])
+    return np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
+
+
 def _yaws(tilt: Float, position_of: Integer, foot: Float, region: BaseGeometry) -> Float:
     """Return the yaw of each pose, (c,) radians: zero for upright ones, else the direction to the region."""
-    if not tilt.any():
-        return np.zeros(len(tilt))
-    way = np.array([_towards(point[:2], region) for point in foot])
-    before_it = np.round(np.arctan2(way[:, 1], way[:, 0]), 6)
-    return np.where(tilt == 0, 0.0, before_it[position_of])
+    return np.where(tilt == 0, 0.0, headings(foot, region)[position_of]) if tilt.any() else np.zeros(len(tilt))
 
 
 def _mandatory_groups(geometry: SceneGeometry, foot: Float, name: Text) -> list[tuple[str, Boolean]]:

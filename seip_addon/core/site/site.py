@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..lidar import LidarModel
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined, ordered_surfaces
 from .targets import Targets, generate_targets
+from .yaws import with_yaws
 
 __all__ = ["Candidates", "Site", "Targets", "make_site"]
 
@@ -45,7 +49,11 @@ class Site:
 
 
 def make_site(
-    geometry: SceneGeometry, settings: CandidateSettings, grid_spacing: float = 1.0, reach: float = math.inf
+    geometry: SceneGeometry,
+    settings: CandidateSettings,
+    grid_spacing: float = 1.0,
+    reach: float = math.inf,
+    models: Mapping[str, LidarModel] = MappingProxyType({}),
 ) -> Site:
     """Make the site of a scene: its targets, candidates and static triangles.
 
@@ -55,6 +63,8 @@ def make_site(
         Distance between neighbouring targets.
     reach : float, metres
         What is farther from the region ends no ray that counts, and is left out.
+    models : mapping of str to LidarModel
+        The sensor types; those that are not in it look all round.
 
     Returns
     -------
@@ -71,12 +81,14 @@ def make_site(
     road = joined(geometry.roads)
     near, _ = without_far_objects(geometry, geometry.region, reach)
     triangles, reflectivity = ordered_surfaces((*near.roads, *near.ground, *near.occluders))
+    targets = generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions)
+    candidates = generate_candidates(geometry, settings)
     return Site(
         name=geometry.name,
         origin=geometry.origin,
         region=geometry.region,
-        targets=generate_targets(geometry.region, road, grid_spacing, geometry.weighted_regions),
-        candidates=generate_candidates(geometry, settings),
+        targets=targets,
+        candidates=with_yaws(candidates, models, settings.yaws, geometry.region, targets.xyz),
         triangles=triangles,
         reflectivity=reflectivity,
     )

@@ -169,7 +169,7 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     """
     models = settings.models()
     geometry = settings.weather.over(geometry)
-    site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach())
+    site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach(), models)
     near, far = without_far_objects(geometry, geometry.region, settings.reach())
     limits = (
         *far,

@@ -1,6 +1,7 @@
 """Rings are where the beams meet the road."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,6 +46,16 @@ def test_rings_of_a_tilted_sensor_lie_on_its_beams_and_on_the_road():
     assert np.abs(elevation[:, None] - MODELS["type1"].elevations).min(axis=1).max() < 1e-9
     assert np.allclose(ends[:, 2], 0.0)
     assert np.median(ends[:, 0]) > 3.0
+
+
+def test_rings_and_cone_end_at_the_borders_of_a_limited_field_of_view():
+    model = replace(MODELS["type1"], field_of_view=math.radians(90))
+    drawn = beam_rings(model, np.array((0.0, 0.0, 5.0)), np.eye(3), 0.0, 2.0)
+    across = math.degrees(model.field_of_view - model.azimuth_step) / 2
+    for ends in (drawn.rings.reshape(-1, 3), drawn.cone[:, 1]):
+        azimuth = np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))
+        assert (azimuth.min(), azimuth.max()) == pytest.approx((-across, across), abs=1e-9)
+    assert np.linalg.norm(np.diff(drawn.rings, axis=1), axis=-1).max() < 2.0
 
 
 def test_no_ring_lies_beyond_the_range():

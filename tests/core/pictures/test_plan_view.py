@@ -7,6 +7,7 @@ import pytest
 import shapely
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
+from matplotlib.patches import Wedge
 
 from seip_addon.core.pictures.drawing import markers_of, percent, summary
 from seip_addon.core.pictures.palette import SEEN_COLOURS
@@ -111,6 +112,17 @@ def test_tilted_sensors_alone_show_where_they_look(example):
     assert sum("tilted 15°" in text for text in words) == 1
     upright = draw_plan(example.geometry, example.site, example.deployment)
     assert not any(getattr(text, "arrow_patch", None) for text in upright.axes[0].texts)
+
+
+def test_sensors_that_do_not_look_all_round_show_which_way_they_look(example):
+    first, *others = example.deployment.sensors
+    one_way = replace(first, yaw=math.radians(90), model=replace(first.model, field_of_view=math.radians(100)))
+    figure = draw_plan(example.geometry, example.site, replace(example.deployment, sensors=(one_way, *others)))
+    (wedge,) = (patch for patch in figure.axes[0].patches if isinstance(patch, Wedge))
+    assert wedge.center == pytest.approx(tuple(one_way.xyz[:2]))
+    assert (wedge.theta1, wedge.theta2) == pytest.approx((40.0, 140.0))
+    assert sum(getattr(text, "arrow_patch", None) is not None for text in figure.axes[0].texts) == 1
+    assert sum("yaw 90°" in text.get_text() for text in figure.axes[1].texts) == 1
 
 
 def test_each_type_has_its_marker(example):

@@ -71,6 +71,14 @@ def test_attributes_are_text_that_set_attribute_takes(example):
     }
 
 
+def test_a_limited_field_of_view_is_that_of_the_actor(example):
+    model = replace(load_catalogue()["type2"], field_of_view=math.radians(120))
+    sensor = replace(example.deployment.sensors[0], model=model)
+    (spawn,) = carla_spawns(replace(example.deployment, sensors=(sensor,)), np.zeros(3))
+    assert spawn["attributes"]["horizontal_fov"] == "120"
+    assert spawn["note"] == ""
+
+
 def test_uneven_beams_are_named_with_how_far_off_they_are(example):
     model = replace(
         load_catalogue()["type1"], elevations=np.radians([15.0, 1.0, 0.0, -15.0]), azimuth_offsets=np.zeros(4)

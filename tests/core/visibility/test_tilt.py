@@ -17,7 +17,7 @@ from random_cases import cases
 from synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.geometry.orientation import angles_of, describe_tilt, orientation, orientations, rotated
+from seip_addon.core.geometry.orientation import angles_of, describe_turn, orientation, orientations, rotated
 from seip_addon.core.lidar import RangeEquation, beam_directions, load_catalogue
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective
@@ -251,7 +251,8 @@ def test_tilts_are_named_in_degrees_one_by_one_or_as_a_range():
     for text in ("steep", "0:10", "10:0:1", "0:95:5", "0:10:0"):
         with pytest.raises(SeipError, match="neither a tilt in degrees nor a range"):
             tilts_of([text])
-    assert (describe_tilt(0.0), describe_tilt(math.radians(7.5))) == ("", ", tilted 7.5°")
+    assert (describe_turn(0.0), describe_turn(math.radians(7.5))) == ("", ", tilted 7.5°")
+    assert describe_turn(math.radians(7.5), math.radians(-90)) == ", tilted 7.5°, yaw 270°"
 
 
 def test_places_part_tilts_and_pieces_keep_each_pose_once():

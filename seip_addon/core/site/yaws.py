@@ -1,0 +1,95 @@
+"""The ways that sensors of a limited horizontal field of view may look."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Boolean, Float
+from ..errors import SeipError
+from ..lidar import LidarModel
+from .candidates import Candidates, headings
+
+NOTHING_BEFORE = "looking past all targets"
+"""Reason for which poses are dropped."""
+
+
+def with_yaws(
+    candidates: Candidates, models: Mapping[str, LidarModel], yaws: int, region: BaseGeometry, targets: Float
+) -> Candidates:
+    """Turn sensors of a limited field of view to several yaws: evenly, the first towards the region.
+
+    Yaws with which no target lies within the field of view in plan are left out, as are positions that keep no pose.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        With one yaw at each position, height and tilt.
+    models : mapping of str to LidarModel
+        Sensor types that are not in it look all round.
+    yaws : int
+        How many, over the circle.
+    region : shapely geometry
+        Region of interest in plan.
+    targets : (t, 3) float64, metres
+
+    Returns
+    -------
+    Candidates
+        Poses of sensors that look all round are as they were; those of others follow each other in order of their yaws.
+
+    Raises
+    ------
+    SeipError
+        No pose is left, or none at the positions of which one must carry a sensor.
+    """
+    kinds, kind = np.unique(candidates.sensor, return_inverse=True)
+    one_way = np.array([key in models and not models[key].all_round for key in kinds], dtype=bool)
+    if not one_way.any():
+        return candidates
+    many = np.where(one_way, yaws, 1)[kind]
+    pose = np.repeat(np.arange(len(candidates)), many)
+    turn = np.arange(len(pose)) - np.repeat(np.cumsum(many) - many, many)
+    kind, position = kind[pose], candidates.position_of[pose]
+
+    ahead = headings(candidates.position, region)[:, None] + math.tau / yaws * np.arange(yaws)
+    ahead = np.round((ahead + math.pi) % math.tau - math.pi, 6)
+    yaw = np.where(one_way[kind], ahead[position, turn], candidates.yaw[pose])
+    looks = np.ones(len(pose), dtype=bool)
+    _, first = np.unique(candidates.position_of, return_index=True)
+    for number in np.flatnonzero(one_way):
+        own = kind == number
+        seen = _any_within(candidates.xyz[first], ahead, models[str(kinds[number])].field_of_view, targets)
+        looks[own] = seen[position[own], turn[own]]
+    if not looks.any():
+        raise SeipError(
+            f"no candidate is left ({len(pose)} {NOTHING_BEFORE}): ask for more yaws, or for a wider field of view"
+        )
+    turned = {name: getattr(candidates, name)[pose[looks]] for name in ("sensor", "height", "xyz", "tilt")}
+    left = replace(candidates, **turned, position_of=position[looks], yaw=yaw[looks])
+    dropped = {NOTHING_BEFORE: int((~looks).sum())} if not looks.all() else {}
+    return _without_empty_positions(replace(left, dropped=candidates.dropped | dropped))
+
+
+def _any_within(xyz: Float, ahead: Float, field_of_view: float, targets: Float) -> Boolean:
+    """Return for which yaws (p, y) some target lies within the field of view in plan of a sensor at (p, 3)."""
+    within = np.zeros(ahead.shape, dtype=bool)
+    for place, yaws, row in zip(xyz, ahead, within, strict=True):
+        azimuth = np.arctan2(targets[:, 1] - place[1], targets[:, 0] - place[0])
+        for number, yaw in enumerate(yaws):
+            row[number] = (np.abs((azimuth - yaw + math.pi) % math.tau - math.pi) <= field_of_view / 2).any()
+    return within
+
+
+def _without_empty_positions(candidates: Candidates) -> Candidates:
+    used, position_of = np.unique(candidates.position_of, return_inverse=True)
+    mandatory = candidates.mandatory[:, used]
+    for name in candidates.mandatory_name[~mandatory.any(axis=1)]:
+        raise SeipError(f"{str(name)!r} must carry a sensor, but with no yaw does one there have a target before it")
+    names = ("position", "position_name", "on_pole", "pole_source")
+    of_positions = {name: getattr(candidates, name)[used] for name in names}
+    return replace(candidates, **of_positions, position_of=position_of.astype(np.int64), mandatory=mandatory)

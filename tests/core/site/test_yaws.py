@@ -1,0 +1,128 @@
+"""Sensors that look one way get several yaws, those that look all round keep their poses to the byte."""
+
+import itertools
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+import shapely
+from engines import ANY, needs_any
+from plain_street import PLAIN, block, street
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.placement.objective import Objective, optimise
+from seip_addon.core.progress import finish
+from seip_addon.core.site.candidates import CandidateSettings, generate_candidates
+from seip_addon.core.site.scene_geometry import Mesh, NamedArea, Pole
+from seip_addon.core.site.site import make_site
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.visibility.sight_lines import pose_at
+
+ROUND = load_catalogue()["type1"]
+
+
+def looking(degrees, key="one-way", **changes):
+    return replace(ROUND, key=key, field_of_view=math.radians(degrees), **changes)
+
+
+def site_of(settings, *models, spacing=4.0, **changes):
+    return make_site(street(**changes), settings, spacing, models={model.key: model for model in models})
+
+
+BOTH = replace(PLAIN, sensors=("type1", "one-way"), spacing=12.0)
+
+
+def test_yaws_are_spread_evenly_and_the_first_looks_to_the_region():
+    poses = site_of(replace(BOTH, sensors=("one-way",), yaws=5), looking(359)).candidates
+    assert len(poses) == 5 * 2 * len(poses.position)
+    degrees = np.degrees(poses.yaw).reshape(-1, 5)
+    assert degrees[:, 0][np.abs(poses.position[poses.position_of[::5], 0]) < 30] == pytest.approx(-90, abs=1e-4)
+    assert (degrees - degrees[:, :1]) % 360 == pytest.approx(np.tile(72.0 * np.arange(5), (len(degrees), 1)), abs=1e-3)
+    assert not poses.tilt.any()
+
+
+def test_poses_of_sensors_that_look_all_round_are_what_they_were():
+    tilted = replace(BOTH, tilts=(0.0, 0.2))
+    for settings in (BOTH, tilted):
+        alone = generate_candidates(street(), replace(settings, sensors=("type1",)))
+        both = site_of(settings, ROUND, looking(90)).candidates
+        own = both.sensor == "type1"
+        for name in ("position_of", "sensor", "height", "xyz", "yaw", "tilt"):
+            assert getattr(both, name)[own].tolist() == getattr(alone, name).tolist()
+        full = site_of(settings, ROUND, looking(360)).candidates
+        plain = generate_candidates(street(), settings)
+        for field in fields(plain):
+            assert repr(getattr(full, field.name)) == repr(getattr(plain, field.name))
+
+
+def test_poses_come_by_position_height_tilt_type_and_yaw():
+    poses = site_of(replace(BOTH, tilts=(0.1, 0.0), yaws=3), ROUND, looking(340)).candidates
+    assert poses.sensor[:8].tolist() == ["type1", *["one-way"] * 3] * 2
+    assert poses.tilt[:8].tolist() == [0.0] * 4 + [0.1] * 4
+    assert poses.height[:16].tolist() == [3.5] * 8 + [8.0] * 8
+    assert poses.yaw[1:4].tolist() == poses.yaw[5:8].tolist()
+
+
+@pytest.mark.parametrize("degrees", [10, 90, 200])
+def test_yaws_without_a_target_before_the_sensor_are_left_out(degrees):
+    settings = replace(BOTH, sensors=("one-way",), yaws=12)
+    site = site_of(settings, looking(degrees))
+    every = site_of(settings, looking(359.9)).candidates
+    kept = {(*xyz, yaw) for xyz, yaw in zip(site.candidates.xyz.tolist(), site.candidates.yaw.tolist(), strict=True)}
+    assert 0 < len(kept) < len(every)
+    for xyz, yaw in zip(every.xyz.tolist(), every.yaw.tolist(), strict=True):
+        off = [math.remainder(math.atan2(y - xyz[1], x - xyz[0]) - yaw, math.tau) for x, y, _ in site.targets.xyz]
+        assert ((*xyz, yaw) in kept) == (min(map(abs, off)) <= math.radians(degrees) / 2)
+    assert site.candidates.dropped["looking past all targets"] == len(every) - len(kept)
+
+
+def test_a_position_from_which_no_yaw_looks_at_a_target_is_none():
+    far = Pole("far", np.array((37.0, 16.0, 0.1)))  # looks to the piece of the region before it, where no road is
+    region = shapely.union_all([shapely.box(-30, -7, 30, 7), shapely.box(36, 12, 38, 14)])
+    settings = replace(BOTH, sensors=("one-way",), heights=(5.0,), yaws=1)
+    made = site_of(settings, looking(20), poles=(far,), region=region).candidates
+    assert len(made) > 3
+    assert "far" not in made.position_name
+    assert set(made.position_of) == set(range(len(made.position)))
+    assert made.mandatory.shape == (0, len(made.position))
+    with pytest.raises(SeipError, match="'far' must carry a sensor, but with no yaw"):
+        site_of(settings, looking(20), poles=(replace(far, mandatory=True),), region=region)
+    with pytest.raises(SeipError, match=r"no candidate is left \(1 looking past all targets\): ask for more yaws"):
+        site_of(settings, looking(20), poles=(far,), region=region, candidate_areas=shapely.Polygon())
+
+
+@pytest.mark.parametrize("yaws", [0, -1, 361])
+def test_a_wrong_number_of_yaws_has_its_sentence(yaws):
+    with pytest.raises(SeipError, match=f"1 to 360 yaws, not {yaws}"):
+        CandidateSettings(yaws=yaws)
+
+
+@needs_any
+def test_a_placement_of_two_sensors_that_look_one_way_is_the_best_of_all():
+    """Against the union of what every two poses at different positions see; one at a position is all there may be."""
+    settings = replace(BOTH, sensors=("one-way",), heights=(5.0,), spacing=20.0, yaws=6, tilts=(0.0, 0.15))
+    wall = Mesh("wall", block((-2.0, -2.0, 0.0), (2.0, 2.0, 4.0)))
+    model = looking(70, points_per_second=30_000.0)
+    site = site_of(
+        settings, model, occluders=(wall,), mandatory_areas=(NamedArea("west", shapely.box(-40, 7, -20, 10)),)
+    )
+    models = {model.key: model}
+    visible = finish(compute_visibility(site, models, VisibilitySettings(), ANY)).visible
+    solution = finish(optimise(site, visible, models, Objective(count=2)))
+    poses = site.candidates
+    assert len(np.unique(poses.yaw)) > 4
+    best = max(
+        (visible[a] | visible[b]).sum()
+        for a, b in itertools.combinations(range(len(poses)), 2)
+        if poses.position_of[a] != poses.position_of[b]
+        and poses.mandatory[:, poses.position_of[[a, b]]].any(axis=1).all()
+    )
+    assert solution.placement.status == "optimal"
+    assert solution.deployment.coverage == best / len(site.targets)
+    for sensor in solution.deployment.sensors:
+        assert sensor.yaw == poses.yaw[sensor.pose]
+        assert sensor.turned.endswith(f", yaw {math.degrees(sensor.yaw) % 360:.3g}°")
+        assert pose_at(poses, model.key, sensor.xyz, sensor.orientation) == sensor.pose
