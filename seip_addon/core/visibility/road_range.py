@@ -68,7 +68,7 @@ def range_warnings(
         assumed = f"; {model.assumed}" if model.assumed else ""
         if beyond >= NEARLY_ALL or assumed:
             warnings.append(
-                f"{key} detects this road ({reflectivity:.0%} reflectivity) with {settings.detection:.0%} probability "
+                f"{key}: detects this road ({reflectivity:.0%} reflectivity) with {settings.detection:.0%} probability "
                 f"up to {reach.max():.0f} m from {heights.max():g} m height: {beyond:.0%} of the region lie beyond its "
                 f"range from every candidate{assumed}"
             )
