@@ -35,8 +35,6 @@ Boolean = NDArray[np.bool_]
 ROUNDINGS = 16
 """So many roundings to float32 lie between the coordinates of a scene and a ray's return: storing corners, origin and
 direction, their differences, two products and a sum of each edge function, and the quotient that is the distance."""
-BORDER_STEPS = 30.0
-"""Tolerances of the ray caster along a grazing ray within which surfaces are held to meet."""
 HALF_STEP = 2.0**-24
 """Largest relative error of one rounding to float32."""
 
@@ -304,15 +302,13 @@ def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: Lidar
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     width = max(np.abs(points - middle).max(), np.abs(origin - middle).max(), np.abs(points - origin).max())
     noise = ROUNDINGS * HALF_STEP * float(width)
-    border = BORDER_STEPS * caster_tolerance(triangles)
 
     rays = _rays(model, yaw, tilt)
     ray, triangle, certain, begin, end = _hits(rays, triangles - origin, noise)
     # what may be met first: all that begins before something that is certainly met ends
     limit = np.full(len(rays), np.inf)
     np.minimum.at(limit, ray[certain], end[certain])
-    # which of surfaces that meet stops a ray is chance, so that each of them must return it strongly enough
-    first = begin <= limit[ray] + border
+    first = begin <= limit[ray]
     ray, triangle, certain, begin, end = (part[first] for part in (ray, triangle, certain, begin, end))
 
     a, b, c = np.moveaxis(triangles[triangle], 1, 0)
@@ -322,6 +318,7 @@ def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: Lidar
     surely = (begin >= model.min_range + noise) & (end <= model.max_range - noise)
     maybe = (end >= model.min_range - noise) & (begin <= model.max_range + noise)
     surely &= _is_strong(model, case.settings, end, reflected * (1 - 1e-9))
+    surely[surely] &= ~_beside_weaker(case, model, origin, rays[ray[surely]], begin[surely], end[surely])
     maybe &= _is_strong(model, case.settings, begin, reflected * (1 + 1e-9))
     # distances of targets from the stretch of each ray in which its return lies: of both ends, and least
     start = (origin + begin[:, None] * rays[ray])[:, None] - targets
@@ -339,6 +336,29 @@ def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: Lidar
     some = np.zeros(len(rays), dtype=bool)
     some[ray[certain]] = True
     return (sure & some[:, None]).any(axis=0), near_perhaps.any(axis=0)
+
+
+def _beside_weaker(case: Case, model: LidarModel, origin: Float, rays: Float, begin: Float, end: Float) -> Boolean:
+    """Whether hits may lie within the tolerance of a triangle that would return too weakly, and so not count."""
+    triangles = case.site.triangles
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    size = np.linalg.norm(normals, axis=1)
+    weaker = np.zeros(len(rays), dtype=bool)
+    points, reach = origin + ((begin + end) / 2)[:, None] * rays, (end - begin) / 2 + 1.05 * caster_tolerance(triangles)
+    for corners, sides, normal, area, share in zip(
+        triangles, edges, normals, size, case.site.reflectivity, strict=True
+    ):
+        if area == 0:
+            continue
+        unit = normal / area
+        there = np.abs((points - corners[0]) @ unit) <= reach
+        for corner, side in zip(corners, sides, strict=True):
+            outward = np.cross(side, unit) / np.linalg.norm(side)
+            there &= (points - corner) @ outward <= reach
+        reflected = share * np.abs(rays @ unit) * (1 - 1e-9)
+        weaker |= there & ~_is_strong(model, case.settings, end, reflected)
+    return weaker
 
 
 def _is_strong(model: LidarModel, settings: VisibilitySettings, distance: Float, reflected: Float) -> Boolean:
