@@ -12,12 +12,13 @@ from headless.charts.style import COLOURS, DASHED, new_figure, save_chart, style
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator, PercentFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.pictures.palette import INK
 
-PANEL, HEIGHT = 3.4, 3.9  # inches
+PANEL, HEIGHT, NARROWEST = 3.4, 3.9, 6.0  # inches
 FARTHEST = 100.0  # metres
 _MEASURED = "measured, 95 % interval over sectors"
 
@@ -42,7 +43,7 @@ def save_vertical_chart(path: str | os.PathLike[str], comparisons: Sequence[Comp
 
 def save_noise_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison]) -> None:
     """Draw the noise of ranges against range, as PNG."""
-    figure, panels = new_figure(PANEL * len(comparisons) + 0.6, HEIGHT, len(comparisons), sharey=True)
+    figure, panels = _new_figure(len(comparisons))
     distance = np.linspace(1.0, FARTHEST, 200)
     for panel, one in zip(panels, comparisons, strict=True):
         panel.plot(distance, 1000.0 * one.model.range_noise(distance), color=COLOURS[0], label="model")
@@ -70,7 +71,7 @@ def save_noise_chart(path: str | os.PathLike[str], comparisons: Sequence[Compari
 
 def save_fate_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparison]) -> None:
     """Draw how alike the fates of rays are against how many rays they are apart, as PNG."""
-    figure, panels = new_figure(PANEL * len(comparisons) + 0.6, HEIGHT, len(comparisons), sharey=True)
+    figure, panels = _new_figure(len(comparisons))
     for panel, one in zip(panels, comparisons, strict=True):
         model = one.fates.along_ring
         if model:
@@ -79,7 +80,7 @@ def save_fate_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparis
         panel.plot(list(measured), list(measured.values()), "o", color=INK, label="measured")
         _finish(panel, one, "rays apart along the ring", "correlation of fate" if panel is panels[0] else "")
         panel.set_ylim(min(0.0, *measured.values()), 1.0)
-    save_chart(path, figure, "How alike the fates of rays at ground are, 20 to 100 m away", panels[:1])
+    save_chart(path, figure, "How alike the fates of neighbouring rays are, 20 to 100 m away", panels[:1])
 
 
 def _save_share_chart(
@@ -89,7 +90,7 @@ def _save_share_chart(
     bins_of: Callable[[Comparison], Sequence[ShareBin]],
     reflected: Callable[[Comparison, Float], Float],
 ) -> None:
-    figure, panels = new_figure(PANEL * len(comparisons) + 0.6, HEIGHT, len(comparisons), sharey=True)
+    figure, panels = _new_figure(len(comparisons))
     distance = np.linspace(1.0, FARTHEST, 400)
     for panel, one in zip(panels, comparisons, strict=True):
         if one.fits is not None:
@@ -107,6 +108,10 @@ def _save_share_chart(
         panel.set_ylim(0.0, 1.03)
         _finish(panel, one, "range, m", "share of rays" if panel is panels[0] else "")
     save_chart(path, figure, title, panels[:1])
+
+
+def _new_figure(panels: int) -> tuple[Figure, Sequence[Axes]]:
+    return new_figure(max(PANEL * panels + 0.6, NARROWEST), HEIGHT, panels, sharey=True)
 
 
 def _draw_measured(panel: Axes, bins: Sequence[ShareBin], face: str, label: str) -> None:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..arrays import Float
 from .noisy_returns import normal
 
-PATCH_SIZES = (0.35, 1.4, 16.0)
-PATCH_VARIANCES = (0.15, 0.5, 0.35)
+PATCH_SIZES = (1.0, 16.0)
+PATCH_VARIANCES = (0.65, 0.35)
 """Edges of the lattices' cubes in metres, and their shares of the variance: fitted to how alike the fates of
 neighbouring rays on roads are, at 20 to 100 m, and to how far sectors of 10° differ there."""
 
