@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from seip_addon import live_coverage, selection
+from seip_addon import live_coverage, preferences, selection
 from seip_addon.core.errors import SeipError
 from seip_addon.core.results.comparison import unpacked_counts
 from seip_addon.core.results.placement_record import parsed_record
@@ -175,3 +175,51 @@ def test_tilted_sensors_are_where_the_placement_put_them_until_a_hand_turns_them
     assert session.following.coverage != coverage
     with pytest.raises(RuntimeError, match="S1 hangs at no candidate pose"):
         bpy.ops.seip.show_sight_lines(sensor="S1")
+
+
+CORNER = """
+[corner]
+name = "Corner"
+manufacturer = "Test"
+source = "Test"
+channels = 32
+field_of_view_deg = [-30.0, 0.0]
+horizontal_field_of_view_deg = 120.0
+range_m = [0.5, 100.0]
+points_per_second = 200_000
+rotation_rate_hz = 10.0
+price_usd = [2_000, 2_000]
+"""
+
+
+def test_sensors_that_look_one_way_are_where_the_placement_put_them_until_a_hand_turns_them(junction, tmp_path):
+    (tmp_path / "mine.toml").write_text(CORNER, encoding="utf-8")
+    entry = bpy.context.preferences.addons.new()
+    entry.module = preferences.ADDON_ID
+    try:
+        bpy.ops.seip.add_catalogue(filepath=str(tmp_path / "mine.toml"))
+        for one in junction.seip.survey.types:
+            one.use = one.name == "corner"
+        junction.seip.survey.yaws = 5
+        bpy.ops.seip.solve_placement()
+        known = session.state_of(junction)
+        sensors, poses = known.solution.deployment.sensors, known.layout.site.candidates
+        assert len(set(poses.yaw[poses.position_of == 0])) in range(1, 6)
+        assert [sensor.yaw for sensor in sensors] == [poses.yaw[sensor.pose] for sensor in sensors]
+        bpy.ops.seip.rank_candidates()
+        assert all("8 m, yaw " in line.name for line in junction.seip.result.ranking)
+        bpy.ops.seip.show_sight_lines(sensor="S1")
+        bpy.ops.seip.follow_sensors()
+        assert session.following.moved == ()
+
+        coverage = session.following.coverage
+        selection.sensor_empties(junction)["S1"].rotation_euler.z += np.pi
+        live_coverage.update()
+        assert session.following.moved == ("S1",)
+        assert session.following.coverage < coverage
+        bpy.ops.seip.evaluate_sensors()
+        record = parsed_record(junction.seip.result.record)
+        moved = next(sensor for sensor in record.sensors if sensor.pose is None)
+        assert (moved.yaw_deg - np.degrees(sensors[0].yaw)) % 360 == pytest.approx(180.0, abs=1e-3)
+    finally:
+        bpy.context.preferences.addons.remove(entry)

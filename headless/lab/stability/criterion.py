@@ -250,7 +250,7 @@ def ring_borders(
 
 
 def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float, targets: Float) -> Boolean:
-    """Return to which targets a sensor has a free line of sight, within its range and its channels' elevations.
+    """Return to which targets a sensor has a free line of sight, within its range and its field of view.
 
     Parameters
     ----------
@@ -269,7 +269,9 @@ def in_view(caster: RayCaster, model: LidarModel, xyz: Float, orientation: Float
     end, _ = caster.cast(xyz, way / distance[:, None], float(distance.max()) + 1.0)
     free: Boolean = end >= distance - SIGHT_CLEARANCE
     free &= (distance >= model.min_range) & (distance <= model.max_range)
-    free &= (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
+    free &= (
+        model.faces(way @ orientation) & (elevation >= model.elevations.min()) & (elevation <= model.elevations.max())
+    )
     return free
 
 
@@ -388,7 +390,7 @@ def _by_azimuth(
     covered = []
     for draw in range(draws):
         yield Progress(draw, draws, "beams that begin elsewhere")
-        turn = [random.uniform(0, 2 * math.pi / s.model.azimuth_count) for s in deployment.sensors]
+        turn = [random.uniform(0, s.model.azimuth_step) for s in deployment.sensors]
         covered.append(_coverage(site, settings, deployment, turn))
     return Draws("azimuth phase", np.array(covered))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..arrays import Float
+from ..arrays import Boolean, Float
 from ..errors import SeipError
 from .carla_dropoff import CarlaDropoff
 from .range_equation import RangeEquation
@@ -106,6 +106,11 @@ class LidarModel:
     def first_azimuth(self) -> float:
         """Azimuth of step 0, radians; the steps of a limited field of view lie symmetrically about azimuth zero."""
         return 0.0 if self.all_round else (self.azimuth_step - self.field_of_view) / 2
+
+    def faces(self, vectors: Float) -> Boolean:
+        """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool."""
+        within: Boolean = np.abs(np.arctan2(vectors[:, 1], vectors[:, 0])) <= self.field_of_view / 2
+        return within
 
     @property
     def price(self) -> float:

@@ -34,9 +34,9 @@ class SightLines:
     seen : int
         How many it sees.
     in_range : int
-        How many are within its range.
+        How many are within its range and its horizontal field of view.
     shadows : (m, 4, 3) float64, metres
-        Squares of the targets within its range that it does not see.
+        Squares of those that it does not see.
     """
 
     eye: Float
@@ -59,7 +59,8 @@ def sight_lines(site: Site, pose: int, model: LidarModel, row: Boolean) -> Sight
     targets = site.targets
     eye = site.candidates.xyz[pose]
     distance = np.linalg.norm(targets.xyz - eye, axis=1)
-    in_range = row | ((distance >= model.min_range) & (distance <= model.max_range))
+    faced = model.faces((targets.xyz - eye) @ site.candidates.orientation(pose))
+    in_range = row | (faced & (distance >= model.min_range) & (distance <= model.max_range))
     seen = np.flatnonzero(row)
     return SightLines(
         eye=eye,

@@ -318,6 +318,9 @@ def test_what_is_in_view_turns_with_the_sensor():
     assert not in_view(caster, model, xyz, orientation(0.0, 0.0), near).any()
     assert in_view(caster, model, xyz, orientation(0.0, math.radians(20)), near).all()
     assert not in_view(caster, model, xyz, orientation(math.pi, math.radians(20)), near).any()
+    one_way = replace(model, field_of_view=math.radians(60))
+    assert in_view(caster, one_way, xyz, orientation(0.5, math.radians(20)), near).all()
+    assert not in_view(caster, one_way, xyz, orientation(0.8, math.radians(20)), near).any()
 
 
 def test_a_sensor_hangs_at_the_pose_of_its_own_tilt():
