@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -13,7 +14,9 @@ from seip_addon.core.visibility.beam_culling import Beams, NearRays, Planes
 from seip_addon.core.visibility.occlusion import stopped_by
 from seip_addon.core.visibility.settings import VisibilitySettings
 
-BEAMS = Beams.of([load_catalogue()["type2"]], 0.4, VisibilitySettings())
+TYPE2 = load_catalogue()["type2"]
+ONE_WAY = replace(TYPE2, field_of_view=math.radians(100))
+BEAMS, BEAMS_ONE_WAY = (Beams.of([model], 0.4, VisibilitySettings()) for model in (TYPE2, ONE_WAY))
 COUNT = 300
 
 
@@ -22,28 +25,30 @@ def bundles(channel: np.ndarray, first: np.ndarray, width: np.ndarray) -> NearRa
     return NearRays(patch, patch, channel, first, width, np.zeros(len(channel)))
 
 
-def directions(rays: NearRays, number: int) -> np.ndarray:
+def directions(rays: NearRays, number: int, view: float = 2 * math.pi) -> np.ndarray:
     """The rays of one bundle, one metre long in plan."""
     step = rays.first[number] + np.arange(rays.width[number])
-    azimuth = BEAMS.zero[rays.channel[number]] + step * 2 * math.pi / BEAMS.steps[rays.channel[number]]
+    begin = 0.4 if view == 2 * math.pi else 0.4 - view / 2 + view / 7500 / 2
+    azimuth = begin + TYPE2.azimuth_offsets[rays.channel[number]] + step * view / 7500
     slope = math.tan(BEAMS.elevation[rays.channel[number]])
     return np.column_stack([np.cos(azimuth), np.sin(azimuth), np.full(len(step), slope)])
 
 
-@given(st.integers(0, 2**32 - 1))
-def test_what_is_proven_hidden_is_hidden(seed: int) -> None:
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(BEAMS, 2 * math.pi), (BEAMS_ONE_WAY, ONE_WAY.field_of_view)]))
+def test_what_is_proven_hidden_is_hidden(seed: int, turning: tuple[Beams, float]) -> None:
+    beams, view = turning
     random = np.random.default_rng(seed)
     rays = bundles(random.integers(0, 32, COUNT), random.integers(-9000, 9000, COUNT), random.integers(1, 400, COUNT))
     origin = random.normal(0, 3, 3)
-    middle = np.array([directions(rays, number)[rays.width[number] // 2] for number in range(COUNT)])
+    middle = np.array([directions(rays, number, view)[rays.width[number] // 2] for number in range(COUNT)])
     triangles = origin + middle[:, None] * random.uniform(2, 40, (COUNT, 1, 1)) + random.normal(0, 6, (COUNT, 3, 3))
     normal = random.normal(0, 1, (COUNT, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal *= np.where((normal * middle).sum(axis=1) < 0, -1, 1)[:, None]
     planes = Planes(normal, random.uniform(0.1, 40, COUNT), np.ones(COUNT), 1e-3)
-    stopped = stopped_by(origin, triangles, BEAMS, rays, planes)
+    stopped = stopped_by(origin, triangles, beams, rays, planes)
     for number in np.flatnonzero(stopped):
-        ray = directions(rays, number)
+        ray = directions(rays, number, view)
         a, b, c = triangles[number] - origin
         facing = np.sign(np.linalg.det([a, b, c]))
         for one, other in ((a, b), (b, c), (c, a)):
