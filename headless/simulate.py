@@ -56,7 +56,13 @@ def main(argv: list[str]) -> None:
 
 
 def _settings(options: argparse.Namespace) -> RecordingSettings:
-    scan = read_settings(ScanSettings, options, noise=not options.no_noise)
+    scan = read_settings(
+        ScanSettings,
+        options,
+        noise=not options.no_noise,
+        weather=tuple(options.weather),
+        reflectivity=tuple(options.reflectivity),
+    )
     return read_settings(RecordingSettings, options, scan=scan, formats=tuple(options.format), split=options.split)
 
 

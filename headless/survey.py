@@ -185,6 +185,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         candidates=candidates,
         visibility=visibility,
         weather=weather_of(options.weather),
+        reflectivity=tuple(options.reflectivity),
         time_limit=limit,
     )
 

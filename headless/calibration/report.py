@@ -26,10 +26,10 @@ def describe(one: Comparison) -> Iterator[str]:
         ):
             lost = f", {law.extinction:g}/m lost in air" if law.extinction else ""
             yield f"  share, {what:10}  rms {misfit:.3f} over {fits.bins} bins; {_numbers(law)}{lost}"
-        caution = (
-            "" if fits.determined else " (at the limit of what is tried: these bins do not tell threshold or spread)"
-        )
-        yield f"  detection_law = {_numbers(fits.free)}{caution}"
+        if fits.determined:
+            yield f"  detection_law = {_numbers(fits.free)}"
+        else:
+            yield "  no detection_law   these bins do not tell threshold or spread: it is at the limit of what is tried"
     beams = one.beams
     yield f"  elevations         largest difference {beams.elevation_largest:.2f}°, rms {beams.elevation_rms:.2f}°"
     yield f"  azimuth offsets    largest difference {beams.azimuth_largest:.2f}°, rms {beams.azimuth_rms:.2f}°"

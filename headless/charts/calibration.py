@@ -79,7 +79,7 @@ def save_fate_chart(path: str | os.PathLike[str], comparisons: Sequence[Comparis
         measured = one.sensor.fate_correlation
         panel.plot(list(measured), list(measured.values()), "o", color=INK, label="measured")
         _finish(panel, one, "rays apart along the ring", "correlation of fate" if panel is panels[0] else "")
-        panel.set_ylim(min(0.0, *measured.values()), 1.0)
+        panel.set_ylim(min([0.0, *measured.values()]), 1.0)
     save_chart(path, figure, "How alike the fates of neighbouring rays are, 20 to 100 m away", panels[:1])
 
 

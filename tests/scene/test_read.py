@@ -355,9 +355,11 @@ def test_materials_get_the_reflectivity_that_is_asked_for(scene):
     assert (read_scene(scene).geometry.roads[0].reflectivity == 0.08).all()
     for asked, message in (
         ("asfalt=0.1", "no material 'asfalt'; did you mean asphalt"),
-        ("asphalt=dark", "must be a number from 0 to 1, not 'dark'"),
-        ("asphalt=1.5", "must be a number from 0 to 1, not 1.5"),
-        ("asphalt", "no material ''"),
+        ("asphalt=dark", "reflectivity 'asphalt=dark' is not understood: give MATERIAL=SHARE"),
+        ("asphalt=1.5", "a share from 0 to 1"),
+        ("asphalt=nan", "a share from 0 to 1"),
+        ("asphalt", "is not understood"),
+        ("=0.5", "is not understood"),
     ):
         with pytest.raises(SeipError, match=message):
             set_reflectivity([asked])

@@ -12,7 +12,7 @@ import numpy as np
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.lidar import LidarModel
 from seip_addon.core.site.candidates import CandidateSettings
-from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY, Mesh, SceneGeometry
 from seip_addon.core.site.site import Site, make_site
 
 
@@ -122,4 +122,9 @@ def _coarser(
 def _with_objects(geometry: SceneGeometry, site: Site, simplify: Callable[[Mesh], Float]) -> Site:
     surfaces = [mesh.triangles for mesh in (*geometry.roads, *geometry.ground)]
     objects = [simplify(mesh) for mesh in geometry.occluders]
-    return replace(site, triangles=np.concatenate([*surfaces, *objects]))
+    return with_triangles(site, np.concatenate([*surfaces, *objects]))
+
+
+def with_triangles(site: Site, triangles: Float) -> Site:
+    """Return a site of other triangles (n, 3, 3), all of the default reflectivity."""
+    return replace(site, triangles=triangles, reflectivity=np.full(len(triangles), DEFAULT_REFLECTIVITY))

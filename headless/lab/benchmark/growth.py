@@ -96,6 +96,7 @@ def repeated(site: Site, copies: int) -> Site:
         ),
         candidates=_repeated_candidates(candidates, shift),
         triangles=_shifted(corners, shift).reshape(-1, 3, 3),
+        reflectivity=np.tile(site.reflectivity, copies),
     )
 
 

@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from headless.lab.benchmark.approximations import approximations
+from headless.lab.benchmark.approximations import approximations, with_triangles
 from headless.lab.benchmark.baselines import BASELINES, can_run
 from headless.lab.benchmark.fresh_process import alone
 from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repeated, visibility_growth
@@ -180,7 +180,7 @@ def growth(
         visibility_growth(
             "visibility",
             "triangles",
-            [Scaled(len(r.triangles), replace(site, triangles=r.triangles), scope.places) for r in rows.values()],
+            [Scaled(len(r.triangles), with_triangles(site, r.triangles), scope.places) for r in rows.values()],
             models,
             settings,
         ),

@@ -48,7 +48,7 @@ def load_catalogue(extra: Iterable[str | os.PathLike[str]] = ()) -> dict[str, Li
             catalogue[model.key] = model
             continue
         try:
-            content = path.read_text(encoding="utf-8")
+            content = path.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise SeipError(f"cannot read the LiDAR catalogue {path}: {error}; name a TOML file") from error
         catalogue |= _parse(content, str(path))
@@ -112,7 +112,8 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
             max_range=high,
             price_range=price_range,
             law=law,
-            assumed="; ".join(filter(None, (beams, assumed))),
+            assumed_beams=beams,
+            assumed_law=assumed,
             field_of_view=field_of_view,
             **angles,
             **given,

@@ -54,8 +54,8 @@ class LidarModel:
         What is added to it for each square metre of r².
     law : RangeEquation or CarlaDropoff
         By which returns are detected.
-    assumed : str
-        What of the law no document says; empty where it follows from published ranges.
+    assumed_beams, assumed_law : str
+        What of its beams, and of its law, no document says; empty where all is published.
     """
 
     key: str
@@ -75,7 +75,8 @@ class LidarModel:
     range_noise_std: float = 0.03
     range_noise_growth: float = 0.0
     law: DetectionLaw = field(default_factory=CarlaDropoff)
-    assumed: str = ""
+    assumed_beams: str = ""
+    assumed_law: str = ""
 
     def __post_init__(self) -> None:
         if self.azimuth_offsets.size == 0:
@@ -117,6 +118,11 @@ class LidarModel:
         """Middle of the price range in US dollars."""
         return sum(self.price_range) / 2
 
+    @property
+    def assumed(self) -> str:
+        """What of it no document says."""
+        return "; ".join(filter(None, (self.assumed_beams, self.assumed_law)))
+
     def range_noise(self, distance: Float) -> Float:
         """Return the standard deviation of the range noise, (n,) float64, at distances (n,), all in metres."""
         return self.range_noise_std + self.range_noise_growth * distance**2
@@ -137,7 +143,7 @@ def _require_valid(model: LidarModel) -> None:
         "it needs at least one channel": model.channels > 0,
         "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
         "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
-        "azimuth offsets must be finite": bool(np.isfinite(model.azimuth_offsets).all()),
+        "azimuth offsets must lie within a turn": bool((np.abs(model.azimuth_offsets) <= math.tau).all()),
         "its horizontal field of view must be above 0 and at most 360 degrees": 0 < model.field_of_view <= math.tau,
         "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
         "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,
@@ -146,8 +152,8 @@ def _require_valid(model: LidarModel) -> None:
             model.points_per_second <= MAX_RAYS * model.rotation_rate and model.channels <= MAX_RAYS
         ),
         "its price range must be positive, finite and not decreasing": 0 < low <= high < math.inf,
-        "the range noise must be 0 m or more and finite": 0 <= model.range_noise_std < math.inf,
-        "the growth of the range noise must be 0 or more and finite": 0 <= model.range_noise_growth < math.inf,
+        "the range noise must lie between 0 and 10 m": 0 <= model.range_noise_std <= 10,
+        "the growth of the range noise must lie between 0 and 0.01 per metre": 0 <= model.range_noise_growth <= 0.01,
     }
     for sentence, holds in checks.items():
         if not holds:

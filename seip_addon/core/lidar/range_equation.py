@@ -54,6 +54,9 @@ MAKER_PROBABILITY = 0.9
 DROPOFF_REFLECTIVITY = 0.2
 """Of the surfaces, between asphalt and walls, for which `RangeEquation.as_dropoff` is right."""
 
+LEAST_RANGE, MAX_RANGE = 0.1, 1e4  # metres
+LEAST_RATIO = 1.3  # of the ranges at 80 and at 10 %: less of it leaves 1/400 of the light to the air
+
 _TINY = 1e-300
 _STANDARD = NormalDist()
 
@@ -87,10 +90,10 @@ class RangeEquation:
 
     def __post_init__(self) -> None:
         checks = {
-            "the threshold of detection must be finite": math.isfinite(self.threshold),
-            "the spread of detection must lie above 0 and up to 10": 0 < self.spread <= 10,
+            "the threshold of detection must lie between -60 and 20 (ln of 1/m²)": -60 <= self.threshold <= 20,
+            "the spread of detection must lie between 0.05 and 10": 0.05 <= self.spread <= 10,
             "the ceiling of detection must lie above 0 and up to 1": 0 < self.ceiling <= 1,
-            "the extinction must be 0 or more and finite": 0 <= self.extinction < math.inf,
+            "the extinction must lie between 0 and 10 per metre": 0 <= self.extinction <= 10,
         }
         for sentence, holds in checks.items():
             if not holds:
@@ -120,10 +123,10 @@ class RangeEquation:
         SeipError
             The range at 80 % is not the longer one, or the probability is not between 0 and the ceiling.
         """
-        if not 0 < at_10 < at_80 < math.inf:
+        if not (at_10 >= LEAST_RANGE and LEAST_RATIO * at_10 <= at_80 <= MAX_RANGE):
             raise SeipError(
-                f"the range at 80 % reflectivity ({at_80:g} m) must be above the one at 10 % ({at_10:g} m), and that "
-                "above 0 m"
+                f"the range at 80 % reflectivity ({at_80:g} m) must be {LEAST_RATIO:g} times the one at 10 % "
+                f"({at_10:g} m) or more, and both {LEAST_RANGE:g} to {MAX_RANGE:g} m: check which is which"
             )
         # p falls by a factor of 8 from one range to the other: what 1/r² leaves of that is extinction
         extinction = max(0.0, (math.log(8.0) - 2.0 * math.log(at_80 / at_10)) / (2.0 * (at_80 - at_10)))

@@ -94,6 +94,7 @@ class UnitBeams:
         return replace(
             base,
             source=f"{base.source}; beams of {source}",
+            assumed_beams="",
             elevations=np.radians(self.elevations),
             azimuth_offsets=np.radians((self.azimuth_offsets + 180.0) % 360.0 - 180.0),
             rotation_rate=rate,

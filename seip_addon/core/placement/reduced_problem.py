@@ -179,7 +179,8 @@ def make_instance(problem: PlacementProblem) -> tuple[Instance, float]:
     seen = problem.visible[order].any(axis=0) & (problem.weights > 0)
     if not seen.any():
         raise SeipError(
-            "no candidate sees any target; try other heights or sensor types, widen δ or clear what stands in the way"
+            "no candidate sees any target; try other heights or sensor types, widen δ, ask for less probability of "
+            "detection or fairer weather, or clear what stands in the way"
         )
     unit, whole = common_unit(problem.weights[seen])
     visible, weight = merge_targets(problem.visible[order][:, seen], np.rint(problem.weights[seen] / unit))

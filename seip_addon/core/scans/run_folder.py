@@ -82,7 +82,7 @@ class Run:
             "schema": SCHEMA,
             "key": self.key,
             "complete": len(frames) == len(self.times),
-            "settings": {name: value for name, value in asdict(self.settings).items() if name != "seed"},
+            "settings": _listed({name: value for name, value in asdict(self.settings).items() if name != "seed"}),
             "seeds": {"returns": self.settings.seed},
             "origin_m": self.origin.tolist(),
             "sensors": [_sensor_record(sensor) for sensor in self.sensors],
@@ -241,11 +241,16 @@ def _sensor_record(sensor: MountedSensor) -> Record:
     }
 
 
+def _listed(record: Mapping[str, Any]) -> Record:
+    """Return a record as JSON gives it back: lists in place of tuples."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in record.items()}
+
+
 def _fields(model: LidarModel) -> list[tuple[str, Any]]:
     return [(part.name, getattr(model, part.name)) for part in fields(model)]
 
 
 def _parts(model: LidarModel) -> list[Any]:
     """Return the figures that scans follow from, not the words for people."""
-    unused = {"name", "manufacturer", "source", "price_source", "assumed"}
+    unused = {"name", "manufacturer", "source", "price_source", "assumed_beams", "assumed_law"}
     return [repr(value) if name == "law" else value for name, value in _fields(model) if name not in unused]

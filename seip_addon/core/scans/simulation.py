@@ -40,12 +40,16 @@ class ScanSettings:
         Whether each azimuth is looked along at its own time (`Scanner.delay`) while the traffic moves. Else a
         revolution takes no time.
     engine : {"auto", "bvh", "embree"}
+    weather, reflectivity : tuple of str
+        What scene and sensors were made with, in words, for the record.
     """
 
     seed: int = setting(0, "seed of noise and lost returns", minimum=0)
     noise: bool = True
     rolling_shutter: bool = setting(default=False, help="traffic moves while a sensor turns")
     engine: Engine = setting("auto", "ray caster")
+    weather: tuple[str, ...] = ()
+    reflectivity: tuple[str, ...] = ()
 
 
 class Simulation:

@@ -64,7 +64,7 @@ def without_far_objects(
     sentence = (
         f"{count:,} triangles of {len(far)} objects lie beyond every sensor's range of {reach:,.0f} m and are left "
         f"out; the farthest, of {far[farthest][0]!r}, lie {distances[farthest]:,.0f} m away: "
-        "move them where they belong, or take them away"
+        "where they do not belong there, move them or take them away"
     )
     return replace(geometry, **left), (sentence,)
 

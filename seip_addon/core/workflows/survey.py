@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SeipError
-from ..lidar import LidarModel, find_models, load_catalogue
+from ..lidar import CarlaDropoff, LidarModel, find_models, load_catalogue
 from ..placement import Placement
 from ..placement.deployment import deploy
 from ..placement.integer_program import check_solver
@@ -69,6 +69,7 @@ class SurveySettings:
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
     weather: Weather = field(default_factory=Weather)
+    reflectivity: tuple[str, ...] = ()
     grid_spacing: float = setting(1.0, "distance between neighbouring targets on the road", unit="m", option="grid")
     catalogue: tuple[Path, ...] = setting((), "catalogues of your own; a unit's beams as KEY=FILE", metavar="FILE")
     engine: Engine = setting("auto", "ray caster")
@@ -114,6 +115,7 @@ class SurveySettings:
             "candidates": _candidates_record(self.candidates),
             "visibility": asdict(self.visibility),
             "weather": _finite(asdict(self.weather)),
+            "reflectivity": list(self.reflectivity),
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
             "solver": self.solver,
@@ -177,9 +179,21 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
         *assumed_pole_warnings(geometry, site.candidates),
         *rounding_warnings(near),
         *resolution_warnings(site, models, settings.visibility),
+        *carla_warnings(models, settings),
         *range_warnings(site, models, road_reflectivity(geometry.roads), settings.visibility),
     )
     return Layout(geometry, site, models, settings, (*warnings, *limits))
+
+
+def carla_warnings(models: Mapping[str, LidarModel], settings: SurveySettings) -> tuple[str, ...]:
+    """Say which sensor types see through any weather, and whether they are compared with types that do not."""
+    types = [key for key, model in models.items() if isinstance(model.law, CarlaDropoff)]
+    others = [key for key in models if key not in types]
+    changed = settings.weather != Weather() or settings.visibility.detection != VisibilitySettings().detection
+    if not types or not (others or changed):
+        return ()
+    named = f"{', '.join(types)}: every return in range counts (CARLA's model), whatever the weather and the surface"
+    return (f"{named}; {', '.join(others)} must detect it: the two do not compare" if others else named,)
 
 
 @dataclass(frozen=True, eq=False)

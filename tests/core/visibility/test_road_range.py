@@ -7,9 +7,12 @@ import pytest
 from synthetic_junction import junction_site
 
 from seip_addon.core.lidar import RangeEquation, load_catalogue
+from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
+from seip_addon.core.site.weather import Weather
 from seip_addon.core.visibility.road_range import range_warnings, road_range, road_reflectivity
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.workflows.survey import SurveySettings, carla_warnings
 
 CATALOGUE = load_catalogue()
 SIGHT = VisibilitySettings()
@@ -17,7 +20,7 @@ SIGHT = VisibilitySettings()
 
 def short_sighted(at_10):
     law = RangeEquation.of_ranges(at_10, 2.5 * at_10)
-    return {"type1": replace(CATALOGUE["type1"], law=law, assumed="")}
+    return {"type1": replace(CATALOGUE["type1"], law=law)}
 
 
 def test_range_on_a_road_is_that_of_the_law_within_the_longest_range():
@@ -45,10 +48,24 @@ def test_warnings_say_which_share_lies_beyond_every_candidate():
     assert f"up to {reach:.0f} m from 8 m height: {share:.0%} of the region lie beyond" in warning
 
 
+def test_sensors_that_see_through_any_weather_are_named():
+    alike = SurveySettings(CandidateSettings(sensors=("type1", "type2")))
+    models = {key: CATALOGUE[key] for key in ("type1", "type2", "os1_128")}
+    carla = {key: models[key] for key in ("type1", "type2")}
+    assert carla_warnings(carla, alike) == ()
+    assert carla_warnings({"os1_128": models["os1_128"]}, replace(alike, weather=Weather(rain=5.0))) == ()
+    (warning,) = carla_warnings(carla, replace(alike, weather=Weather(rain=5.0)))
+    assert warning.startswith("type1, type2: every return in range counts")
+    (warning,) = carla_warnings(carla, replace(alike, visibility=VisibilitySettings(detection=0.5)))
+    assert "the two do not compare" not in warning
+    (warning,) = carla_warnings(models, alike)
+    assert warning.endswith("os1_128 must detect it: the two do not compare")
+
+
 def test_there_is_no_warning_where_all_is_in_range_but_for_what_is_assumed():
     site = junction_site(positions=8, sensors=["type1"], heights=[8.0])
     seeing = short_sighted(900.0)
     assert range_warnings(site, seeing, 0.17, SIGHT) == ()
     assert range_warnings(site, CATALOGUE, 0.17, SIGHT) == ()
-    assumed = {"type1": replace(seeing["type1"], assumed="its range is a guess")}
+    assumed = {"type1": replace(seeing["type1"], assumed_law="its range is a guess")}
     assert range_warnings(site, assumed, 0.17, SIGHT)[0].endswith("; its range is a guess")
