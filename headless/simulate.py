@@ -31,7 +31,7 @@ from seip_addon.core.workflows.recording import RecordingSettings, dataset_folde
 from seip_addon.core.workflows.survey import SurveySettings
 from seip_addon.scene.materials import set_reflectivity
 from seip_addon.scene.read import read_scene
-from seip_addon.scene.sensors import read_sensors
+from seip_addon.scene.sensors import changed_beams, read_sensors
 from seip_addon.scene.traffic import read_traffic
 
 
@@ -76,6 +76,7 @@ def _run(options: argparse.Namespace, settings: RecordingSettings) -> Run:
         replace(sensor, model=weather.through(sensor.model))
         for sensor in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
     ]
+    runtime.warn(changed_beams(bpy.context.scene, sensors))
     if options.traffic is None:
         trajectories = runtime.finish_with_bar(read_traffic(bpy.context.scene))
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -50,6 +50,17 @@ def read_sensors(
             f"scene {scene.name!r} has no sensors in the collection {contract.SENSORS!r}{others}: place some first"
         )
     return tuple(_mounted(obj, label, catalogue) for label, obj in sensors.items())
+
+
+def changed_beams(scene: bpy.types.Scene, sensors: Sequence[MountedSensor]) -> tuple[str, ...]:
+    """Return a warning for each sensor that was placed with other beams than its type has now."""
+    empties = labelled_sensors(scene, hidden=True)
+    return tuple(
+        f"{sensor.label} was placed with other beams than {sensor.model.key} has now: name the catalogue or the unit's "
+        "file that it was placed with (--catalogue), or place again"
+        for sensor in sensors
+        if empties[sensor.label].get(contract.BEAMS, sensor.model.beams_key) != sensor.model.beams_key
+    )
 
 
 def labelled_sensors(scene: bpy.types.Scene, *, hidden: bool = False) -> dict[str, bpy.types.Object]:

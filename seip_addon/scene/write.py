@@ -132,6 +132,7 @@ def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:
         contract.LABEL: sensor.label,
         contract.SENSOR: sensor.model.key,
         "seip_sensor_name": sensor.model.name,
+        contract.BEAMS: sensor.model.beams_key,
         contract.POSITION: sensor.position_name,
         "seip_on_pole": sensor.on_pole,
         "seip_height": sensor.height,

@@ -21,7 +21,7 @@ from seip_addon.core.site.scene_geometry import DEFAULT_REFLECTIVITY
 from seip_addon.scene import contract
 from seip_addon.scene.materials import REFLECTIVITY, material
 from seip_addon.scene.read import read_scene
-from seip_addon.scene.sensors import read_sensors
+from seip_addon.scene.sensors import changed_beams, labelled_sensors, read_sensors
 from seip_addon.scene.write import write_result
 
 CATALOGUE = load_catalogue()
@@ -103,6 +103,17 @@ def test_posts_of_tilted_sensors_stand_on_the_ground_and_brackets_reach_the_pole
         else:
             lowest = corners[corners[:, 2].argmin()]
             assert np.linalg.norm(lowest - written.foot) < 0.1
+
+
+def test_sensors_whose_type_has_other_beams_now_are_named(scene):
+    sensors = read_sensors(scene, CATALOGUE)
+    assert changed_beams(scene, sensors) == ()
+    first = sensors[0]
+    turned = replace(first.model, azimuth_offsets=first.model.azimuth_offsets + 0.01)
+    (warning,) = changed_beams(scene, [replace(first, model=turned), *sensors[1:]])
+    assert warning.startswith(f"{first.label} was placed with other beams than {turned.key} has now")
+    del labelled_sensors(scene)[first.label]["seip_beams"]  # as scenes of before have it
+    assert changed_beams(scene, [replace(first, model=turned)]) == ()
 
 
 def test_what_a_hand_has_done_counts(scene):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass, field, replace
 
@@ -126,6 +127,12 @@ class LidarModel:
     def range_noise(self, distance: Float) -> Float:
         """Return the standard deviation of the range noise, (n,) float64, at distances (n,), all in metres."""
         return self.range_noise_std + self.range_noise_growth * distance**2
+
+    @property
+    def beams_key(self) -> str:
+        """Digest of the directions of its beams."""
+        steps = (float(self.azimuth_count), self.field_of_view)
+        return hashlib.sha256(np.concatenate([self.elevations, self.azimuth_offsets, steps]).tobytes()).hexdigest()[:16]
 
     def in_air(self, extinction: float) -> LidarModel:
         """Return the sensor in air that takes so much more light, in 1/m, on each way."""
