@@ -76,7 +76,13 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         column = settings_column(layout)
         column.prop(survey, "heights")
         column.prop(survey, "tilts")
-        column.prop(survey, "yaws")
+        if any(one.use and _looks_one_way(one.name) for one in survey.types):
+            column.prop(survey, "yaws")
+
+
+def _looks_one_way(key: str) -> bool:
+    model = session.sensor_types.get(key)
+    return model is not None and not model.all_round
 
 
 class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
