@@ -180,7 +180,7 @@ def _law(random: np.random.Generator, half: float) -> DetectionLaw:
     if random.random() < 0.4:
         return CarlaDropoff()
     far = half * float(10.0 ** random.uniform(-1.0, 1.0))
-    return RangeEquation.of_ranges(far, far * float(random.uniform(1.1, 2.8)), float(random.uniform(0.3, 0.95)))
+    return RangeEquation.of_ranges(far, far * float(random.uniform(1.3, 2.8)), float(random.uniform(0.3, 0.95)))
 
 
 def _model(random: np.random.Generator, key: str, half: float) -> LidarModel:

@@ -150,7 +150,7 @@ def _require_valid(model: LidarModel) -> None:
         "it needs at least one channel": model.channels > 0,
         "elevations must lie between -90 and 90 degrees": bool((np.abs(model.elevations) < right_angle).all()),
         "it needs one azimuth offset per channel": model.azimuth_offsets.shape == model.elevations.shape,
-        "azimuth offsets must lie within a turn": bool((np.abs(model.azimuth_offsets) <= math.tau).all()),
+        "azimuth offsets must lie within two turns": bool((np.abs(model.azimuth_offsets) <= 2 * math.tau).all()),
         "its horizontal field of view must be above 0 and at most 360 degrees": 0 < model.field_of_view <= math.tau,
         "its range must be increasing, from 0 m or more to 10 km": 0 <= model.min_range < model.max_range <= 1e4,
         "points per second must lie between 1 and 1e9": 1 <= model.points_per_second <= 1e9,

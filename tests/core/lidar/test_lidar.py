@@ -204,7 +204,7 @@ def test_a_law_follows_from_published_ranges_or_is_assumed_and_said_to_be(tmp_pa
         ({"detection_law": "[-11.0, 0.9, 0.9]", "detection_probability": "0.5"}, "either detection_law"),
         ({"range_noise_growth_per_m": "-1"}, "growth of the range noise"),
         ({"range_noise_std_m": "1e300"}, "range noise must lie between 0 and 10 m"),
-        ({"azimuth_offsets_deg": "[1e9, 0.0, 0.0, 0.0]"}, "azimuth offsets must lie within a turn"),
+        ({"azimuth_offsets_deg": "[1e9, 0.0, 0.0, 0.0]"}, "azimuth offsets must lie within two turns"),
         ({"detection_range_m": "[150.0, 150.2]"}, "must be 1.3 times the one at 10 %"),
         ({"detection_law": "[800.0, 0.9, 0.9]"}, "the threshold of detection must lie between -60 and 20"),
         ({"detection_law": "[-12.0, 0.001, 0.95]"}, "the spread of detection must lie between 0.05 and 10"),
