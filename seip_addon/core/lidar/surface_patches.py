@@ -1,8 +1,8 @@
 """Deviation of surfaces from what their material promises, patch by patch.
 
-Whether a ray returns is not drawn anew each time: a place on a road or a car that fails a LiDAR once fails it in the
-next sweep too, and so do its neighbours. Each place deviates by a standard normal number that follows from a seed and
-the place alone: the sum of a number for each of some cubic lattices that the place lies in.
+Whether a ray returns is not drawn anew each time: a place on a road or a car that fails a LiDAR once mostly fails it in
+the next sweep too, and so do its neighbours. Each place deviates by a standard normal number that follows from a seed
+and the place alone: the sum of a number for each of some cubic lattices that the place lies in.
 """
 
 from __future__ import annotations
