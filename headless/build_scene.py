@@ -1,13 +1,14 @@
-"""Build a Blender scene from an OpenDRIVE map.
+"""Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap.
 
 blender -b --python-exit-code 1 -P headless/build_scene.py -- map.xodr --near -49 -1 --radius 80 -o site.blend
+python -m headless.build_scene place.osm --near-latlon 52.47391 13.44048 -o site.blend
+python -m headless.build_scene place.osm --junction "One Street" "Other Street" -o site.blend
 python -m headless.build_scene map.xodr --junction 53 --site site.toml -o site.blend
 python -m headless.build_scene site.toml -o site.blend
 """
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -15,46 +16,62 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 
-from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
-from seip_addon.core.streetscape.description import describe_place
-from seip_addon.core.streetscape.model import site_model
+from seip_addon.core.site.provenance import provenance_lines
+from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
 
 
 def main(argv: list[str]) -> None:
-    """Read the map and the site description, model the site and save it."""
+    """Read the source, model the site and save it."""
     asked = _parser().parse_args(argv)
-    near = None if asked.near is None else (asked.near[0], asked.near[1])
-    map_path, description = describe_place(
-        asked.source,
-        site=asked.site,
-        near=near,
-        junction=asked.junction,
-        radius=asked.radius,
-        approaches=asked.approaches,
-    )
-    if asked.level:
-        description = replace(description, level=tuple(asked.level))
     check_name(asked.output)
     with runtime.progress_bar() as report:
-        model = finish(site_model(read_map(map_path), description), report)
-        finish(build_scene(new_file(), model, map_path.name), report)
+        built = finish(build_site(asked.source, _asked_site(asked)), report)
+        model = built.model
+        finish(build_scene(new_file(), model, built.map_name), report)
+    map_path = asked.output.with_suffix(".xodr")
+    save_map(built, map_path)
     save_blend(asked.output)
     for note in model.notes:
         runtime.print_line(f"note: {note}")
     runtime.warn(model.warnings)
+    for line in provenance_lines(model.provenance()):
+        runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(
         f"{asked.output}: {model.name}, {len(model.parts)} objects, region of interest {model.region.area:.0f} m², "
         f"local origin at map ({x:.0f}, {y:.0f}, {z:.0f})"
     )
+    if built.map_text is not None:
+        runtime.print_line(f"{map_path}: the map of its streets, to simulate traffic on")
+
+
+def _asked_site(options: argparse.Namespace) -> AskedSite:
+    return AskedSite(
+        near=None if options.near is None else tuple(options.near),
+        near_latlon=None if options.near_latlon is None else tuple(options.near_latlon),
+        junction=tuple(options.junction),
+        radius=options.radius,
+        approaches=options.approaches,
+        level=tuple(options.level),
+        site=options.site,
+        osm=options.osm,
+        service=options.service_roads,
+        left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
+    )
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="build_scene", description="Build a Blender scene from an OpenDRIVE map.")
-    parser.add_argument("source", type=Path, help="the map (.xodr), or a site description (.toml) that names it")
+    parser = argparse.ArgumentParser(
+        prog="build_scene", description="Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap."
+    )
+    parser.add_argument(
+        "source",
+        type=Path,
+        help="the map (.xodr), an extract (.osm, .osm.gz), or a site description (.toml) that names a map",
+    )
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
         "--near",
@@ -63,7 +80,20 @@ def _parser() -> argparse.ArgumentParser:
         metavar=("X", "Y"),
         help="middle of the place, map coordinates in metres (or latitude and longitude)",
     )
-    place.add_argument("--junction", metavar="ID", help="id or name of the junction in the middle of the place")
+    place.add_argument(
+        "--near-latlon",
+        type=float,
+        nargs=2,
+        metavar=("LAT", "LON"),
+        help="middle of the place, degrees: the junction nearest to it is studied",
+    )
+    place.add_argument(
+        "--junction",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="id or name of the junction in the middle of the place, or the names of two streets that meet there",
+    )
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--radius", type=float, help="radius of the region of interest in metres (80 with --near)")
     size.add_argument(
@@ -80,6 +110,15 @@ def _parser() -> argparse.ArgumentParser:
         help="id of a road on the level to study, where roads cross above",
     )
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
+    parser.add_argument(
+        "--osm", type=Path, metavar="EXTRACT", help="OpenStreetMap extract: adds buildings, trees and posts to a map"
+    )
+    parser.add_argument(
+        "--service-roads", action="store_true", help="of an extract: driveways, aisles and alleys are streets too"
+    )
+    parser.add_argument(
+        "--traffic-keeps", choices=("left", "right"), help="of an extract: by default as it shows, or as in its country"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="BLEND", help="the .blend to write")
     return parser
 

@@ -1,10 +1,9 @@
 """A mark for tests that need Eclipse SUMO."""
 
-from headless.sumo.simulation import find_sumo
-
 import pytest
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.traffic.sumo_programs import find_sumo
 
 
 def _is_installed():

@@ -1,13 +1,8 @@
 """Traffic from SUMO (Simulation of Urban MObility, Eclipse) on an OpenDRIVE map; SUMO itself is an optional extra."""
 
-import importlib.util
-import os
-import shutil
-import subprocess
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 import shapely
@@ -16,9 +11,10 @@ from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive import read_map
 from seip_addon.core.opendrive.road_map import RoadMap
-from seip_addon.core.progress import Progress, in_thread
+from seip_addon.core.progress import Progress
 from seip_addon.core.storage.files import whole_file
 from seip_addon.core.traffic.source import TrafficFiles
+from seip_addon.core.traffic.sumo_programs import Sumo, find_sumo, run
 
 from .demand import Demand, write_routes
 from .street_network import PARKED_CLASS, StreetNetwork, read_network
@@ -38,15 +34,6 @@ _PERMISSIONS = {
 """Permissions of lane types; all others are closed."""
 
 _CLOSED_LANES = ("shoulder", "restricted", "median", "stop", "none", "border")
-
-
-@dataclass(frozen=True)
-class Sumo:
-    """SUMO's programs, of the installation in ``home``."""
-
-    sumo: Path
-    netconvert: Path
-    home: Path | None
 
 
 @dataclass(frozen=True)
@@ -85,24 +72,6 @@ class Scenario:
             raise SeipError(f"a simulation must last above 0 s and at most a day, not {self.duration:g} s")
 
 
-def find_sumo() -> Sumo:
-    """Find SUMO's programs: on the PATH, or in the package ``eclipse-sumo`` of this Python.
-
-    Raises
-    ------
-    SeipError
-        They are not installed.
-    """
-    package = importlib.util.find_spec("sumo")
-    home = Path(package.origin).parent if package is not None and package.origin is not None else None
-    path = os.environ.get("PATH", "")
-    where = path if home is None else os.pathsep.join([path, str(home / "bin")])
-    sumo, netconvert = shutil.which("sumo", path=where), shutil.which("netconvert", path=where)
-    if sumo is None or netconvert is None:
-        raise SeipError("SUMO is not installed: `pip install --group traffic`, or put sumo and netconvert on the PATH")
-    return Sumo(Path(sumo), Path(netconvert), home)
-
-
 def simulate(
     map_path: Path, folder: Path, scenario: Scenario, bounds: tuple[float, float, float, float] | None = None
 ) -> Generator[Progress, None, TrafficFiles]:
@@ -127,7 +96,7 @@ def simulate(
     recorded, routes, network = (folder / f"traffic.{kind}.xml" for kind in ("fcd", "rou", "net"))
     yield from _network(programs, map_path, network, scenario.signals, bounds)
     write_routes(routes, read_network(network), scenario.demand, scenario.seed, scenario.duration)
-    yield from _run(
+    yield from run(
         programs,
         programs.sumo,
         [
@@ -159,14 +128,14 @@ def _network(
     ]
     lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
     source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
-    yield from _run(programs, programs.netconvert, [*source, *common], "reading the map")
+    yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
     shapes = _junction_shapes(read_network(plain), road_map)
     corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
     _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
     clip = [] if bounds is None else ["--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds)]
     source = ["--sumo-net-file", plain, "--node-files", nodes, "--tls.rebuild", "true", "--output-file", network]
     changes = [*source, *common, *clip, "--keep-edges.postload", "true"]
-    yield from _run(programs, programs.netconvert, changes, "laying crosswalks")
+    yield from run(programs, programs.netconvert, changes, "laying crosswalks")
 
 
 def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Float]:
@@ -206,36 +175,3 @@ def _crosswalks(road_map: RoadMap) -> list[Float]:
 def _write(path: Path, root: str, elements: Sequence[str]) -> None:
     with whole_file(path) as temporary:
         temporary.write_text("\n".join([f"<{root}>", *elements, f"</{root}>", ""]), encoding="utf-8")
-
-
-def _run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -> Generator[Progress, None, None]:
-    """Run one of SUMO's programs to its end."""
-    environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
-
-    def work(stop: Event) -> tuple[int, str]:
-        command = [str(part) for part in (program, *arguments)]
-        with subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as process:
-            while True:
-                try:
-                    _, complaint = process.communicate(timeout=0.2)
-                except subprocess.TimeoutExpired:
-                    if stop.is_set():
-                        process.kill()
-                else:
-                    return process.returncode, complaint
-
-    status, complaint = yield from in_thread(work, what)
-    if status != 0:
-        raise SeipError(f"{program.name} failed: {_last_error(complaint)}; check the map, or simulate in SUMO itself")
-
-
-def _last_error(complaint: str) -> str:
-    lines = [line.removeprefix("Error:").strip() for line in complaint.splitlines() if line.startswith("Error:")]
-    return lines[0].rstrip(".") if lines else "it says no reason"

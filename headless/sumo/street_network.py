@@ -7,7 +7,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic.sumo_files import Attributes, read_tags
+from seip_addon.core.storage.xml_stream import Attributes, read_tags
 
 WALKING, PARKING, DRIVING, OTHER = "walking", "parking", "driving", "other"  # uses of lanes
 PARKED_CLASS = "custom1"  # the vClass that alone may stand in a parking lane

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from pathlib import Path
-from typing import NamedTuple
 
 import bpy
 
@@ -17,8 +16,8 @@ from ..core.site.check import Problem, SiteCheck, check_site
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX, describe_place
-from ..core.streetscape.model import SiteModel, site_model
 from ..core.streetscape.parts import Role
+from ..core.workflows.site_building import AskedSite, BuiltSite, build_site
 from ..core.workflows.survey import SurveySettings, lay_out
 from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
@@ -72,13 +71,6 @@ def list_junctions(site: SEIP_PG_site, road_map: RoadMap) -> None:
         one.name = f"{junction.id} {junction.name}".strip()
 
 
-class BuiltSite(NamedTuple):
-    """A model, and the map that it was made from."""
-
-    map_name: str
-    model: SiteModel
-
-
 class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
     """Model the chosen place of the map: in this scene with its camera, light and units, or in a new scene of this file where this one has a site already"""  # noqa: E501  # a tooltip is one line
 
@@ -96,12 +88,12 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
         site = scene.seip.site
-        return _model(
-            Path(bpy.path.abspath(site.source)),
-            site.junction_id(),
-            None if site.is_described() else float(f"{site.radius:.7g}"),
-            along=site.follows_approaches(),
-        )
+        junction = site.junction_id()
+        size = None if site.is_described() else float(f"{site.radius:.7g}")
+        radius, approaches = (None, size) if site.follows_approaches() else (size, None)
+        chosen = () if junction is None else (junction,)
+        asked = AskedSite(junction=chosen, radius=radius, approaches=approaches, anywhere=True)
+        return build_site(Path(bpy.path.abspath(site.source)), asked)
 
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
@@ -124,23 +116,6 @@ class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
         for warning in result.model.warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{len(result.model.parts)} objects, region {result.model.region.area:,.0f} m²")
-
-
-def _model(
-    source: Path, junction: str | None, size: float | None, *, along: bool
-) -> Generator[Progress, None, BuiltSite]:
-    """Model a place; without a junction the one that is described, or the middle of the map.
-
-    Its ``size`` (metres) is how far it goes ``along`` the approaches of the junction, or its radius.
-    """
-    yield Progress(0, 0, "map")
-    map_path, described = describe_place(source)
-    road_map = read_map(map_path)
-    placed = described.near is not None or described.junction is not None or described.region is not None
-    near = None if junction is not None or placed else road_map.middle()
-    radius, approaches = (None, size) if along else (size, None)
-    _, description = describe_place(source, near=near, junction=junction, radius=radius, approaches=approaches)
-    return BuiltSite(map_path.name, (yield from site_model(road_map, description)))
 
 
 def missing_for_build(scene: bpy.types.Scene) -> str:

@@ -94,6 +94,8 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
         obj[contract.WEIGHT] = part.weight
     if part.source:
         obj[contract.SOURCE] = part.source
+    if part.height_assumed:
+        obj[contract.HEIGHT_ASSUMED] = True
     obj.hide_render = AREA_OVERLAYS.keys() >= set(part.roles)  # the viewport shows what only means an area
     for role in part.roles:
         contract.find_or_make(scene, COLLECTIONS[role]).objects.link(obj)

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 from headless import traffic
-from headless.sumo import simulation as sumo
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.sumo_programs import find_sumo
 
 ROOT = Path(__file__).resolve().parents[2]
 JUNCTION = ROOT / "scenes" / "junction.blend"
@@ -105,7 +105,7 @@ def test_the_paper_s_traffic_runs_on_the_road_of_town05(tmp_path, capsys):
     )  # fmt: skip
     net, rou = PAPERS / "Town05.net.xml", PAPERS / "Town05.rou.xml"
     subprocess.run(  # noqa: S603  # SUMO's program and our arguments
-        [sumo.find_sumo().sumo, "--net-file", net, "--route-files", rou, "--seed", "1", "--end", "60", "--step-length",
+        [find_sumo().sumo, "--net-file", net, "--route-files", rou, "--seed", "1", "--end", "60", "--step-length",
          "0.1", "--device.fcd.period", "0.2", "--fcd-output", data, "--precision", "3", "--no-step-log"],
         check=True, timeout=120, capture_output=True,
     )  # fmt: skip

@@ -15,8 +15,9 @@ from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.traffic import CATEGORIES
+from seip_addon.core.traffic import CATEGORIES, sumo_programs
 from seip_addon.core.traffic.floating_car_data import Extent, read_floating_car_data, read_trajectories
+from seip_addon.core.traffic.sumo_programs import find_sumo
 from seip_addon.core.traffic.vehicle_types import read_vehicle_types
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -154,9 +155,10 @@ def test_senseless_demand_is_refused(make, complaint):
 
 def test_without_sumo_the_cure_is_named(monkeypatch):
     monkeypatch.setenv("PATH", "")
-    monkeypatch.setattr(sumo.importlib.util, "find_spec", lambda _name: None)
-    with pytest.raises(SeipError, match="SUMO is not installed: `pip install --group traffic`"):
-        sumo.find_sumo()
+    monkeypatch.delenv("SUMO_HOME", raising=False)
+    monkeypatch.setattr(sumo_programs.importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(SeipError, match=r"SUMO is not installed, which .* `pip install --group traffic`"):
+        find_sumo()
 
 
 JUNCTION = ROOT / "scenes" / "junction.xodr"
@@ -192,7 +194,7 @@ def test_sumo_s_csv_says_what_its_xml_says(tmp_path, run):
     forms = {}
     for name in ("f.xml", "f.csv", "f.xml.gz"):
         more = ["--fcd-output", tmp_path / name, "--precision", 3, "--no-warnings", "true", "--no-step-log", "true"]
-        finish(sumo._run(sumo.find_sumo(), sumo.find_sumo().sumo, [*arguments, *more], "again"))  # noqa: SLF001  # its runner
+        finish(sumo_programs.run(find_sumo(), find_sumo().sumo, [*arguments, *more], "again"))
         forms[name] = finish(read_floating_car_data(tmp_path / name))
     plain = forms.pop("f.xml")
     assert plain.person.any()
@@ -241,7 +243,7 @@ def test_town05_is_cut_to_the_scene(tmp_path):
 
 @needs_sumo
 def test_what_sumo_refuses_is_said_in_one_sentence(tmp_path):
-    programs = sumo.find_sumo()
+    programs = find_sumo()
     with pytest.raises(SeipError, match=r"sumo failed: .*nowhere.*; check the map") as caught:
-        finish(sumo._run(programs, programs.sumo, ["--net-file", tmp_path / "nowhere.net.xml"], "x"))  # noqa: SLF001  # its runner
+        finish(sumo_programs.run(programs, programs.sumo, ["--net-file", tmp_path / "nowhere.net.xml"], "x"))
     assert "\n" not in str(caught.value)

@@ -104,7 +104,7 @@ class PlanLegend:
         self._line("region of interest")
         for weight in weights:
             names = [area.name for area in geometry.weighted_regions if area.weight == weight]
-            words = _short(names[0], 26) if len(names) == 1 else f"{len(names)} areas"
+            words = _short(names[0], 20) if len(names) == 1 else f"{len(names)} areas"
             self._swatch(facecolor="none", edgecolor=WEIGHTED, linewidth=1.4, linestyle=(0, (4, 1.5)))
             self._line(f"{words} (weight {weight:g} where weights count)")
         for areas, colour, hatch, words in (

@@ -18,7 +18,8 @@ DEFAULT_REFLECTIVITY = 0.3
 """Of a surface that is not known to reflect otherwise."""
 
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
-"""Source of a pole: the map, the site description, or an assumption."""
+FROM_EXTRACT, FROM_CITY_MODEL, FROM_SURVEY = "extract", "city model", "survey"
+"""Source of an object: the map, the site description, an assumption, OpenStreetMap, a city model, or a survey."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class Pole:
     forbidden, mandatory : bool
         No sensor may hang here; at least one sensor must.
     source : str
-        `FROM_MAP`, `DESCRIBED` or `ASSUMED`; empty where the user put it into the scene.
+        `FROM_MAP`, `DESCRIBED`, `ASSUMED` or `FROM_EXTRACT`; empty where the user put it into the scene.
     """
 
     name: str

@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,8 +38,10 @@ class _ApproachRoad:
     leads_on: bool
 
 
-def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: float) -> tuple[LaneSurface, ...]:
-    """Return the driving lanes of a junction, and of its approaches up to a distance.
+def approach_lanes(
+    surfaces: Sequence[LaneSurface], junctions: Collection[str], distance: float
+) -> tuple[LaneSurface, ...]:
+    """Return the driving lanes of junctions that are one place, and of their approaches up to a distance.
 
     An approach goes on over the roads that join on to it, and straight on through other junctions.
 
@@ -47,6 +49,8 @@ def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: 
     ----------
     surfaces : sequence of LaneSurface
         All lanes of a map.
+    junctions : collection of str
+        Their ids.
     distance : float, metres
         Along the roads, from where the junction ends.
 
@@ -57,7 +61,7 @@ def approach_lanes(surfaces: Sequence[LaneSurface], junction_id: str, distance: 
     """
     driving = in_groups(surfaces, ["driving"])
     roads = by_road(driving)
-    inside = {lane.road_id for lane in driving if lane.junction_id == junction_id}
+    inside = {lane.road_id for lane in driving if lane.junction_id in junctions}
     if not inside:
         return ()
     streets = {road: _street(lanes) for road, lanes in roads.items()}

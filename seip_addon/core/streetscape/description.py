@@ -16,8 +16,9 @@ from shapely.validation import explain_validity
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..site.scene_geometry import DEFAULT_WEIGHT
+from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
+from .roofs import FLAT, Roof
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
@@ -48,29 +49,51 @@ class WeightedRegion:
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """A block with a flat roof: ``height`` metres from ``base`` metres above the ground."""
+    """A building: ``height`` metres from ``base`` metres above the ground to the ridge.
+
+    Parameters
+    ----------
+    outline : Polygon
+        In plan; courtyards are its holes.
+    roof : Roof
+        Part of the height.
+    source : str
+        Who says that it stands there, as in `scene_geometry.Pole`.
+    height_assumed : bool
+        Whether that source does not give its height.
+    """
 
     outline: Polygon
     height: float
     base: float = 0.0
+    roof: Roof = FLAT
+    source: str = DESCRIBED
+    height_assumed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Trees:
-    """Trees of one size at ``positions`` (n, 2)."""
+    """Trees of one size at ``positions`` (n, 2); ``source`` and ``height_assumed`` as of a `Building`."""
 
     positions: Float
     height: float
     crown_diameter: float
+    source: str = DESCRIBED
+    height_assumed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """A wall along ``line`` (n, 2)."""
+    """A wall along ``line`` (n, 2), of a material and with a name; the rest as of a `Building`."""
 
     line: Float
     height: float
     thickness: float
+    base: float = 0.0
+    name: str = "Wall"
+    material: str = "wall"
+    source: str = DESCRIBED
+    height_assumed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +108,39 @@ class Poles:
         Of the post, and of the arm it carries.
     heading : float or None, radians
         Where the arm points, counter-clockwise from map x (east). None: to the nearest carriageway.
+    source, height_assumed
+        As of a `Building`.
     """
 
     positions: Float
     height: float
     arm: float
     heading: float | None
+    source: str = DESCRIBED
+    height_assumed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Slab:
+    """A plate over ``outline`` from ``base`` to ``top`` metres above the ground: a canopy, a shelter, a hedge."""
+
+    outline: Polygon
+    base: float
+    top: float
+    name: str
+    material: str = "roof"
+    source: str = DESCRIBED
+    height_assumed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class SideWay:
+    """A footway, cycle track or driveway that is no part of the road: ``line`` (n, 2), its width and material."""
+
+    line: Float
+    width: float
+    material: str
+    name: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +166,13 @@ class SiteDescription:
         Ids of roads that lie on the level to study, where roads lie above each other.
     weighted_regions, buildings, trees, walls, street_lights, signal_poles, forbidden_areas, mandatory_areas : tuple
         What the file lists.
+    slabs, posts, ways : tuple
+        What an extract adds: plates, plain posts, and ways beside the road.
+    from_centre_lines : bool
+        Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
+        other are one, and holes between their lanes no islands.
+    map_source : str
+        Who says where the roads are.
     """
 
     name: str = ""
@@ -134,6 +191,31 @@ class SiteDescription:
     signal_poles: tuple[Poles, ...] = ()
     forbidden_areas: tuple[Area, ...] = ()
     mandatory_areas: tuple[Area, ...] = ()
+    slabs: tuple[Slab, ...] = ()
+    posts: tuple[Poles, ...] = ()
+    ways: tuple[SideWay, ...] = ()
+    from_centre_lines: bool = False
+    map_source: str = FROM_MAP
+
+    @property
+    def has_objects(self) -> bool:
+        """Whether anything stands there."""
+        standing = (self.buildings, self.trees, self.walls, self.street_lights, self.signal_poles)
+        return any((*standing, self.slabs, self.posts))
+
+    def with_objects_of(self, other: "SiteDescription") -> "SiteDescription":
+        """Return this description with what stands there, and what ways lie there, by another one too."""
+        return replace(
+            self,
+            buildings=(*self.buildings, *other.buildings),
+            trees=(*self.trees, *other.trees),
+            walls=(*self.walls, *other.walls),
+            street_lights=(*self.street_lights, *other.street_lights),
+            signal_poles=(*self.signal_poles, *other.signal_poles),
+            slabs=(*self.slabs, *other.slabs),
+            posts=(*self.posts, *other.posts),
+            ways=(*self.ways, *other.ways),
+        )
 
     @property
     def along(self) -> float | None:

@@ -44,16 +44,24 @@ def tree_part(name: str, foot: Float, height: float, crown_diameter: float, numb
     return Part(name, shape, (Role.OCCLUDERS,), _xyz(foot), number * golden_turn % math.tau)
 
 
-def building_parts(name: str, base: Float, height: Float, number: int) -> tuple[Part, ...]:
-    """Return a block (k, 3) raised by (k,) metres, and its windows where it is a house with level eaves."""
-    walls = street_furniture.block(base, height, side=FACADES[number % len(FACADES)], cap="roof")
+def building_parts(name: str, base: Float, height: Float, number: int, shape: Solid | None = None) -> tuple[Part, ...]:
+    """Return a block (k, 3) raised by (k,) metres, and its windows where it is a house with level eaves.
+
+    A ``shape`` stands in place of the block, whose windows it gets.
+    """
+    walls = shape or street_furniture.block(base, height, side=facade(number), cap="roof")
     block = Part(name, walls, (Role.OCCLUDERS,))
     level = np.ptp(base[:, 2]) < 0.1 and np.ptp(height) < 0.1
-    facade = float(np.hypot(*np.diff(base[:, :2], axis=0, append=base[:1, :2]).T).sum()) * float(height[0])
-    if not level or height[0] < street_furniture.STOREY_HEIGHT or facade > MAX_FACADE_AREA:
+    walls_area = float(np.hypot(*np.diff(base[:, :2], axis=0, append=base[:1, :2]).T).sum()) * float(height[0])
+    if not level or height[0] < street_furniture.STOREY_HEIGHT or walls_area > MAX_FACADE_AREA:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
     return (block, Part(f"{name} windows", panes, (Role.DRESSING,))) if panes.faces else (block,)
+
+
+def facade(number: int) -> str:
+    """Return the material of the walls of a building, by its number."""
+    return FACADES[number % len(FACADES)]
 
 
 def object_parts(objects: Iterable[PlacedObject], carriageway: BaseGeometry) -> tuple[Part, ...]:

@@ -1,5 +1,6 @@
 """From a map and a site description to the parts of a scene, in local axes."""
 
+from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,15 +14,20 @@ from ..geometry.plan import outline, signed_area, without
 from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
+from ..site.provenance import ProvenanceRow, provenance
 from ..site.scene_geometry import ASSUMED, DESCRIBED
 from . import road_surface, street_furniture
-from .description import Poles, SiteDescription
+from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
+from .intersections import without_plain_joints
 from .levels import MIN_LEVEL_HEIGHT, Levels
 from .map_furniture import (
     CROWN_SHARE,
+    POLE_HEIGHT,
+    POST_RADIUS,
     arm_heading,
     building_parts,
+    facade,
     is_trunk,
     local_objects,
     object_parts,
@@ -31,6 +37,7 @@ from .map_furniture import (
 from .parts import Part, Role
 from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
+from .roofs import house
 from .signal_posts import signal_parts, split_posts
 from .terrain import Terrain
 
@@ -93,6 +100,14 @@ class SiteModel:
     notes: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
+    def provenance(self) -> tuple[ProvenanceRow, ...]:
+        """Count what is there by kind and source; what is there to be looked at alone does not count."""
+        return provenance(
+            (part.name, part.source, part.height_assumed)
+            for part in self.parts
+            if part.source and set(part.roles) != {Role.DRESSING}
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class _Surroundings:
@@ -128,6 +143,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     if not surfaces:
         raise SeipError(f"map {road_map.name!r} has no lane with an area; give its lanes widths, or take another map")
     description, place_notes = in_metres(description, road_map, surfaces)
+    if description.from_centre_lines:
+        surfaces = without_plain_joints(surfaces)
     stages = (Progress(done, STAGES, "streets") for done in range(STAGES + 1))
     yield next(stages)
     place = Place(road_map, surfaces, description)
@@ -151,15 +168,17 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     objects = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
     other_levels, below = _other_level_parts(levels.others, street)
     furniture = [*objects, *signals, *_described_parts(description, street)]
+    beside = _side_way_parts(description, street, below)
     yield next(stages)
     pavement, notes = _pavement_parts(street, below)
     yield next(stages)
-    carriageway = _surface_parts(street)
+    carriageway = _surface_parts(street, fill=description.from_centre_lines)
     yield next(stages)
     weighted = place.weighted_areas()
     parts = [
         *carriageway,
         *pavement,
+        *beside,
         _verge_part(street, furniture, below),
         *other_levels,
         _marking_part(street, stop_lines=bool(signals or description.signal_poles)),
@@ -175,11 +194,17 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         origin=origin,
         geo_reference=road_map.geo_reference,
         header_offset=road_map.header_offset,
-        parts=tuple(part for part in parts if part.solid.faces),
+        parts=tuple(_with_source(part, description.map_source) for part in parts if part.solid.faces),
         region=street.region,
         notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
         warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
     )
+
+
+def _with_source(part: Part, source: str) -> Part:
+    """Return a part of which somebody says that it is there; what only means an area needs nobody."""
+    is_there = not AREA_OVERLAYS.keys() >= set(part.roles)
+    return replace(part, source=source) if is_there and not part.source else part
 
 
 def _furniture_notes(placed: Sequence[PlacedObject], signals: Sequence[Part]) -> Iterator[str]:
@@ -250,12 +275,14 @@ def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGe
     return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles))
 
 
-def _surface_parts(street: _Surroundings) -> list[Part]:
+def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
     groups = {road_surface.group(lane) for lane in street.lanes}
     return [
         Part(
             name,
-            street_furniture.from_faces(road_surface.group_triangles(street.lanes, group, street.extent), material),
+            street_furniture.from_faces(
+                road_surface.group_triangles(street.lanes, group, street.extent, fill=fill), material
+            ),
             (role,),
         )
         for group, (name, material, role) in SURFACES.items()
@@ -354,31 +381,78 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
     """Return what the site description adds, standing on the ground."""
     parts: list[Part] = []
     for number, building in enumerate(description.buildings, start=1):
-        plan = shapely.get_coordinates(building.outline)[:-1] - street.origin[:2]
-        base = np.full(len(plan), street.terrain.height(plan).min() + building.base)
-        height = np.full(len(plan), building.height)
-        parts += building_parts(f"Building {number}", np.column_stack([plan, base]), height, number)
-    for number, wall in enumerate(description.walls, start=1):
-        foot = _on_ground(wall.line, street)
-        panels = street_furniture.fence(foot, np.full(len(foot), wall.height), wall.thickness, side="wall")
-        parts.append(Part(f"Wall {number}", panels, (Role.OCCLUDERS,)))
+        parts += _building_parts(building, number, street)
+    names = Counter[str]()
+    for wall in description.walls:
+        names[wall.name] += 1
+        foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
+        panels = street_furniture.fence(foot, np.full(len(foot), wall.height), wall.thickness, side=wall.material)
+        parts.append(_told(Part(f"{wall.name} {names[wall.name]}", panels, (Role.OCCLUDERS,)), wall))
+    for slab in description.slabs:
+        names[slab.name] += 1
+        outline = shifted(slab.outline, -street.origin)
+        ground = float(street.terrain.height(shapely.get_coordinates(outline)).min())
+        plate = house(outline, ground + slab.base, ground + slab.top, side=slab.material)
+        parts.append(_told(Part(f"{slab.name} {names[slab.name]}", plate, (Role.OCCLUDERS,)), slab))
     trees = [(foot, row) for row in description.trees for foot in _on_ground(row.positions, street)]
     parts += [
-        tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number)
+        _told(tree_part(f"Tree {number}", foot, row.height, row.crown_diameter, number), row)
         for number, (foot, row) in enumerate(trees, start=1)
     ]
     parts += _pole_parts(description, street)
     return parts
 
 
+def _building_parts(building: Building, number: int, street: _Surroundings) -> list[Part]:
+    outline = shifted(building.outline, -street.origin)
+    plan = shapely.get_coordinates(building.outline.exterior)[:-1] - street.origin[:2]
+    ground = float(street.terrain.height(plan).min()) + building.base
+    walls = building.height - building.roof.height
+    base = np.column_stack([plan, np.full(len(plan), ground)])
+    shape = None
+    if building.roof.height > 0.0 or building.outline.interiors:
+        shape = house(outline, ground, ground + walls, side=facade(number), roof=building.roof)
+    made = building_parts(f"Building {number}", base, np.full(len(plan), walls), number, shape)
+    return [_told(part, building) for part in made]
+
+
+def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
+    """Return a part with who says so."""
+    return replace(part, source=item.source, height_assumed=item.height_assumed)
+
+
+def _side_way_parts(description: SiteDescription, street: _Surroundings, below: BaseGeometry) -> Iterator[Part]:
+    """Yield ways beside the road, by kind, where no lane, building or other road lies."""
+    lanes = road_surface.lane_outline(street.lanes)
+    houses = shapely.union_all([shifted(building.outline, -street.origin) for building in description.buildings])
+    taken = shapely.union_all([lanes, street.roadside.filled, houses, below]).buffer(road_surface.MAX_SEAM)
+    for name, material in sorted({(way.name, way.material) for way in description.ways}):
+        lines = [
+            shapely.LineString(way.line - street.origin[:2]).buffer(way.width / 2)
+            for way in description.ways
+            if (way.name, way.material) == (name, material)
+        ]
+        area = without(shapely.union_all(lines).intersection(street.extent), taken)
+        taken = taken.union(area)
+        triangles = street.terrain.drape(
+            road_surface.without_crumbs(area), spacing=VERGE_SPACING, above=-VERGE_BELOW / 2
+        )
+        yield Part(name, _solid(triangles, material), (Role.GROUND,))
+
+
 def _pole_parts(description: SiteDescription, street: _Surroundings) -> Iterator[Part]:
     for number, (foot, heading, row) in enumerate(_pole_places(description.street_lights, street), start=1):
         shape = street_furniture.street_light(row.height, row.arm)
-        yield pole_part(f"Street light {number}", shape, foot, heading, DESCRIBED)
+        yield _told(pole_part(f"Street light {number}", shape, foot, heading, row.source), row)
     keeps_left = any(lane.keeps_left for lane in street.lanes)
     for number, (foot, heading, row) in enumerate(_pole_places(description.signal_poles, street), start=1):
         shape = street_furniture.signal_pole(row.height, row.arm, faces_left=not keeps_left)
-        yield pole_part(f"Signal pole {number} of the site file", shape, foot, heading, DESCRIBED)
+        whose = "the site file" if row.source == DESCRIBED else f"the {row.source}"
+        yield _told(pole_part(f"Signal pole {number} of {whose}", shape, foot, heading, row.source), row)
+    for number, (foot, heading, row) in enumerate(_pole_places(description.posts, street), start=1):
+        pole = pole_part(f"Post {number}", street_furniture.post(row.height, POST_RADIUS), foot, heading, row.source)
+        role = Role.POLES if row.height >= POLE_HEIGHT else Role.OCCLUDERS
+        yield _told(replace(pole, roles=(role,)), row)
 
 
 def _pole_places(rows: Sequence[Poles], street: _Surroundings) -> Iterator[tuple[Float, float, Poles]]:

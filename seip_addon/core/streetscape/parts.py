@@ -37,7 +37,9 @@ class Part:
     weight : float or None
         Of a weighted region.
     source : str
-        Of a pole: who says that it stands there, as in `scene_geometry.Pole`.
+        Who says that it stands there, as in `scene_geometry.Pole`; empty for what only means an area.
+    height_assumed : bool
+        Whether that source does not give its height.
     """
 
     name: str
@@ -47,3 +49,4 @@ class Part:
     yaw: float = 0.0
     weight: float | None = None
     source: str = ""
+    height_assumed: bool = False

@@ -10,14 +10,17 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
+from ..geometry.plan import closed
 from ..opendrive import Junction, LaneSurface, RoadMap, find_junction, junction_area, nearest_junctions
 from ..site.scene_geometry import DEFAULT_WEIGHT
 from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
+from .intersections import JUNCTION_REACH, filled, intersection, with_other_carriageways
 from .levels import Levels, split_levels
 
+MIN_SHARE_OF_JUNCTION = 0.5  # of a junction's area that a region holds from which on it holds all of it
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
 MAX_ROAD_DISTANCE = 10.0  # roads this near to the middle of the place (metres) may each be the one that is meant
 
@@ -59,13 +62,18 @@ class Place:
             return self.description.region
         if self.description.along is None:
             return shapely.Point(self.centre).buffer(self.description.radius or DEFAULT_RADIUS, quad_segs=32)
-        return shapely.union_all([shapely.make_valid(lane.polygon) for lane in self._approach_lanes()]).convex_hull
+        lanes = self._approach_lanes()
+        if self.description.from_centre_lines:
+            names = {road.id: road.name for road in self.road_map.roads}
+            driving = road_surface.in_groups(self.surfaces, ["driving"])
+            return with_other_carriageways(lanes, driving, names).convex_hull
+        return shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes]).convex_hull
 
     def levels(self) -> Levels:
         """Return the lanes on the level of the place, and those that cross above or below."""
         around = self.within.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
         if self.description.near is None and self.description.junction is not None:
-            anchors = {lane.road_id for lane in self.surfaces if lane.junction_id == self._junction.id}
+            anchors = {lane.road_id for lane in self.surfaces if lane.junction_id in self._junctions}
         else:
             driving = road_surface.in_groups(self.surfaces, ["driving"])
             away = shapely.distance([lane.polygon for lane in driving], shapely.Point(self.centre))
@@ -77,14 +85,29 @@ class Place:
         """Return the region of interest."""
         shift = np.array([*self.centre, 0.0])  # outlines need small coordinates for their grids
         within = shifted(self.within, -shift)
-        lanes = self.surfaces if self.description.along is None else self._approach_lanes()
+        lanes = self._lanes_of_region()
         driving = road_surface.in_groups(lanes, ["driving"])
         near = road_surface.local_strips(driving, shift, within) if driving else ()
         if near:
-            region = road_surface.without_crumbs(road_surface.lane_outline(near).intersection(within))
+            outline = road_surface.lane_outline(near)
+            if self.description.from_centre_lines:
+                outline = self._whole_streets(near, shift)
+            region = road_surface.without_crumbs(outline.intersection(within))
             if not region.is_empty:
                 return shifted(region, shift)
         raise self._no_driving_lane()
+
+    def _whole_streets(self, lanes: Sequence[LaneSurface], shift: Float) -> BaseGeometry:
+        """Return the area of lanes, local axes, and their streets' other carriageways no holes in junctions."""
+        around = self.within.convex_hull.buffer(SCENE_MARGIN)
+        driving = road_surface.in_groups(self.surfaces, ["driving"])
+        nearby = road_surface.local_strips(driving, shift, shifted(around, -shift))
+        names = {road.id: road.name for road in self.road_map.roads}
+        area = with_other_carriageways(lanes, nearby, names)
+        numbers = sorted({lane.junction_id for lane in nearby if lane.junction_id is not None})
+        junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
+        inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
+        return road_surface.without_crumbs(closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM))
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.
@@ -94,24 +117,55 @@ class Place:
         described, (x, y) = self.description.weighted_regions, self.centre.tolist()
         if not described:
             nearest = nearest_junctions(self.road_map, self.surfaces, x, y, 1)
-            return [(f"Junction {found.id}", self._central_box(found), DEFAULT_WEIGHT) for found, _ in nearest]
+            return [(self._title(found), self._central_box(found), DEFAULT_WEIGHT) for found, _ in nearest]
         return [
             (one.name, one.polygon or self._central_box(self._found(one.junction or "")), one.weight)
             for one in described
         ]
 
+    def _title(self, junction: Junction) -> str:
+        """Return what a junction is called: by its streets where the map was made of them, else by its id."""
+        named = self.description.from_centre_lines and self.description.name
+        return f"Junction {self.description.name if named else junction.id}"
+
+    def _lanes_of_region(self) -> Sequence[LaneSurface]:
+        """Return the lanes that the region of interest may lie on.
+
+        In a map made of middle lines a circle about a junction holds no street that only passes by.
+        """
+        description = self.description
+        if description.along is not None:
+            return self._approach_lanes()
+        if description.from_centre_lines and description.near is not None:
+            nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
+            if nearest and nearest[0][1] <= JUNCTION_REACH:
+                junctions = intersection(self.surfaces, nearest[0][0].id)
+                return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS)
+        return self.surfaces
+
     @cached_property
     def _junction(self) -> Junction:
         return self._found(self.description.junction or "")
+
+    @cached_property
+    def _junctions(self) -> frozenset[str]:
+        """Ids of the junctions in the middle of the place: one, or those of an intersection."""
+        return self._one_place(self._junction)
+
+    def _one_place(self, junction: Junction) -> frozenset[str]:
+        joined = self.description.from_centre_lines
+        return intersection(self.surfaces, junction.id) if joined else frozenset({junction.id})
 
     def _found(self, id_or_name: str) -> Junction:
         return find_junction(self.road_map, self.surfaces, id_or_name)
 
     def _approach_lanes(self) -> tuple[LaneSurface, ...]:
-        return approach_lanes(self.surfaces, self._junction.id, self.description.along or 0.0)
+        return approach_lanes(self.surfaces, self._junctions, self.description.along or 0.0)
 
     def _driving_area(self, junction: Junction) -> BaseGeometry:
-        area = junction_area(road_surface.in_groups(self.surfaces, ["driving"]), junction.id)
+        driving = road_surface.in_groups(self.surfaces, ["driving"])
+        areas = [junction_area(driving, number) for number in sorted(self._one_place(junction))]
+        area = shapely.union_all(areas)
         return junction_area(self.surfaces, junction.id) if area.is_empty else area
 
     def _central_box(self, junction: Junction) -> BaseGeometry:

@@ -12,6 +12,7 @@ from shapely.geometry.polygon import orient
 from ..arrays import Float, Integer
 from ..geometry.plan import closed, outline, without
 from ..opendrive import LaneSurface
+from .intersections import filled
 from .terrain import Terrain, cut
 
 GROUPS = {
@@ -191,21 +192,23 @@ def without_crumbs(area: BaseGeometry, least: float = 0.5) -> BaseGeometry:
     return _without_holes(shapely.geometrycollections(parts), least=least)
 
 
-def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry) -> Float:
+def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeometry, *, fill: bool = False) -> Float:
     """Return the surface of one group of lanes within an extent, as (n, 3, 3) triangles.
 
     Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as one
     layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge to edge
-    and stay as they are.
+    and stay as they are. With ``fill`` holes between the driving lanes of a junction are filled.
     """
     lanes = in_groups(surfaces, [name])
     pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
     for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
         own = [lane for lane in lanes if lane.junction_id == junction]
         area = lane_outline(own)
-        if name != "driving":
-            driving = in_groups(surfaces, ["driving"])
-            area = without_crumbs(without(area, _plan([lane for lane in driving if lane.junction_id == junction])))
+        if name == "driving":
+            area = filled(own) if fill else area
+        else:
+            driving = [lane for lane in in_groups(surfaces, ["driving"]) if lane.junction_id == junction]
+            area = without_crumbs(without(area, filled(driving) if fill and driving else _plan(driving)))
         terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
         pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)

@@ -21,7 +21,8 @@ from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from ..progress import Progress
 from ..storage.files import digest
-from .sumo_files import MAX_COORDINATE, Attributes, opened, quoted, read_tags, short
+from ..storage.xml_stream import Attributes, opened, quoted, read_tags, short
+from .sumo_files import MAX_COORDINATE
 from .trajectories import RoadUser, Trajectories
 from .vehicle_types import CAR, PERSON, VehicleType
 

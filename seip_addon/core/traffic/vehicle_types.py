@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import SeipError
 from ..progress import Progress
-from .sumo_files import Attributes, quoted, read_tags
+from ..storage.xml_stream import Attributes, quoted, read_tags
 
 
 @dataclass(frozen=True)

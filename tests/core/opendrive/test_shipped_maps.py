@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from headless.sumo.simulation import find_sumo
-
 import numpy as np
 import pytest
 import shapely
@@ -27,6 +25,7 @@ from seip_addon.core.opendrive import (
     placed_signals,
     read_map,
 )
+from seip_addon.core.traffic.sumo_programs import find_sumo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

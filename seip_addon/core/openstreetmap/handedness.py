@@ -1,0 +1,79 @@
+"""On which side of the road traffic keeps, by what an extract shows and where it lies."""
+
+import itertools
+import math
+from collections.abc import Iterator
+
+from .extract import Extract, Way
+
+_LEFT_HAND = (
+    ("the British Isles", 49.8, -11.0, 61.0, 1.8),
+    ("Malta", 35.7, 14.1, 36.2, 14.7),
+    ("Cyprus", 34.4, 32.2, 35.8, 34.7),
+    ("India, Bangladesh and Sri Lanka", 5.8, 68.8, 27.5, 92.6),
+    ("northern India and Pakistan", 27.5, 66.5, 35.0, 80.0),
+    ("Pakistan", 24.5, 62.0, 29.8, 70.0),
+    ("Nepal", 26.3, 80.0, 30.0, 88.2),
+    ("Thailand", 12.5, 98.9, 18.3, 102.4),
+    ("Thailand and Malaysia", 1.1, 98.2, 12.5, 104.5),
+    ("Indonesia", -11.2, 95.0, 1.1, 141.1),
+    ("Borneo and Sumatra", 1.1, 95.0, 7.5, 119.4),
+    ("Hong Kong and Macau", 22.1, 113.5, 22.56, 114.5),
+    ("Japan", 30.9, 129.0, 45.6, 146.0),
+    ("Okinawa", 24.0, 122.9, 30.9, 131.4),
+    ("Australia and Tasmania", -44.0, 112.8, -10.0, 154.0),
+    ("New Zealand", -47.6, 166.0, -34.0, 179.0),
+    ("Papua New Guinea", -11.8, 140.9, -1.0, 156.1),
+    ("Fiji", -19.5, 176.8, -16.0, 180.0),
+    ("southern Africa", -35.0, 11.7, -17.0, 33.0),
+    ("Mozambique, Zimbabwe, Malawi and Tanzania", -27.0, 30.0, -1.0, 41.0),
+    ("Zambia", -18.1, 22.0, -8.2, 33.7),
+    ("Kenya", -4.8, 34.0, 4.6, 41.9),
+    ("Uganda", -1.4, 29.6, 3.7, 35.0),
+    ("Mauritius", -20.6, 57.2, -19.9, 57.9),
+    ("Jamaica", 17.6, -78.4, 18.6, -76.1),
+    ("Trinidad and Tobago", 10.0, -61.95, 11.4, -60.4),
+    ("Barbados", 13.0, -59.7, 13.4, -59.4),
+    ("the Bahamas", 21.9, -79.3, 27.3, -72.7),
+    ("Guyana and Suriname", 1.8, -60.9, 6.0, -54.0),
+)
+"""Regions of left-hand traffic as south, west, north, east in degrees: coarse, for where an extract shows nothing."""
+_MIN_EVIDENCE = 3.0  # right angles of turn in roundabouts
+
+
+def drives_on_the_left(extract: Extract) -> tuple[bool, str]:
+    """Return whether traffic keeps to the left, and how that is known."""
+    for way in extract.ways.values():
+        side = way.tags.get("driving_side")
+        if side in ("left", "right"):
+            return side == "left", "a street's driving_side says so"
+    turn = sum(_turn(extract, way) for way in _roundabouts(extract))
+    if abs(turn) > _MIN_EVIDENCE * math.pi / 2:
+        return turn < 0.0, "its roundabouts turn that way"
+    nodes = list(extract.nodes.values())
+    middle = nodes[len(nodes) // 2]
+    for name, south, west, north, east in _LEFT_HAND:
+        if south <= middle.latitude <= north and west <= middle.longitude <= east:
+            return True, f"as in {name}"
+    return False, "as in most countries"
+
+
+def _roundabouts(extract: Extract) -> Iterator[Way]:
+    return (way for way in extract.ways.values() if way.tags.get("junction") == "roundabout" and "highway" in way.tags)
+
+
+def _turn(extract: Extract, way: Way) -> float:
+    """Return by which angle a way turns in all, radians counter-clockwise."""
+    nodes = extract.line(way)
+    if len(nodes) < 3:
+        return 0.0
+    east = math.cos(math.radians(nodes[0].latitude))
+    steps = [
+        complex((after.longitude - before.longitude) * east, after.latitude - before.latitude)
+        for before, after in itertools.pairwise(nodes)
+    ]
+    steps = [step for step in steps if step != 0]
+    return sum(
+        math.atan2((before.conjugate() * after).imag, (before.conjugate() * after).real)
+        for before, after in itertools.pairwise(steps)
+    )

@@ -1,0 +1,49 @@
+"""Lengths and counts as mappers write them: ``12``, ``12 m``, ``40'``, ``39 ft 4 in``, ``3;4``."""
+
+import re
+
+_METRES = {"": 1.0, "m": 1.0, "metre": 1.0, "metres": 1.0, "meter": 1.0, "meters": 1.0, "cm": 0.01, "km": 1000.0}
+_FOOT, _INCH = 0.3048, 0.0254
+_PLAIN = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*([a-z]*)")
+_FEET = re.compile(
+    r"(\d+(?:\.\d+)?)\s*(?:'|\u2032|ft|feet|foot)\.?\s*(?:(\d+(?:\.\d+)?)\s*(?:\"|\u2033|''|in|inch|inches)\.?)?"
+)
+
+
+def metres(text: str | None, most: float) -> float | None:
+    """Return a length in metres; of several (``3;4``) the greatest.
+
+    Parameters
+    ----------
+    most : float, metres
+        A length that is not above zero, or above this, counts as none.
+
+    Returns
+    -------
+    float or None
+        None where the text is no such length.
+    """
+    lengths = [_metres(one.strip().lower()) for one in (text or "").split(";")]
+    sound = [length for length in lengths if length is not None and 0.0 < length <= most]
+    return max(sound, default=None)
+
+
+def count(text: str | None, most: float) -> float | None:
+    """Return how many levels, lanes or the like: a number from 0 to ``most``, of several the greatest; else None."""
+    numbers = [match for one in (text or "").split(";") if (match := _PLAIN.fullmatch(one.strip())) and not match[2]]
+    sound = [value for match in numbers if 0.0 <= (value := _number(match[1])) <= most]
+    return max(sound, default=None)
+
+
+def _metres(text: str) -> float | None:
+    if match := _PLAIN.fullmatch(text):
+        unit = _METRES.get(match[2])
+        if unit is not None:
+            return unit * _number(match[1])
+    if match := _FEET.fullmatch(text):
+        return _FOOT * float(match[1]) + _INCH * float(match[2] or 0.0)
+    return None
+
+
+def _number(text: str) -> float:
+    return float(text.replace(",", "."))

@@ -1,0 +1,237 @@
+"""From an extract of OpenStreetMap to a map of its streets and a description of what stands beside them."""
+
+import difflib
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..opendrive import LaneSurface, RoadMap, lane_surfaces, nearest_junctions, read_map
+from ..opendrive.geo_reference import TransverseMercator, projection
+from ..opendrive.junctions import STREETS, streets_of_junctions
+from ..progress import Progress
+from ..site.scene_geometry import FROM_EXTRACT
+from ..streetscape import road_surface
+from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
+from ..streetscape.intersections import intersection, without_plain_joints
+from ..streetscape.place import SCENE_MARGIN
+from .extract import Extract, Way, read_extract, window
+from .netconvert import convert
+from .plan_shapes import PlanShapes
+from .street_objects import surroundings
+from .streets import is_street, write_streets
+
+EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
+STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
+MAX_JUNCTION_DISTANCE = 60.0  # metres from a place to the junction that is meant at most
+STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
+
+
+@dataclass(frozen=True)
+class ExtractPlace:
+    """Which place of an extract is studied.
+
+    Parameters
+    ----------
+    near : (latitude, longitude) or None, degrees
+    streets : tuple of str
+        Names of two streets, or more, that meet there, in place of ``near``.
+    radius, approaches : float or None, metres
+        As of a `SiteDescription`; without either the region follows the approaches of the junction.
+    service : bool
+        Whether driveways and aisles are streets.
+    left_hand : bool or None
+        On which side traffic keeps; None: as the extract shows.
+    """
+
+    near: tuple[float, float] | None = None
+    streets: tuple[str, ...] = ()
+    radius: float | None = None
+    approaches: float | None = None
+    service: bool = False
+    left_hand: bool | None = None
+
+    @property
+    def reach(self) -> float:
+        """How far the region may reach from the place, metres."""
+        return self.radius or (self.approaches or DEFAULT_RADIUS) + MAX_JUNCTION_DISTANCE
+
+
+def is_extract(path: Path) -> bool:
+    """Return whether a file is an extract by its name."""
+    return path.name.lower().endswith((*EXTRACT_SUFFIXES, ".pbf"))
+
+
+def site_of_extract(
+    path: Path, place: ExtractPlace, map_path: Path
+) -> Generator[Progress, None, tuple[RoadMap, SiteDescription, tuple[str, ...]]]:
+    """Lay out the streets of an extract about a place, and describe what stands there.
+
+    Parameters
+    ----------
+    map_path : Path
+        Where the map of the streets is written (.xodr); its folder takes a file in between.
+
+    Returns
+    -------
+    road_map : RoadMap
+    description : SiteDescription
+    notes : tuple of str
+        What was assumed or left out.
+
+    Raises
+    ------
+    SeipError
+        The extract cannot be read or holds no such place or no street there, or SUMO is missing.
+    """
+    if place.near is None and not place.streets:
+        raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
+    around = None if place.near is None else window(*place.near, place.reach + STREET_REACH + 200.0)
+    extract = yield from read_extract(path, around)
+    near = place.near or _meeting_place(extract, place.streets)
+    streets_path = map_path.with_suffix(".streets.osm")
+    streets = write_streets(
+        extract,
+        streets_path,
+        window(*near, place.reach + STREET_REACH),
+        service=place.service,
+        left_hand=place.left_hand,
+    )
+    try:
+        if streets.streets == 0:
+            raise _no_street(extract, near)
+        yield from convert(streets, streets_path, map_path)
+    finally:
+        streets_path.unlink(missing_ok=True)
+    road_map = read_map(map_path)
+    shapes, middle = _shapes(extract, road_map, near)
+    lanes = without_plain_joints([lane for road in road_map.roads for lane in lane_surfaces(road)])
+    junction = nearest_junctions(road_map, lanes, float(middle[0]), float(middle[1]), 1)
+    if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
+        raise SeipError(
+            f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give --radius for a "
+            "place between junctions"
+        )
+    carriageway = _carriageway(lanes, middle, place.reach)
+    area = shapely.Point(middle).buffer(place.reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    beside = surroundings(shapes, area, carriageway)
+    names = _street_names(road_map, lanes, junction[0][0].id) if junction else ()
+    description = replace(
+        beside,
+        name=STREETS.join(names[:2]),
+        near=None if place.radius is None else (float(middle[0]), float(middle[1])),
+        junction=junction[0][0].id if place.radius is None else None,
+        radius=place.radius,
+        approaches=place.approaches,
+        from_centre_lines=True,
+        map_source=FROM_EXTRACT,
+    )
+    dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
+    return road_map, description, (*extract.notes, *streets.notes, *dropped)
+
+
+def surroundings_of_map(
+    path: Path, road_map: RoadMap, description: SiteDescription, middle: Float, reach: float
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
+    """Add to a description what an extract says of the surroundings of a place on a map.
+
+    Parameters
+    ----------
+    middle : (2,) float64, metres
+        Of the place, map coordinates.
+    reach : float, metres
+        How far the region may reach from it.
+
+    Raises
+    ------
+    SeipError
+        The extract cannot be read, or the map names no projection that places it.
+    """
+    extract = yield from read_extract(path)
+    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
+    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    found = surroundings(shapes, area, _carriageway(lanes, middle, reach))
+    if not found.has_objects:
+        raise SeipError(f"{path.name} has nothing that stands at the place: take the extract of the map's own place")
+    dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
+    return description.with_objects_of(found), (*extract.notes, *dropped)
+
+
+def _projection(road_map: RoadMap) -> TransverseMercator:
+    to_map = projection(road_map.geo_reference)
+    if to_map is None or road_map.header_offset[3]:
+        raise SeipError(
+            f"map {road_map.name!r} names no projection that an extract can be laid on it with: its <geoReference> "
+            "must be a UTM zone or a transverse Mercator projection"
+        )
+    return to_map
+
+
+def _shapes(extract: Extract, road_map: RoadMap, near: tuple[float, float]) -> tuple[PlanShapes, Float]:
+    """Return the shapes of an extract on a map, and where the place is there, (2,) metres."""
+    to_map, offset = _projection(road_map), road_map.header_offset[:2]
+    middle = np.array(to_map(math.radians(near[0]), math.radians(near[1]))) - offset
+    return PlanShapes(extract, to_map, offset), middle
+
+
+def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> BaseGeometry:
+    near = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND)
+    driving = road_surface.in_groups(lanes, ["driving"])
+    return shapely.union_all([shapely.make_valid(lane.polygon) for lane in driving if road_surface.is_near(lane, near)])
+
+
+def _street_names(road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str) -> tuple[str, ...]:
+    meeting = streets_of_junctions(road_map, lanes)
+    together = sorted(intersection(lanes, junction_id), key=lambda number: number != junction_id)
+    return tuple(dict.fromkeys(name for number in together for name in meeting.get(number, ())))
+
+
+def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[float, float]:
+    """Return latitude and longitude of where streets meet: the mean of the nodes that they share."""
+    named = {name: _streets_called(extract, name) for name in names}
+    for name, ways in named.items():
+        if not ways:
+            raise SeipError(f"{extract.name} has no street called {name!r}; {_alike(extract, name)}")
+    nodes = [{number for way in ways for number in way.nodes} for ways in named.values()]
+    shared = sorted(set.intersection(*nodes) & extract.nodes.keys())
+    if not shared:
+        both = " and ".join(map(repr, names))
+        raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
+    places = [extract.nodes[number] for number in shared]
+    return (
+        sum(node.latitude for node in places) / len(places),
+        sum(node.longitude for node in places) / len(places),
+    )
+
+
+def _streets_called(extract: Extract, name: str) -> list[Way]:
+    wanted = name.strip().casefold()
+    return [
+        way
+        for way in extract.ways.values()
+        if is_street(way.tags, service=True)
+        and wanted in {way.tags.get(key, "").casefold() for key in ("name", "name:en", "alt_name", "ref")}
+    ]
+
+
+def _alike(extract: Extract, name: str) -> str:
+    known = sorted({way.tags["name"] for way in extract.ways.values() if "name" in way.tags and is_street(way.tags)})
+    close = difflib.get_close_matches(name, known, n=4, cutoff=0.4) or known[:5]
+    return f"the closest: {', '.join(close)}" if close else "its streets have no names"
+
+
+def _no_street(extract: Extract, near: tuple[float, float]) -> SeipError:
+    nodes = extract.nodes.values()
+    south, north = (f(node.latitude for node in nodes) for f in (min, max))
+    west, east = (f(node.longitude for node in nodes) for f in (min, max))
+    return SeipError(
+        f"{extract.name} has no street near {near[0]:.5f}, {near[1]:.5f}: it holds {south:.4f} to {north:.4f} degrees "
+        f"of latitude and {west:.4f} to {east:.4f} of longitude"
+    )

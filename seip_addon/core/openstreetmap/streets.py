@@ -1,0 +1,349 @@
+"""Streets of an extract, chosen and made explicit for SUMO's netconvert: what counts as a street, lanes, pavements."""
+
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import shapely
+
+from ..arrays import Float
+from .extract import Extract, Node, Tags, Way
+from .handedness import drives_on_the_left
+from .quantities import count, metres
+
+CLASSES = (
+    *("motorway", "trunk", "primary", "secondary", "tertiary"),
+    *("motorway_link", "trunk_link", "primary_link", "secondary_link", "tertiary_link"),
+    *("unclassified", "residential", "living_street", "road", "busway"),
+)
+"""Values of ``highway`` that are streets; ``service`` (driveways, aisles, alleys) is one where it is asked for."""
+PAVED_CLASSES = {"primary", "secondary", "tertiary", "unclassified", "residential", "living_street", "road"}
+"""Streets that have a pavement on both sides where the map says nothing of pavements."""
+ONE_WAY = {"yes", "true", "1", "-1", "reverse"}
+COPIED = (
+    *("highway", "railway", "name", "oneway", "junction", "lanes", "lanes:forward", "lanes:backward", "maxspeed"),
+    *("turn:lanes", "turn:lanes:forward", "turn:lanes:backward", "bridge", "layer", "access", "area"),
+)
+"""Tags of a street that netconvert reads as they are."""
+MAX_LANES, MAX_STREET_WIDTH = 12, 60.0
+LANE_WIDTHS = (2.25, 6.0)
+"""Widths (metres) of a lane that a width of the street may mean."""
+CYCLE_LANES = {"lane", "track", "opposite_lane", "opposite_track", "shared_busway"}
+CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
+_SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
+MAX_MEDIAN = 35.0  # metres between the middles of two carriageways of one street
+MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevation for it to be used
+
+
+@dataclass(frozen=True)
+class StreetFile:
+    """What was written for netconvert.
+
+    Parameters
+    ----------
+    streets : int
+        Number of ways that are streets.
+    elevated : bool
+        Whether its nodes have elevations.
+    left_hand : bool
+        Whether traffic keeps to the left.
+    notes : tuple of str
+        What was assumed.
+    """
+
+    streets: int
+    elevated: bool
+    left_hand: bool
+    notes: tuple[str, ...]
+
+
+def is_street(tags: Tags, *, service: bool = False) -> bool:
+    """Return whether a way is a street on the surface, or a tram's track; driveways only with ``service``."""
+    if tags.get("area") == "yes" or tags.get("tunnel", "no") not in ("no", "building_passage"):
+        return False
+    if tags.get("railway") == "tram":
+        return True
+    highway = tags.get("highway")
+    return highway in CLASSES or (service and highway == "service")
+
+
+def write_streets(
+    extract: Extract,
+    path: Path,
+    window: tuple[float, float, float, float],
+    *,
+    service: bool = False,
+    left_hand: bool | None = None,
+) -> StreetFile:
+    """Write the streets within a window as an extract of their own.
+
+    Parameters
+    ----------
+    window : (4,) float, degrees
+        South, west, north, east.
+    service : bool
+        Whether driveways, aisles and alleys (``highway=service``) are streets.
+    left_hand : bool, optional
+        Whether traffic keeps to the left; by default what the extract and its place say.
+    """
+    pieces = list(_pieces(extract, window, service=service))
+    used = list(dict.fromkeys(number for _, way in pieces for number in way.nodes))
+    notes: list[str] = []
+    if left_hand is None:
+        left_hand, reason = drives_on_the_left(extract)
+        notes.append(f"traffic keeps to the {'left' if left_hand else 'right'}: {reason}")
+    heights = [metres_of_elevation(extract.nodes[number]) for number in used]
+    elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
+    medians = _Medians(extract, [way for _, way in pieces])
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
+    for number, height in zip(used, heights, strict=True):
+        lines += _node(number, extract.nodes[number], height if elevated else None)
+    for number, way in pieces:
+        lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
+    lines += _restrictions(extract, {number for number, _ in pieces})
+    path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
+    return StreetFile(len(pieces), elevated, left_hand, tuple(notes))
+
+
+def metres_of_elevation(node: Node) -> float | None:
+    """Return the elevation that a node has, metres."""
+    try:
+        value = float(node.tags.get("ele", ""))
+    except ValueError:
+        return None
+    return value if -500.0 < value < 9000.0 else None
+
+
+def _pieces(extract: Extract, window: tuple[float, float, float, float], *, service: bool) -> Iterator[tuple[int, Way]]:
+    """Yield the streets within a window; one that leaves it in between comes in pieces, with ids of their own."""
+    south, west, north, east = window
+    fresh = max(extract.ways, default=0)
+    for number, way in extract.ways.items():
+        if not is_street(way.tags, service=service):
+            continue
+        inside = [
+            (node := extract.nodes.get(one)) is not None
+            and south <= node.latitude <= north
+            and west <= node.longitude <= east
+            for one in way.nodes
+        ]
+        for place, (first, last) in enumerate(_runs(inside)):
+            nodes = way.nodes[max(first - 1, 0) : last + 1]  # one node beyond, where the extract has it
+            held = tuple(one for one in nodes if one in extract.nodes)
+            if len(held) < 2:
+                continue
+            fresh += place > 0
+            yield (number if place == 0 else fresh), Way(held, way.tags)
+
+
+def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
+    """Yield first index and index after the last of each run of nodes inside."""
+    start = None
+    for place, held in enumerate([*inside, False]):
+        if held and start is None:
+            start = place
+        elif not held and start is not None:
+            yield start, place
+            start = None
+
+
+def _node(number: int, node: Node, height: float | None) -> list[str]:
+    place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{node.longitude:.9f}"'
+    tags = {key: node.tags[key] for key in ("highway", "crossing", "railway") if key in node.tags}
+    if height is not None:
+        tags["ele"] = f"{height:.3f}"
+    return [f"{place}/>"] if not tags else [f"{place}>", *_tag_lines(tags), "</node>"]
+
+
+def _way(number: int, nodes: Iterable[int], tags: Mapping[str, str]) -> list[str]:
+    return [f'<way id="{number}">', *(f'<nd ref="{one}"/>' for one in nodes), *_tag_lines(tags), "</way>"]
+
+
+def _tag_lines(tags: Mapping[str, str]) -> list[str]:
+    return [f"<tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in tags.items()]
+
+
+def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
+    for number, relation in extract.relations.items():
+        ways = [ref for kind, ref, _ in relation.members if kind == "way"]
+        if relation.tags.get("type") == "restriction" and ways and streets.issuperset(ways):
+            yield f'<relation id="{number}">'
+            for kind, ref, role in relation.members:
+                yield f'<member type={quoteattr(kind)} ref="{ref}" role={quoteattr(role)}/>'
+            yield from _tag_lines(relation.tags)
+            yield "</relation>"
+
+
+def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
+    """Return the tags of a street that netconvert is to read: lanes, widths, pavements and cycle lanes explicit."""
+    given = way.tags
+    tags = {key: given[key] for key in COPIED if key in given}
+    if given.get("railway") == "tram" and "highway" not in given:
+        return tags
+    if given.get("tunnel") == "building_passage":
+        tags.pop("layer", None)
+    if tags.get("lanes") is not None and not (count(tags["lanes"], MAX_LANES) or 0) >= 1:
+        del tags["lanes"]
+    near, far = ("left", "right") if left_hand else ("right", "left")
+    cycle = {"right": _cycle_lane(given, near), "left": _cycle_lane(given, far)}
+    walked = dict(zip(("left", "right"), _sidewalks(way, medians, left_hand=left_hand), strict=True))
+    paved = {"right": walked[near], "left": walked[far]}
+    tags |= {f"cycleway:{side}": kind for side, kind in cycle.items() if kind is not None}
+    tags["sidewalk"] = _SIDES[paved["left"], paved["right"]]
+    beside = {
+        side: [CYCLE_LANE_WIDTH] * (cycle[side] is not None) + [SIDEWALK_WIDTH] * paved[side]
+        for side in ("right", "left")
+    }
+    return tags | _widths(given, beside)
+
+
+def _cycle_lane(tags: Tags, side: str) -> str | None:
+    kind = tags.get(f"cycleway:{side}", tags.get("cycleway:both", tags.get("cycleway", "no")))
+    if kind not in CYCLE_LANES or kind == "shared_busway":
+        return None
+    return "track" if "track" in kind else "lane"
+
+
+def _widths(tags: Tags, beside: Mapping[str, list[float]]) -> dict[str, str]:
+    """Return the widths of all lanes, left to right as one drives, nothing where the map gives no width.
+
+    Parameters
+    ----------
+    beside : dict
+        Widths (metres) of cycle lane and pavement on the ``right`` and ``left``, where they are; the right is where
+        traffic keeps.
+    """
+    lanes = lane_counts(tags)
+    widths = {way: _lane_widths(tags, way, number) for way, number in lanes.items()}
+    if not any(widths.values()):
+        return {}
+    named = {"forward": "" if is_one_way(tags) else ":forward", "backward": ":backward"}
+    side = {"forward": "right", "backward": "left"}
+    return {
+        f"width:lanes{named[way]}": "|".join(f"{one:.2f}" for one in [*each, *beside[side[way]]])
+        for way, each in widths.items()
+        if each
+    }
+
+
+def lane_counts(tags: Tags) -> dict[str, int]:
+    """Return how many lanes a street has in each direction: ``forward`` and, where it is none of one way, ``backward``.
+
+    What is not said is as netconvert assumes it.
+    """
+    whole = count(tags.get("lanes"), MAX_LANES)
+    if is_one_way(tags):
+        return {"forward": int(whole or 1)}
+    own = {way: count(tags.get(f"lanes:{way}"), MAX_LANES) for way in ("forward", "backward")}
+    total = max(int(whole or (sum(number or 1 for number in own.values()))), 2)
+    backward = int(own["backward"] or (total - own["forward"] if own["forward"] else total // 2))
+    return {"forward": max(total - backward, 1), "backward": max(backward, 1)}
+
+
+def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
+    """Return the widths of the driving lanes of one direction, metres, none where the map does not say."""
+    low, high = LANE_WIDTHS
+    key = "width:lanes" if is_one_way(tags) else f"width:lanes:{way}"
+    given = [metres(one, MAX_STREET_WIDTH) for one in tags.get(key, "").split("|")]
+    if len(given) == lanes and all(given):
+        return [min(max(one, low), high) for one in given if one]
+    width = metres(tags.get("width", tags.get("width:carriageway")), MAX_STREET_WIDTH)
+    if width is None:
+        return []
+    cycle_lanes = sum(_cycle_lane(tags, side) is not None for side in ("left", "right"))
+    each = (width - cycle_lanes * CYCLE_LANE_WIDTH) / sum(lane_counts(tags).values())
+    return [min(max(each, low), high)] * lanes
+
+
+def is_one_way(tags: Tags) -> bool:
+    """Return whether traffic goes along a street in one direction only."""
+    roundabout = tags.get("junction") in ("roundabout", "circular")
+    motorway = tags.get("highway", "").startswith("motorway")
+    return tags.get("oneway", "yes" if roundabout or motorway else "no") in ONE_WAY
+
+
+def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:
+    """Return whether a pavement lies on the left and on the right of a street."""
+    left, right = (_sidewalk_tag(way.tags, side) for side in ("left", "right"))
+    if left is None or right is None:
+        kind = way.tags.get("highway", "")
+        usual_left = usual_right = kind in PAVED_CLASSES
+        if way.tags.get("junction") in ("roundabout", "circular"):
+            usual_left, usual_right = (True, False) if left_hand else (False, True)
+        elif kind.endswith("_link") and kind not in ("motorway_link", "trunk_link"):
+            usual_left, usual_right = left_hand, not left_hand
+        elif usual_left and is_one_way(way.tags):
+            beside_left, beside_right = medians.beside(way)
+            usual_left, usual_right = not beside_left, not beside_right
+        left = usual_left if left is None else left
+        right = usual_right if right is None else right
+    return left, right
+
+
+def _sidewalk_tag(tags: Tags, side: str) -> bool | None:
+    """Return what tags say of the pavement on one side, None where they say nothing."""
+    own = tags.get(f"sidewalk:{side}", tags.get("sidewalk:both"))
+    if own is not None:
+        return own not in ("no", "none")
+    whole = tags.get("sidewalk")
+    if whole is None:
+        return None
+    return whole in ("both", "yes", "separate", side)
+
+
+class _Medians:
+    """The one-way streets of an extract, to tell on which side of one its other carriageway lies."""
+
+    def __init__(self, extract: Extract, ways: Iterable[Way]) -> None:
+        self._extract = extract
+        starts, stops, names = [], [], []
+        for way in ways:
+            if is_one_way(way.tags) and way.tags.get("junction") is None and not _is_link(way.tags):
+                line = self._line(way)
+                starts.append(line[:-1])
+                stops.append(line[1:])
+                names += [way.tags.get("name", "")] * (len(line) - 1)
+        empty = np.empty((0, 2))
+        self._start, self._stop = (np.concatenate([empty, *points]) for points in (starts, stops))
+        self._names = np.array(names, dtype=object)
+        lines = shapely.linestrings(np.stack([self._start, self._stop], axis=1))
+        self._tree = shapely.STRtree(list(lines))
+
+    def beside(self, way: Way) -> tuple[bool, bool]:
+        """Return whether the other carriageway of a one-way street lies to its left, and to its right."""
+        line = self._line(way)
+        steps = np.diff(line, axis=0)
+        if not len(steps):
+            return False, False
+        longest = int(np.argmax(np.hypot(*steps.T)))
+        middle, along = (line[longest] + line[longest + 1]) / 2, steps[longest] / (np.hypot(*steps[longest]) or 1.0)
+        aside = np.array([-along[1], along[0]])
+        found = [False, False]
+        for side, sign in enumerate((1.0, -1.0)):
+            ray = shapely.linestrings(np.stack([middle + 2.0 * sign * aside, middle + MAX_MEDIAN * sign * aside]))
+            for index in self._tree.query(ray, predicate="intersects"):
+                ahead = self._stop[index] - self._start[index]
+                opposite = float(ahead @ along) < -0.8 * float(np.hypot(*ahead))
+                found[side] |= opposite and self._names[index] == way.tags.get("name", "")
+        return found[0], found[1]
+
+    def _line(self, way: Way) -> Float:
+        """Return a way (n, 2) in metres about the extract's first node, in the direction of its traffic."""
+        nodes = self._extract.line(way)
+        first = next(iter(self._extract.nodes.values()))
+        east = 111_320.0 * math.cos(math.radians(first.latitude))
+        line = np.array(
+            [
+                ((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0)
+                for node in nodes
+            ]
+        )
+        return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
+
+
+def _is_link(tags: Tags) -> bool:
+    return tags.get("highway", "").endswith("_link")

@@ -1,0 +1,131 @@
+"""Intersections of maps that were made of the middle lines of streets, where one comes as several junctions.
+
+SUMO's netconvert makes a junction wherever two ways meet or a lane begins, and several where the carriageways of two
+wide streets cross.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..arrays import Float
+from ..geometry.plan import closed
+from ..opendrive import LaneSurface, junction_area
+
+MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
+ARM_GAP = 2.0  # metres between two ends of roads of one arm at most
+SAME_DIRECTION = math.radians(40.0)  # roads whose ends differ by less lead the same way
+TOUCH = 0.5  # metres between a junction and the end of a road that meets it at most
+JUNCTION_REACH = 20.0  # metres between two junctions of one intersection at most
+PARALLEL = math.radians(15.0)  # by which the other carriageway of a street turns from it at most
+MAX_MEDIAN = 22.0  # metres between the middles of lanes of two carriageways of one street at most
+MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthest of an intersection at most
+
+
+def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
+    """Return lanes of which those are in no junction that lie where no more than two arms meet."""
+    areas = _areas(surfaces)
+    ends, outwards = [], []
+    for lane in surfaces:
+        if lane.junction_id is None:
+            for row, next_row in ((0, 1), (-1, -2)):
+                ends.append(shapely.LineString([lane.left[row, :2], lane.right[row, :2]]))
+                outwards.append(lane.left[next_row, :2] - lane.left[row, :2])
+    tree = shapely.STRtree(ends)
+    joints = set()
+    for number, area in areas.items():
+        touching = tree.query(area, predicate="dwithin", distance=TOUCH)
+        arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
+        if max(len(shapely.get_parts(arms)), _directions([outwards[index] for index in touching])) < MIN_ARMS:
+            joints.add(number)
+    return tuple(replace(lane, junction_id=None) if lane.junction_id in joints else lane for lane in surfaces)
+
+
+def _directions(vectors: Sequence[Float]) -> int:
+    """Return in how many directions vectors (2,) point that differ by more than `SAME_DIRECTION`."""
+    found: list[float] = []
+    for x, y in vectors:
+        heading = math.atan2(y, x)
+        if (x or y) and all(abs(math.remainder(heading - other, math.tau)) > SAME_DIRECTION for other in found):
+            found.append(heading)
+    return len(found)
+
+
+def intersection(surfaces: Sequence[LaneSurface], junction_id: str) -> frozenset[str]:
+    """Return the ids of the junctions that are one intersection with a junction."""
+    areas = _areas(surfaces)
+    if junction_id not in areas:
+        return frozenset({junction_id})
+    middle = areas[junction_id].centroid
+    found, waiting = {junction_id}, [junction_id]
+    while waiting:
+        area = areas[waiting.pop()]
+        near = {
+            number
+            for number, other in areas.items()
+            if number not in found
+            and area.distance(other) <= JUNCTION_REACH
+            and other.centroid.distance(middle) <= MAX_INTERSECTION
+        }
+        found |= near
+        waiting += sorted(near)
+    return frozenset(found)
+
+
+def with_other_carriageways(
+    lanes: Sequence[LaneSurface], surfaces: Sequence[LaneSurface], names: Mapping[str, str]
+) -> BaseGeometry:
+    """Return the area of lanes, and of what lies beside them of the same streets: the other carriageway of each.
+
+    Parameters
+    ----------
+    lanes : sequence of LaneSurface
+        Some driving lanes.
+    surfaces : sequence of LaneSurface
+        All driving lanes.
+    names : mapping of str to str
+        Of the streets, by the ids of their roads.
+    """
+    area = shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes])
+    bands: dict[str, list[tuple[BaseGeometry, float]]] = {}
+    for lane in lanes:
+        middle = (lane.left[:, :2] + lane.right[:, :2]) / 2
+        if names.get(lane.road_id) and lane.junction_id is None and np.ptp(middle, axis=0).max() > 0:
+            band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
+            bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
+    others = [
+        shapely.make_valid(lane.polygon).intersection(band)
+        for lane in surfaces
+        for band, heading in bands.get(names.get(lane.road_id, ""), ())
+        if abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL
+    ]
+    return shapely.union_all([area, *others])
+
+
+def _heading(lane: LaneSurface) -> float:
+    """Return the direction from the start of a lane to its end, radians."""
+    x, y = (lane.left[-1] + lane.right[-1] - lane.left[0] - lane.right[0])[:2].tolist()
+    return math.atan2(y, x)
+
+
+def filled(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the area of a junction's lanes with the holes between them, and narrow gaps at its edge, filled."""
+    area = closed(shapely.union_all([shapely.make_valid(lane.polygon) for lane in surfaces]), 0.5)
+    return shapely.union_all([shapely.Polygon(part.exterior) for part in _polygons(area)])
+
+
+def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+
+
+def _areas(surfaces: Sequence[LaneSurface]) -> dict[str, BaseGeometry]:
+    """Return the area of each junction, by its id."""
+    lanes: dict[str, list[LaneSurface]] = {}
+    for lane in surfaces:
+        if lane.junction_id is not None:
+            lanes.setdefault(lane.junction_id, []).append(lane)
+    return {number: junction_area(own, number) for number, own in lanes.items()}

@@ -1,0 +1,160 @@
+"""From a map, an extract of OpenStreetMap or a site description to the model of a site, as one job."""
+
+import tempfile
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..arrays import Float
+from ..errors import SeipError
+from ..opendrive import RoadMap, lane_surfaces, read_map
+from ..opendrive.junctions import STREETS
+from ..openstreetmap.site import ExtractPlace, is_extract, site_of_extract, surroundings_of_map
+from ..progress import Progress
+from ..storage.files import whole_file
+from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
+from ..streetscape.model import SiteModel, site_model
+from ..streetscape.place import Place
+
+
+@dataclass(frozen=True)
+class AskedSite:
+    """What is asked for beside the file that a site is built from.
+
+    Parameters
+    ----------
+    near : (x, y) or None
+        Middle of the place: map coordinates in metres.
+    near_latlon : (latitude, longitude) or None, degrees
+        The same on the globe.
+    junction : tuple of str
+        Id or name of the junction in the middle, or the names of two streets that meet there.
+    radius, approaches : float or None, metres
+        As of a `SiteDescription`.
+    level : tuple of str
+        As of a `SiteDescription`.
+    site : Path or None
+        Site description that goes with a map.
+    osm : Path or None
+        Extract whose buildings, trees and posts are added to an OpenDRIVE map.
+    service : bool
+        Whether driveways and aisles of an extract are streets.
+    left_hand : bool or None
+        On which side traffic of an extract keeps; None: as it shows.
+    anywhere : bool
+        Whether the middle of a map will do where no place is named.
+    """
+
+    near: tuple[float, float] | None = None
+    near_latlon: tuple[float, float] | None = None
+    junction: tuple[str, ...] = ()
+    radius: float | None = None
+    approaches: float | None = None
+    level: tuple[str, ...] = ()
+    site: Path | None = None
+    osm: Path | None = None
+    service: bool = False
+    left_hand: bool | None = None
+    anywhere: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltSite:
+    """A site's model, the name of its map, and the map itself where it was made of an extract."""
+
+    map_name: str
+    model: SiteModel
+    map_text: str | None = None
+
+
+def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, BuiltSite]:
+    """Model the site that is asked for.
+
+    Parameters
+    ----------
+    source : Path
+        An OpenDRIVE map, an extract of OpenStreetMap, or a site description that names a map.
+
+    Raises
+    ------
+    SeipError
+        A file cannot be read, or holds no such place.
+    """
+    yield Progress(0, 0, "map")
+    if is_extract(source):
+        return (yield from _of_extract(source, asked))
+    map_path, road_map, description = _of_map(source, asked)
+    notes: tuple[str, ...] = ()
+    if asked.osm is not None:
+        middle, reach = _where(road_map, description)
+        description, notes = yield from surroundings_of_map(asked.osm, road_map, description, middle, reach)
+    model = yield from site_model(road_map, description)
+    return BuiltSite(map_path.name, replace(model, notes=(*notes, *model.notes)))
+
+
+def save_map(built: BuiltSite, path: Path) -> None:
+    """Write the map that a site of an extract stands on: traffic is simulated on it.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be written.
+    """
+    if built.map_text is not None:
+        with whole_file(path) as temporary:
+            temporary.write_text(built.map_text, encoding="utf-8")
+
+
+def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, BuiltSite]:
+    if asked.near is not None or asked.osm is not None:
+        raise SeipError(f"{source.name} is an extract of OpenStreetMap: give its place by --near-latlon LAT LON")
+    if len(asked.junction) == 1:
+        raise SeipError(f'a junction of {source.name} has two streets: --junction "One Street" "Other Street"')
+    place = ExtractPlace(
+        near=asked.near_latlon,
+        streets=asked.junction,
+        radius=asked.radius,
+        approaches=asked.approaches,
+        service=asked.service,
+        left_hand=asked.left_hand,
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        map_path = Path(folder) / "streets.xodr"
+        road_map, found, notes = yield from site_of_extract(source, place, map_path)
+        map_text = map_path.read_text(encoding="utf-8")
+    _, described = describe_place(source, site=asked.site)
+    description = replace(
+        found.with_objects_of(described),
+        weighted_regions=described.weighted_regions,
+        forbidden_areas=described.forbidden_areas,
+        mandatory_areas=described.mandatory_areas,
+        region=described.region,
+        name=described.name or found.name,
+        level=asked.level,
+    )
+    model = yield from site_model(road_map, description)
+    return BuiltSite(source.name, replace(model, notes=(*notes, *model.notes)), map_text)
+
+
+def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:
+    near = asked.near or asked.near_latlon
+    junction = STREETS.join(asked.junction) or None
+    map_path, described = describe_place(source, site=asked.site)
+    road_map = read_map(map_path)
+    placed = described.near is not None or described.junction is not None or described.region is not None
+    if asked.anywhere and near is None and junction is None and not placed:
+        near = road_map.middle()
+    map_path, description = describe_place(
+        source, site=asked.site, near=near, junction=junction, radius=asked.radius, approaches=asked.approaches
+    )
+    return map_path, road_map, replace(description, level=asked.level) if asked.level else description
+
+
+def _where(road_map: RoadMap, description: SiteDescription) -> tuple[Float, float]:
+    """Return the middle of a place, (2,) metres, and how far its region may reach from there."""
+    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    place = Place(road_map, lanes, description)
+    x_low, y_low, x_high, y_high = place.within.bounds
+    x, y = place.centre.tolist()
+    reach = max(abs(x_low - x), abs(x_high - x), abs(y_low - y), abs(y_high - y))
+    return place.centre, max(reach, DEFAULT_RADIUS)
