@@ -129,7 +129,11 @@ def _network(
     lanes = ["--opendrive.import-all-lanes", "true", "--type-files", types, "--tls.guess", "true"]
     source = ["--opendrive-files", map_path, *lanes, "--output-file", plain]
     yield from run(programs, programs.netconvert, [*source, *common], "reading the map")
-    shapes = _junction_shapes(read_network(plain), road_map)
+    network_before = read_network(plain)
+    shapes = _junction_shapes(network_before, road_map)
+    if bounds is not None:
+        whole = _whole_nodes(network_before, bounds)
+        shapes = {node: shape for node, shape in shapes.items() if node in whole}
     corners = {node: " ".join(f"{x:.2f},{y:.2f}" for x, y in shape) for node, shape in shapes.items()}
     _write(nodes, "nodes", [f'<node id="{node}" shape="{shape}"/>' for node, shape in corners.items()])
     clip = [] if bounds is None else ["--keep-edges.in-boundary=" + ",".join(f"{edge:.3f}" for edge in bounds)]
@@ -155,6 +159,17 @@ def _junction_shapes(network: StreetNetwork, road_map: RoadMap) -> dict[str, Flo
             corners.setdefault(nodes[int(distance.argmin())], []).append(crosswalk)
     hulls = {node: shapely.MultiPoint(np.concatenate(parts)).convex_hull for node, parts in corners.items()}
     return {node: shapely.get_coordinates(hull)[:-1] for node, hull in hulls.items()}
+
+
+def _whole_nodes(network: StreetNetwork, bounds: tuple[float, float, float, float]) -> set[str]:
+    """Return the nodes that keep all edges that lead to them where the network is cut at a rectangle."""
+    kept = shapely.box(*bounds)
+    cut = {
+        edge.end
+        for edge in network.edges.values()
+        if not any(shapely.LineString(lane.line).intersects(kept) for lane in edge.lanes)
+    }
+    return {edge.end for edge in network.edges.values()} - cut
 
 
 def _crosswalks(road_map: RoadMap) -> list[Float]:

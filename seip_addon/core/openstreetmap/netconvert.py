@@ -43,6 +43,8 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     ]
     if streets.left_hand:
         options += ["--lefthand", "--opendrive-output.lefthand-left"]
+    if streets.roundabouts:
+        options += ["--junctions.join-exclude", ",".join(map(str, streets.roundabouts))]
     if streets.elevated:
         options += ["--osm.elevation"]
     yield from run(programs, programs.netconvert, options, "streets of the extract")

@@ -210,12 +210,18 @@ def _back_wall(outline: shapely.Polygon, carriageway: BaseGeometry) -> shapely.P
 def _side_ways(shapes: PlanShapes, area: BaseGeometry) -> Iterator[SideWay]:
     for way, line in _lines(shapes, area, "highway", set(WAY_WIDTHS)):
         tags = way.tags
-        if tags.get("area") == "yes" or tags.get("tunnel", "no") != "no" or tags.get("indoor", "no") != "no":
+        if tags.get("tunnel", "no") != "no" or tags.get("indoor", "no") != "no":
             continue
         if tags.get("layer", "0") != "0" or tags.get("bridge", "no") != "no" or tags.get("footway") == "crossing":
             continue
         usual, material, name = WAY_WIDTHS[tags["highway"]]
-        yield SideWay(line, metres(tags.get("width"), MAX_BARRIER) or usual, material, name)
+        if tags.get("area") == "yes":
+            outline = shapes.footprint(way)
+            if outline is not None:
+                yield SideWay(outline, material, name)
+            continue
+        width = metres(tags.get("width"), MAX_BARRIER) or usual
+        yield SideWay(shapely.LineString(line).buffer(width / 2), material, name)
 
 
 def _lines(shapes: PlanShapes, area: BaseGeometry, key: str, values: set[str]) -> Iterator[tuple[Way, Float]]:

@@ -51,6 +51,8 @@ class StreetFile:
         Whether its nodes have elevations.
     left_hand : bool
         Whether traffic keeps to the left.
+    roundabouts : tuple of int
+        Nodes of roundabouts, each of which is a junction of its own.
     notes : tuple of str
         What was assumed.
     """
@@ -58,6 +60,7 @@ class StreetFile:
     streets: int
     elevated: bool
     left_hand: bool
+    roundabouts: tuple[int, ...]
     notes: tuple[str, ...]
 
 
@@ -106,7 +109,9 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    return StreetFile(len(pieces), elevated, left_hand, tuple(notes))
+    round_ways = [way for _, way in pieces if _is_roundabout(way.tags)]
+    roundabouts = tuple(dict.fromkeys(number for way in round_ways for number in way.nodes))
+    return StreetFile(len(pieces), elevated, left_hand, roundabouts, tuple(notes))
 
 
 def metres_of_elevation(node: Node) -> float | None:
@@ -261,9 +266,8 @@ def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
 
 def is_one_way(tags: Tags) -> bool:
     """Return whether traffic goes along a street in one direction only."""
-    roundabout = tags.get("junction") in ("roundabout", "circular")
     motorway = tags.get("highway", "").startswith("motorway")
-    return tags.get("oneway", "yes" if roundabout or motorway else "no") in ONE_WAY
+    return tags.get("oneway", "yes" if motorway or _is_roundabout(tags) else "no") in ONE_WAY
 
 
 def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:
@@ -272,7 +276,7 @@ def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool,
     if left is None or right is None:
         kind = way.tags.get("highway", "")
         usual_left = usual_right = kind in PAVED_CLASSES
-        if way.tags.get("junction") in ("roundabout", "circular"):
+        if _is_roundabout(way.tags):
             usual_left, usual_right = (True, False) if left_hand else (False, True)
         elif kind.endswith("_link") and kind not in ("motorway_link", "trunk_link"):
             usual_left, usual_right = left_hand, not left_hand
@@ -343,6 +347,10 @@ class _Medians:
             ]
         )
         return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
+
+
+def _is_roundabout(tags: Tags) -> bool:
+    return tags.get("junction") in ("roundabout", "circular")
 
 
 def _is_link(tags: Tags) -> bool:

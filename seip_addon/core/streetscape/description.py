@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
 from ..arrays import Float
@@ -135,10 +136,9 @@ class Slab:
 
 @dataclass(frozen=True, eq=False)
 class SideWay:
-    """A footway, cycle track or driveway that is no part of the road: ``line`` (n, 2), its width and material."""
+    """A footway, cycle track or driveway that is no part of the road: its area in plan and material."""
 
-    line: Float
-    width: float
+    area: BaseGeometry
     material: str
     name: str
 

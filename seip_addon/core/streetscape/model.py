@@ -427,12 +427,12 @@ def _side_way_parts(description: SiteDescription, street: _Surroundings, below: 
     houses = shapely.union_all([shifted(building.outline, -street.origin) for building in description.buildings])
     taken = shapely.union_all([lanes, street.roadside.filled, houses, below]).buffer(road_surface.MAX_SEAM)
     for name, material in sorted({(way.name, way.material) for way in description.ways}):
-        lines = [
-            shapely.LineString(way.line - street.origin[:2]).buffer(way.width / 2)
+        areas = [
+            shifted(way.area, -street.origin)
             for way in description.ways
             if (way.name, way.material) == (name, material)
         ]
-        area = without(shapely.union_all(lines).intersection(street.extent), taken)
+        area = without(shapely.union_all(areas).intersection(street.extent), taken)
         taken = taken.union(area)
         triangles = street.terrain.drape(
             road_surface.without_crumbs(area), spacing=VERGE_SPACING, above=-VERGE_BELOW / 2
