@@ -53,7 +53,7 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py
+	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py tests/core/openstreetmap/test_sites.py
 
 # Runs of one scene differ by their seed alone; dense ones have twice the vehicles.
 traffic: sumo

@@ -34,7 +34,7 @@ MIN_KNOWN = 5  # buildings of known height in an extract from which on their med
 NO_BUILDINGS = {"no", "none", "proposed", "construction", "ruins", "demolished", "razed", "abandoned:building"}
 NO_PARTS = {"no", "balcony", "steps", "ramp", "base"}
 SLAB = 0.4  # metres: thickness of a roof that stands on posts
-DEFAULT_ROOF_SHARE = 0.3  # height of a roof without one, as a share of the building's, and at most one storey
+USUAL_ROOF = 2.5  # metres: height of a roof without one, and at most half of the building's
 FULLY_PARTED = 0.1  # share of an outline that may lie beside its parts before the rest is a building of its own
 
 
@@ -110,7 +110,7 @@ def known_height(tags: Tags) -> float | None:
     levels = count(tags.get("building:levels"), MAX_LEVELS)
     if not levels:
         return None
-    return levels * STOREY + (_roof_height(tags, levels * STOREY) if _is_roofed(tags) else 0.0)
+    return levels * STOREY + (_roof_height(tags) or USUAL_ROOF if _is_roofed(tags) else 0.0)
 
 
 def _usual_height(tags: Sequence[Tags]) -> float:
@@ -136,7 +136,9 @@ def _building(outline: shapely.Polygon, tags: Tags, usual: float, *, is_part: bo
         if not is_part:
             return None
         base, height = 0.0, max(base, height)
-    roof = min(_roof_height(tags, height), height - base) if _is_roofed(tags) and not canopy else 0.0
+    roof = 0.0
+    if _is_roofed(tags) and not canopy:
+        roof = min(_roof_height(tags) or min(USUAL_ROOF, (height - base) / 2), height - base)
     return Building(
         outline,
         height - base,
@@ -151,12 +153,11 @@ def _is_roofed(tags: Tags) -> bool:
     return tags.get("roof:shape", "flat") in RIDGED | SLOPED
 
 
-def _roof_height(tags: Tags, height: float) -> float:
+def _roof_height(tags: Tags) -> float | None:
+    """Return the height of a roof that tags give, metres."""
     own = metres(tags.get("roof:height"), MAX_HEIGHT)
-    if own is not None:
-        return own
     levels = count(tags.get("roof:levels"), MAX_LEVELS)
-    return levels * STOREY if levels else min(DEFAULT_ROOF_SHARE * height, STOREY)
+    return own or (levels * STOREY if levels else None)
 
 
 _POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")

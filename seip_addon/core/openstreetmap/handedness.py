@@ -18,7 +18,7 @@ _LEFT_HAND = (
     ("Thailand and Malaysia", 1.1, 98.2, 12.5, 104.5),
     ("Indonesia", -11.2, 95.0, 1.1, 141.1),
     ("Borneo and Sumatra", 1.1, 95.0, 7.5, 119.4),
-    ("Hong Kong and Macau", 22.1, 113.5, 22.56, 114.5),
+    ("Hong Kong and Macau", 22.1, 113.5, 22.51, 114.5),
     ("Japan", 30.9, 129.0, 45.6, 146.0),
     ("Okinawa", 24.0, 122.9, 30.9, 131.4),
     ("Australia and Tasmania", -44.0, 112.8, -10.0, 154.0),
@@ -35,7 +35,7 @@ _LEFT_HAND = (
     ("Trinidad and Tobago", 10.0, -61.95, 11.4, -60.4),
     ("Barbados", 13.0, -59.7, 13.4, -59.4),
     ("the Bahamas", 21.9, -79.3, 27.3, -72.7),
-    ("Guyana and Suriname", 1.8, -60.9, 6.0, -54.0),
+    ("Guyana and Suriname", 1.8, -60.0, 8.3, -54.0),
 )
 """Regions of left-hand traffic as south, west, north, east in degrees: coarse, for where an extract shows nothing."""
 _MIN_EVIDENCE = 3.0  # right angles of turn in roundabouts

@@ -21,6 +21,7 @@ from .intersections import JUNCTION_REACH, filled, intersection, with_other_carr
 from .levels import Levels, split_levels
 
 MIN_SHARE_OF_JUNCTION = 0.5  # of a junction's area that a region holds from which on it holds all of it
+MIN_PIECE = 6.0  # square metres: smaller pieces of other carriageways, and smaller holes, do not count
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
 MAX_ROAD_DISTANCE = 10.0  # roads this near to the middle of the place (metres) may each be the one that is meant
 
@@ -107,7 +108,8 @@ class Place:
         numbers = sorted({lane.junction_id for lane in nearby if lane.junction_id is not None})
         junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
-        return road_surface.without_crumbs(closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM))
+        whole = closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM)
+        return road_surface.without_crumbs(whole, least=MIN_PIECE)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.

@@ -1,0 +1,128 @@
+"""Reading extracts, whole and broken."""
+
+import gzip
+
+import pytest
+from osm_text import Extract, crossing
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.openstreetmap import extract as reading
+from seip_addon.core.openstreetmap.extract import Way, read_extract, rings, window
+from seip_addon.core.progress import finish
+
+
+def read(path, within=None):
+    return finish(read_extract(path, within))
+
+
+def written(tmp_path, text, name="place.osm"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def osm(body):
+    return f'<?xml version="1.0" encoding="UTF-8"?><osm version="0.6">{body}</osm>'
+
+
+def test_an_extract_is_read_plain_and_packed(tmp_path):
+    plain = crossing().write(tmp_path / "place.osm")
+    packed = tmp_path / "place.osm.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    one, other = read(plain), read(packed)
+    assert len(one.nodes) == len(other.nodes) > 20
+    assert one.ways.keys() == other.ways.keys()
+    assert any(way.tags.get("name") == "East Road" for way in one.ways.values())
+
+
+def test_a_packed_extract_is_known_by_its_content_not_its_name(tmp_path):
+    path = tmp_path / "place.osm"
+    path.write_bytes(gzip.compress(crossing().text().encode()))
+    assert read(path).ways
+
+
+def test_nodes_outside_a_window_are_passed_over(tmp_path):
+    path = crossing().write(tmp_path / "place.osm")
+    near = read(path, window(52.5, 13.4, 60.0))
+    assert 0 < len(near.nodes) < len(read(path).nodes)
+    assert len(near.ways) == len(read(path).ways)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "broken or unfinished XML"),
+        ("<osm><node id='1' lat='0' lon='0'>", "broken or unfinished XML"),
+        (osm("")[:-6] + "<node", "broken or unfinished XML"),
+        (osm(""), "has no node"),
+        ("<OpenDRIVE/>", "no extract of OpenStreetMap: its first element is <OpenDRIVE>"),
+        ('<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm>&a;</osm>', "declares a document type or entities"),
+        (osm('<node id="x" lat="0" lon="0"/>'), "is no whole number"),
+        (osm('<node lat="0" lon="0"/>'), "is no whole number"),
+        (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "is no whole number"),
+    ],
+)
+def test_a_broken_extract_is_refused_in_a_sentence(tmp_path, text, complaint):
+    with pytest.raises(SeipError, match=complaint):
+        read(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("content", "cure"),
+    [
+        (b"\x00\x00\x00\x0d\x0a\x09OSMHeader", "osmium cat"),
+        (b"PK\x03\x04rest", "unpack"),
+        (b"BZh91", "bunzip2"),
+        (b' {"a": 1}', "JSON"),
+    ],
+)
+def test_another_format_is_named_with_the_cure(tmp_path, content, cure):
+    path = tmp_path / "place.osm"
+    path.write_bytes(content)
+    with pytest.raises(SeipError, match=cure):
+        read(path)
+
+
+def test_a_missing_file_and_a_damaged_one_are_named(tmp_path):
+    with pytest.raises(SeipError, match="no such file"):
+        read(tmp_path / "nowhere.osm")
+    path = tmp_path / "place.osm.gz"
+    path.write_bytes(gzip.compress(crossing().text().encode())[:-30])
+    with pytest.raises(SeipError, match="damaged gzip"):
+        read(path)
+
+
+def test_places_that_are_none_and_repeats_are_counted(tmp_path):
+    nodes = ['<node id="1" lat="10" lon="10"/>', '<node id="1" lat="11" lon="10"/>']
+    nodes += ['<node id="2" lat="90" lon="0"/>', '<node id="3" lat="0" lon="181"/>', '<node id="4" lat="nan" lon="1"/>']
+    nodes += ['<node id="5" lat="0" lon="180"/>', '<node id="6" lat="0" lon="-180"/>', '<node id="7"/>']
+    found = read(written(tmp_path, osm("".join(nodes))))
+    assert sorted(found.nodes) == [1, 5, 6]
+    assert found.nodes[1].latitude == 11
+    assert "gives 1 elements twice" in found.notes[0]
+    assert "gives 4 nodes no place on Earth" in found.notes[1]
+
+
+def test_an_extract_that_is_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "MAX_ELEMENTS", 10)
+    with pytest.raises(SeipError, match="more than 10 elements; cut the place out"):
+        read(crossing().write(tmp_path / "place.osm"))
+
+
+def test_deleted_elements_are_passed_over(tmp_path):
+    text = osm('<node id="1" lat="1" lon="1"/><node id="2" lat="1" lon="1" action="delete"/>')
+    assert list(read(written(tmp_path, text)).nodes) == [1]
+
+
+def test_ways_are_joined_to_rings_in_either_direction():
+    ways = [Way((1, 2, 3), {}), Way((5, 4, 3), {}), Way((5, 1), {}), Way((7, 8), {})]
+    found, left = rings(ways)
+    assert found == [[1, 2, 3, 4, 5]]
+    assert left == 1
+
+
+def test_ids_and_tags_survive_odd_characters(tmp_path):
+    extract = Extract()
+    extract.way([(0, 0), (10, 0)], highway="residential", name='"Quoted" & <angled> ä 南京')
+    found = read(extract.write(tmp_path / "place.osm"))
+    assert next(iter(found.ways.values())).tags["name"] == '"Quoted" & <angled> ä 南京'

@@ -1,0 +1,210 @@
+"""Sites of extracts, with SUMO: ten kinds of junctions, and where things stand in them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+from osm_text import JUNCTIONS, Extract, crossing, dual_carriageway, left_hand, plaza, roundabout, slope
+from sumo_here import needs_sumo
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import finish
+from seip_addon.core.streetscape.parts import Role
+from seip_addon.core.traffic import sumo_programs
+from seip_addon.core.workflows.site_building import AskedSite, build_site
+
+pytestmark = needs_sumo
+CORNER_HOUSE = 24.0 * 24.0
+
+
+def built(extract, tmp_path, **asked):
+    path = extract.write(tmp_path / "place.osm")
+    asked = {"near_latlon": (extract.latitude, extract.longitude)} | asked
+    return finish(build_site(path, AskedSite(**asked)))
+
+
+def plan(model, name):
+    """Return the area in plan of the parts whose names begin so."""
+    parts = [part for part in model.parts if part.name.startswith(name)]
+    faces = [part.solid.vertices[list(face)][:, :2] for part in parts for face in part.solid.faces]
+    return shapely.union_all([shapely.Polygon(face).buffer(0) for face in faces if len(face) > 2], grid_size=1e-4)
+
+
+@pytest.mark.parametrize("name", JUNCTIONS)
+def test_a_kind_of_junction_becomes_a_sound_site(name, tmp_path):
+    site = built(JUNCTIONS[name](), tmp_path)
+    model = site.model
+    assert model.region.is_valid
+    assert model.region.geom_type == "Polygon"
+    assert 1000 < model.region.area < 8000
+    assert " / " in model.name
+    assert not model.warnings
+    assert site.map_text is not None
+    for part in model.parts:
+        assert np.isfinite(part.solid.vertices).all()
+        assert part.source or not {Role.ROADS, Role.GROUND, Role.OCCLUDERS, Role.POLES} & set(part.roles)
+    houses = {row.kind: row for row in model.provenance()}["Building"]
+    assert (houses.source, houses.assumed) == ("extract", 0)
+    driving = plan(model, "Driving lanes")
+    holes = [ring for part in shapely.get_parts(driving) for ring in part.interiors]
+    assert sum(shapely.Polygon(hole).area for hole in holes if shapely.Polygon(hole).area < 30) < 1.0
+
+
+def test_the_same_extract_makes_the_same_map(tmp_path):
+    assert built(crossing(), tmp_path).map_text == built(crossing(), tmp_path).map_text
+
+
+def test_what_stands_at_the_road_s_edge_in_the_extract_stands_there_in_the_scene(tmp_path):
+    extract = crossing()
+    edges = [(x, side * 3.2) for x in (-70, -45, 45, 70) for side in (-1, 1)]
+    for x, y in edges:
+        extract.node(x, y, natural="tree", height="9")
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    trees = [part for part in model.parts if part.name.startswith("Tree")]
+    assert len(trees) == len(edges)
+    for tree in trees:
+        assert road.boundary.distance(shapely.Point(tree.foot[:2])) < 0.3
+
+
+def test_footprints_keep_their_area(tmp_path):
+    model = built(crossing(), tmp_path).model
+    houses = [part for part in model.parts if part.name.startswith("Building") and Role.OCCLUDERS in part.roles]
+    assert len(houses) == 4
+    for house in houses:
+        hull = shapely.MultiPoint(house.solid.vertices[:, :2]).convex_hull
+        assert hull.area == pytest.approx(CORNER_HOUSE, rel=0.01)
+
+
+def test_the_region_follows_the_approaches_and_holds_both_carriageways(tmp_path):
+    model = built(dual_carriageway(), tmp_path).model
+    low_x, low_y, high_x, high_y = model.region.bounds
+    assert (low_x, high_x) == (pytest.approx(-90, abs=8), pytest.approx(90, abs=8))
+    for y in (-8, 8):
+        for x in (-80, 80):
+            assert model.region.distance(shapely.Point(x, y)) < 4.0
+    assert low_y < -80 < 80 < high_y
+
+
+def test_a_radius_is_a_circle_without_streets_that_only_pass_by(tmp_path):
+    extract = crossing()
+    extract.way([(-200, 45), (-10, 55), (200, 70)], highway="motorway", name="Passing")
+    extract.way([(-60, -200), (-60, -70), (-40, -60), (200, -60)], highway="residential", name="Behind")
+    model = built(extract, tmp_path, radius=70.0).model
+    assert max(np.hypot(*np.array(model.region.exterior.coords).T)) < 71.5
+    assert not model.region.contains(shapely.Point(-50, 53))
+
+
+def test_the_island_of_a_roundabout_is_no_road(tmp_path):
+    model = built(roundabout(), tmp_path).model
+    middle = shapely.Point(0, 0).buffer(8)
+    assert not plan(model, "Driving lanes").intersects(middle)
+    weighted = next(part for part in model.parts if Role.WEIGHTED_REGIONS in part.roles)
+    assert shapely.MultiPoint(weighted.solid.vertices[:, :2]).convex_hull.area > 36**2
+
+
+def test_a_slope_is_that_of_the_nodes(tmp_path):
+    model = built(slope(), tmp_path).model
+    road = next(part for part in model.parts if part.name == "Driving lanes").solid.vertices
+    rise = np.polyfit(road[:, 0], road[:, 2], 1)[0]
+    assert rise == pytest.approx(0.06, abs=0.004)
+
+
+def test_traffic_on_the_left_is_in_the_map(tmp_path):
+    site = built(left_hand(), tmp_path)
+    assert site.map_text is not None
+    assert 'rule="LHT"' in site.map_text
+    pavement = plan(site.model, "Pavement")
+    assert pavement.intersects(shapely.box(-9, 40, -3, 60))  # north along North Road the left is the west
+    assert not pavement.intersects(shapely.box(3.6, 40, 9, 60))
+
+
+def test_a_place_can_be_named_by_its_streets(tmp_path):
+    site = built(crossing(), tmp_path, near_latlon=None, junction=("north road", "East Road"))
+    assert set(site.model.name.split(" / ")) == {"East Road", "North Road"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "complaint"),
+    [
+        ({"near_latlon": None}, "needs a place"),
+        ({"near_latlon": (48.0, 2.0)}, "no node near the place"),
+        ({"near_latlon": (52.5, 13.4), "osm": "x"}, "is an extract"),
+        ({"near_latlon": None, "junction": ("East Road",)}, "has two streets"),
+        (
+            {"near_latlon": None, "junction": ("East Road", "Nowhere Lane")},
+            "no street called 'Nowhere Lane'; the closest",
+        ),
+        ({"near_latlon": None, "junction": ("East Road", "East Road Far")}, "no street called"),
+    ],
+)
+def test_a_place_that_is_none_is_refused_in_a_sentence(asked, complaint, tmp_path):
+    with pytest.raises(SeipError, match=complaint):
+        built(crossing(), tmp_path, **asked)
+
+
+def test_streets_that_do_not_meet_are_named(tmp_path):
+    extract = crossing()
+    extract.way([(-100, 300), (100, 300)], highway="residential", name="Far Lane")
+    with pytest.raises(SeipError, match="'East Road' and 'Far Lane' do not meet"):
+        built(extract, tmp_path, near_latlon=None, junction=("East Road", "Far Lane"))
+
+
+def test_an_extract_without_streets_is_refused(tmp_path):
+    extract = Extract()
+    extract.house(0, 0, 10, 10)
+    with pytest.raises(SeipError, match=r"has no street near 52\.50000, 13\.40000"):
+        built(extract, tmp_path)
+
+
+def test_a_place_between_junctions_needs_a_radius(tmp_path):
+    extract = Extract()
+    extract.way([(-400, 0), (400, 0)], highway="residential", name="Long Street")
+    extract.house(-20, 10, 20, 10)
+    with pytest.raises(SeipError, match="give --radius for a place between junctions"):
+        built(extract, tmp_path)
+    assert built(extract, tmp_path, radius=60.0).model.region.area == pytest.approx(120 * 6.4, rel=0.05)
+
+
+def test_a_square_and_a_canopy(tmp_path):
+    model = built(plaza(), tmp_path).model
+    names = {row.kind: row for row in model.provenance()}
+    assert names["Shelter"].assumed == 1
+    assert names["Tree"].assumed == 0
+    assert names["Footways"].count == 1
+    canopy = [part for part in model.parts if part.name.startswith("Building") and part.solid.vertices[:, 2].min() > 4]
+    assert len(canopy) == 1
+
+
+def test_without_sumo_the_cure_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("SUMO_HOME", raising=False)
+    monkeypatch.setattr(sumo_programs.importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(SeipError, match="SUMO is not installed"):
+        built(crossing(), tmp_path)
+
+
+def test_a_site_description_adds_to_an_extract(tmp_path):
+    description = tmp_path / "more.toml"
+    description.write_text('name = "Here"\n[[wall]]\nline = [[150, 150], [160, 150]]\n', encoding="utf-8")
+    model = built(crossing(), tmp_path, site=description).model
+    assert model.name == "Here"
+    assert ("Wall", "site description") in {(row.kind, row.source) for row in model.provenance()}
+
+
+def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
+    site = built(crossing(), tmp_path)
+    assert site.map_text is not None
+    map_path = tmp_path / "street.xodr"
+    map_path.write_text(site.map_text, encoding="utf-8")
+    middle = tuple((site.model.origin[:2] * 1.0).tolist())
+    asked = AskedSite(near=middle, radius=60.0, osm=tmp_path / "place.osm")
+    model = finish(build_site(map_path, asked)).model
+    rows = {row.kind: row for row in model.provenance()}
+    assert (rows["Building"].count, rows["Building"].source) == (4, "extract")
+    assert rows["Driving lanes"].source == "map"
+    elsewhere = Extract(40.0, 5.0)
+    elsewhere.house(0, 0, 10, 10)
+    with pytest.raises(SeipError, match="nothing that stands at the place"):
+        finish(build_site(map_path, dataclasses.replace(asked, osm=elsewhere.write(tmp_path / "no.osm"))))
