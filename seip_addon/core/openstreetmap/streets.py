@@ -35,6 +35,7 @@ LANE_WIDTHS = (2.25, 6.0)
 CYCLE_LANES = {"lane", "track", "opposite_lane", "opposite_track", "shared_busway"}
 CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
 _SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
+_FIRST_OTHER = "\u0900"  # from here on (Devanagari, Thai, Chinese …) the font of the pictures has no letters
 MAX_MEDIAN = 35.0  # metres between the middles of two carriageways of one street
 MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevation for it to be used
 
@@ -186,7 +187,7 @@ def _restrictions(extract: Extract, streets: set[int]) -> Iterator[str]:
 def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
     """Return the tags of a street that netconvert is to read: lanes, widths, pavements and cycle lanes explicit."""
     given = way.tags
-    tags = {key: given[key] for key in COPIED if key in given}
+    tags = {key: given[key] for key in COPIED if key in given} | shown_name(given)
     if given.get("railway") == "tram" and "highway" not in given:
         return tags
     if given.get("tunnel") == "building_passage":
@@ -262,6 +263,13 @@ def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
     cycle_lanes = sum(_cycle_lane(tags, side) is not None for side in ("left", "right"))
     each = (width - cycle_lanes * CYCLE_LANE_WIDTH) / sum(lane_counts(tags).values())
     return [min(max(each, low), high)] * lanes
+
+
+def shown_name(tags: Tags) -> dict[str, str]:
+    """Return the name of a street that pictures can show: in English where theirs has no letters for it."""
+    name = tags.get("name", "")
+    english = tags.get("name:en")
+    return {"name": english} if english and any(_FIRST_OTHER <= character for character in name) else {}
 
 
 def is_one_way(tags: Tags) -> bool:

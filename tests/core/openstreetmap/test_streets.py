@@ -156,3 +156,11 @@ def test_elevations_count_where_nearly_all_nodes_have_one(tmp_path):
     assert streets(extract, tmp_path)[0].elevated
     extract.way([(0, 50), (100, 50)], highway="residential")
     assert not streets(extract, tmp_path)[0].elevated
+
+
+def test_a_name_without_letters_in_the_pictures_is_in_english(tmp_path):
+    extract = Extract()
+    extract.way([(-100, 0), (100, 0)], highway="residential", name="中山北路", name__en="Zhongshan North Road")
+    extract.way([(-100, 50), (100, 50)], highway="residential", name="Straße", name__en="Street")
+    extract.way([(-100, 90), (100, 90)], highway="residential", name="南京東路")
+    assert [tags["name"] for tags in streets(extract, tmp_path)[1]] == ["Zhongshan North Road", "Straße", "南京東路"]
