@@ -256,4 +256,6 @@ def _fields(model: LidarModel) -> list[tuple[str, Any]]:
 def _parts(model: LidarModel) -> list[Any]:
     """Return the figures that scans follow from, not the words for people."""
     unused = {"name", "manufacturer", "source", "price_source", "assumed_beams", "assumed_law"}
-    return [repr(value) if name in {"law", "rosette"} else value for name, value in _fields(model) if name not in unused]
+    return [
+        repr(value) if name in {"law", "rosette"} else value for name, value in _fields(model) if name not in unused
+    ]

@@ -68,4 +68,5 @@ def _turns(azimuth: Float) -> Float:
 def _row(elevation: Float, margin: float) -> Integer:
     """Return the rows of cells that elevations lie in."""
     row = np.floor((elevation / math.pi + 0.5) * _ELEVATIONS + margin)
-    return np.clip(row, 0, _ELEVATIONS - 1).astype(np.int64)
+    rows: Integer = np.clip(row, 0, _ELEVATIONS - 1).astype(np.int64)
+    return rows

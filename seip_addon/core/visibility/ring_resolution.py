@@ -5,6 +5,10 @@ radius h / tan φ. Where neighbouring rings are more than 2δ apart, targets
 between them count as unseen although nothing stands before them. A sensor that is
 tilted by θ draws the ring of elevation -φ - θ on the side that it looks to, and that
 of -φ + θ, which lies farther from the next, on the other.
+
+The rays of a rosette are spread over its field of view, ρ of them in each unit of solid angle on average. At a
+distance d the part of the road within δ of a target is seen under π δ² h / d³ from the height h, so that one ray meets
+it on average at d = (π δ² h ρ)^(1/3).
 """
 
 from __future__ import annotations
@@ -38,6 +42,9 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
     for key, model in find_models(models, np.unique(poses.sensor).tolist()).items():
         of_type = poses.sensor == key
         reach = min(model.max_range, _farthest(poses.xyz[of_type], site.targets.xyz))
+        if model.rosette is not None:
+            warnings += _of_rosette(model, np.unique(np.round(poses.height[of_type], 2)), settings.delta, reach)
+            continue
         upright = of_type & (poses.tilt == 0)
         heights = np.unique(np.round(poses.height[upright], 2))
         limits = [(height, unresolved_from(model, float(height), settings.delta, reach)) for height in heights]
@@ -54,6 +61,17 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
             f"lies within δ of none; take a δ of at least {site.targets.spacing / math.sqrt(2):.2g} m or a finer grid"
         )
     return tuple(warnings)
+
+
+def _of_rosette(model: LidarModel, heights: Float, delta: float, reach: float) -> list[str]:
+    """Return a warning on the radius from which the sensors of a type send too few rays for δ."""
+    limits = [(height, unresolved_from(model, float(height), delta, reach)) for height in heights]
+    beyond = [f"{limit:.0f} m (at {height:g} m height)" for height, limit in limits if limit < reach]
+    sentence = (
+        f"{model.key}: beyond {', '.join(beyond)} fewer than one ray of a frame of {1 / model.rotation_rate:g} s ends "
+        f"within δ = {delta:g} m of a target on a level road, on average, so coverage there counts beams, not view"
+    )
+    return [sentence] if beyond else []
 
 
 def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, reach: float) -> list[str]:
@@ -76,6 +94,8 @@ def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, rea
 def unresolved_from(model: LidarModel, height: float, delta: float, reach: float, tilt: float = 0.0) -> float:
     """Return the radius from which some neighbouring returns on a level road are more than 2δ apart.
 
+    Of a rosette: from which fewer than one return on average lies within δ of a target.
+
     Parameters
     ----------
     height : float, metres
@@ -90,6 +110,10 @@ def unresolved_from(model: LidarModel, height: float, delta: float, reach: float
     float, metres
         ``reach`` if all is resolved.
     """
+    if model.rosette is not None:
+        spread = model.channels / (math.tau * (1 - math.cos(model.field_of_view / 2)))
+        along = math.cbrt(math.pi * delta**2 * height * spread)
+        return min(math.sqrt(max(along**2 - height**2, 0.0)), reach)
     down = tilt - model.elevations
     down = np.sort(down[(down > 0) & (down <= math.pi / 2)])[::-1]
     rings = height / np.tan(down)

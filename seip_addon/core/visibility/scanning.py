@@ -11,7 +11,8 @@ the tolerance of the ray caster, the return of each of them must be: which of th
 
 No ray is cast twice, neither for two targets nor for two sensors that share it.
 
-The rays of a rosette have no neighbours in rows: all of them that can return from near a target are cast (`ray_culling`).
+The rays of a rosette have no neighbours in rows: all of them that can return from near a target are cast
+(`ray_culling`).
 """
 
 from __future__ import annotations
