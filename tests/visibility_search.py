@@ -251,9 +251,7 @@ def _targets(random: np.random.Generator, triangles: Float, delta: float, count:
     return xyz
 
 
-def _poses(
-    random: np.random.Generator, triangles: Float, targets: Float, half: float, models: list[str]
-) -> Candidates:
+def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: float, models: list[str]) -> Candidates:
     """All models at each of six places: free ones, ones close to faces, and ones by targets."""
     places = 6
     xyz = random.uniform((-half, -half, 0), (half, half, 8), (places, 3))

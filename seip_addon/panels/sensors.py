@@ -164,9 +164,9 @@ class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
         draw_sentence(layout, f"{preview.model.key} at {preview.height:.3g} m")
         far = f"{preview.resolved_to():.0f} m"
         if preview.model.rosette is not None:
-            near = f"one ray or more of a frame within δ = {preview.delta:.3g} m of each target, on average"
-            apart = "fewer rays; road between may go unseen"
-            border = f"On a level road rays are as close as that up to {far}."
+            near = f"all road in view is within δ = {preview.delta:.3g} m of a ray of the frame"
+            apart = "gaps; road in them goes unseen"
+            border = f"On a level road there is no gap up to {far}."
         else:
             near = f"within 2δ = {2 * preview.delta:.3g} m of the next ring inwards"
             apart = "farther apart; road between may go unseen"

@@ -52,7 +52,7 @@ class Preview:
     def resolved_to(self) -> float:
         """Return the radius, metres, to which all rings before the sensor are within 2δ of each other.
 
-        Of a rosette: to which one ray of a frame on average ends within δ of each target.
+        Of a rosette: to which all road in view has a ray of the frame within δ.
         """
         return unresolved_from(self.model, self.height, self.delta, self.range_on_road(), self.tilt)
 

@@ -25,7 +25,7 @@ class BeamRings:
         Pieces of the rings on the road, or of the line that a rosette draws there in a frame.
     wide : (n,) bool
         Whether the next ring inwards is farther away than asked: what is there may lie between two rings. Of a rosette:
-        whether it is beyond where rays are as close as that on average.
+        whether it is beyond where that is so.
     cone : (m, 2, 3) float64, metres
         Beams of the lowest and the highest channel, from the sensor to the road or to the end of its range, at a few
         azimuths; first and last are those of a limited field of view. Of a rosette: beams at the rim.
@@ -52,7 +52,7 @@ def beam_rings(
     gap : float, metres
         Distance of neighbouring rings up to which they are dense: twice δ.
     resolved : float, metres
-        Radius up to which a rosette is.
+        Radius up to which a rosette leaves no gaps.
     """
     if model.rosette is not None:
         return _rosette_lines(model, place, axes, ground, resolved)
