@@ -62,7 +62,7 @@ def test_a_rosette_draws_its_line_and_its_rim():
     model, place = MODELS["mid40"], np.array((3.0, 4.0, 8.0))
     drawn = beam_rings(model, place, np.eye(3), 0.0, 2.0, resolved=30.0)
     ways = BeamPattern(model).directions(np.arange(model.channels))
-    meets = (ways[:, 2] < 0) & (8.0 < -ways[:, 2] * model.max_range)
+    meets = (ways[:, 2] < 0) & (-ways[:, 2] * model.max_range > 8.0)
     assert len(drawn.rings) == (meets[1:] & meets[:-1]).sum()
     assert np.allclose(drawn.rings[..., 2], 0.0)
     ends = drawn.rings[:, 1] - place

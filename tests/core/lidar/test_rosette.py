@@ -49,7 +49,7 @@ def all_rays(model: LidarModel) -> np.ndarray:
 
 
 def in_the_plane(first: float, second: float, index: float) -> float:
-    """Angle off the axis behind both prisms with their oblique faces' normals at angles in one plane, by angles alone."""
+    """Angle off the axis behind oblique faces with their normals at angles in one plane, by angles alone."""
     after_first = math.asin(index * math.sin(-first)) + first
     inside = math.asin(math.sin(after_first - second) / index) + second
     return math.asin(index * math.sin(inside))
@@ -128,14 +128,16 @@ def covered(rays: np.ndarray, reach: float) -> float:
 
 
 def test_the_longer_the_pattern_is_accumulated_the_more_it_covers() -> None:
+    """Of the Mid-40 a public comparison names 93 % after a second, and the maker close to all after 1.4 s."""
     model = CATALOGUE["mid40"]
     shares = [
         covered(all_rays(replace(model, rotation_rate=1 / time)), model.field_of_view / 2)
         for time in (0.05, 0.1, 0.2, 0.5, 1.0, 1.4)
     ]
-    assert np.diff(shares).min() > 0.05
-    assert shares[1] < 0.5
-    assert shares[-1] > 0.9
+    assert np.diff(shares).min() > 0.03
+    assert shares[1] == pytest.approx(0.21, abs=0.03)
+    assert shares[4] == pytest.approx(0.93, abs=0.03)
+    assert shares[5] > 0.98
 
 
 def test_frames_go_on_where_the_one_before_ended() -> None:

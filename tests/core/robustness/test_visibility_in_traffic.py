@@ -16,7 +16,7 @@ from traffic_by_hand import make_model, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotated
-from seip_addon.core.lidar import RangeEquation, beam_directions
+from seip_addon.core.lidar import RangeEquation, Rosette, beam_directions
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_instants import (
     BATCH_SECONDS,
@@ -27,7 +27,6 @@ from seip_addon.core.robustness.traffic_instants import (
     spread_instants,
 )
 from seip_addon.core.robustness.visibility_in_traffic import LAYER_HEIGHT, visibility_in_traffic
-from seip_addon.core.lidar import Rosette
 from seip_addon.core.robustness.visibility_under_errors import Surroundings
 from seip_addon.core.traffic import RoadUser
 from seip_addon.core.visibility.grid import compute_visibility
