@@ -223,11 +223,11 @@ def _looking_one_way(random: np.random.Generator, models: dict[str, LidarModel])
 def _drawing_a_rosette(random: np.random.Generator, half: float) -> LidarModel:
     """Two prisms of any rates, in frames of few rays to many, that look a little to the side or nearly all round."""
     model = _model(random, "rosette", half)
-    wedge = math.radians(random.uniform(2, 25))
+    wedge = math.radians(random.uniform(8, 32))
     rosette = Rosette(
         (random.uniform(1, 200), -random.uniform(1, 200)),
         (wedge, wedge * float(random.choice([1.0, random.uniform(0.3, 1.0)]))),
-        random.uniform(1.2, 2.0),
+        random.uniform(1.3, 1.75),
         float(random.choice([0.0, random.uniform(0, 100)])),
     )
     return replace(model, points_per_second=model.rotation_rate * int(random.integers(2, 2000)), rosette=rosette)

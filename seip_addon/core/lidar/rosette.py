@@ -1,7 +1,8 @@
 r"""The pattern of a beam through two rotating wedge prisms, which hardly ever repeats: a rosette.
 
 The beam comes along the axis and enters the first prism through its flat face, which is square to the axis, leaves it
-through its oblique face, enters the second prism through its oblique face and leaves it through its flat one [1]_ [2]_.
+through its oblique face, enters the second prism through its oblique face and leaves it through its flat one: of the
+four ways to mount the Mid-40's prisms [1]_ the one with its field of view. Each ray is traced from face to face [2]_.
 The normals of the oblique faces, along the beam, are off the axis by the wedge angles, on sides that lie opposite where
 the prisms deflect the same way. At each face light of direction d bends by Snell's law, with the normal n along it and
 the ratio μ of the refractive indices before and behind the face:
@@ -14,8 +15,8 @@ Thin prisms deflect by (index − 1) times their wedge angle each, and the two d
 
 .. [1] Liu, Zhang and Hong 2022, "Low-cost retina-like robotic lidars based on incommensurable scanning", IEEE/ASME
    Transactions on Mechatronics 27(1), arXiv:2006.11034.
-.. [2] Brazeal, Wilkinson and Hochmair 2021, "A rigorous observation model for the Risley prism-based Livox Mid-40 lidar
-   sensor", Sensors 21(14), 4722.
+.. [2] Li, Liu and Sun 2017, "Forward and inverse solutions for three-element Risley prism beam scanners", Optics
+   Express 25(7), 7677.
 """
 
 from __future__ import annotations
