@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from seip_addon.core.lidar import CarlaDropoff, LidarModel, RangeEquation
+from seip_addon.core.lidar import CarlaDropoff, LidarModel, RangeEquation, Rosette
 from seip_addon.core.lidar.model import DetectionLaw
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import Candidates
@@ -74,6 +74,9 @@ def draw_case(seed: int) -> Case:
     models = {key: _model(random, key, half) for key in ("one", "two")}
     if random.random() < 0.6:  # one, both or none of them look one way, some of them with channels of the other
         models = _looking_one_way(random, models)
+    other = np.random.default_rng((9, seed))  # that earlier scenes stay as they were
+    if other.random() < 0.5:
+        models["rosette"] = _drawing_a_rosette(other, half)
     targets = _targets(random, triangles, delta, 60)
     return Case(
         Site(
@@ -81,7 +84,7 @@ def draw_case(seed: int) -> Case:
             origin=np.zeros(3),
             region=shapely.box(-half, -half, half, half),
             targets=Targets(targets, np.ones(len(targets)), np.zeros(len(targets), dtype=bool), 1.0),
-            candidates=_poses(random, triangles, targets, half),
+            candidates=_poses(random, triangles, targets, half, list(models)),
             triangles=triangles,
             reflectivity=_reflectivity(random, triangles),
         ),
@@ -217,6 +220,19 @@ def _looking_one_way(random: np.random.Generator, models: dict[str, LidarModel])
     return models
 
 
+def _drawing_a_rosette(random: np.random.Generator, half: float) -> LidarModel:
+    """Two prisms of any rates, in frames of few rays to many, that look a little to the side or nearly all round."""
+    model = _model(random, "rosette", half)
+    wedge = math.radians(random.uniform(8, 32))
+    rosette = Rosette(
+        (random.uniform(1, 200), -random.uniform(1, 200)),
+        (wedge, wedge * float(random.choice([1.0, random.uniform(0.3, 1.0)]))),
+        random.uniform(1.3, 1.75),
+        float(random.choice([0.0, random.uniform(0, 100)])),
+    )
+    return replace(model, points_per_second=model.rotation_rate * int(random.integers(2, 2000)), rosette=rosette)
+
+
 def _targets(random: np.random.Generator, triangles: Float, delta: float, count: int) -> Float:
     """Points at every offset from the faces: up, down and across, some of them δ away but for rounding."""
     which = random.integers(0, len(triangles), count)
@@ -235,8 +251,8 @@ def _targets(random: np.random.Generator, triangles: Float, delta: float, count:
     return xyz
 
 
-def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: float) -> Candidates:
-    """Two models at each of six places: free ones, ones close to faces, and ones by targets."""
+def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: float, models: list[str]) -> Candidates:
+    """All models at each of six places: free ones, ones close to faces, and ones by targets."""
     places = 6
     xyz = random.uniform((-half, -half, 0), (half, half, 8), (places, 3))
     xyz[3] = targets[random.integers(len(targets))] + (0.0, 0.0, random.choice([-1e-3, 1e-3, 0.0]))
@@ -248,14 +264,14 @@ def _poses(random: np.random.Generator, triangles: Float, targets: Float, half: 
         xyz = np.round(xyz, 6)
     yaw = random.uniform(-math.pi, math.pi, places)
     tilt = np.radians(random.choice([0.0, 0.01, 5.0, 45.0, 89.0, -30.0, random.uniform(-89, 89)], places))
-    both = np.repeat(np.arange(places), 2)
+    both = np.repeat(np.arange(places), len(models))
     return Candidates(
         position=xyz[both],
         position_name=np.array([f"place {i}" for i in both]),
         on_pole=np.zeros(len(both), dtype=bool),
         pole_source=np.full(len(both), ""),
         position_of=both,
-        sensor=np.array(["one", "two"] * places),
+        sensor=np.array(models * places),
         height=xyz[both, 2],
         xyz=xyz[both],
         yaw=yaw[both],
@@ -282,6 +298,8 @@ def judge(case: Case) -> Verdict:
 
 def _rays(model: LidarModel, yaw: float, tilt: float) -> Float:
     """Unit directions of one frame, each from its own angles, turned about y by the tilt and then about z."""
+    if model.rosette is not None:
+        return _turned(behind_prisms(model.rosette, model.points_per_second, model.rotation_rate), yaw, tilt)
     count = max(1, round(model.points_per_second / model.rotation_rate / len(model.elevations)))
     column = np.arange(count) * (2 * math.pi / count)
     if model.field_of_view < 2 * math.pi:
@@ -290,9 +308,31 @@ def _rays(model: LidarModel, yaw: float, tilt: float) -> Float:
     level = np.cos(model.elevations)[:, None]
     x, y = level * np.cos(azimuth), level * np.sin(azimuth)
     z = np.broadcast_to(np.sin(model.elevations)[:, None], x.shape)
+    return _turned(np.stack([x, y, z], axis=-1).reshape(-1, 3), yaw, tilt)
+
+
+def _turned(rays: Float, yaw: float, tilt: float) -> Float:
+    x, y, z = rays.T
     ahead, up = math.cos(tilt) * x + math.sin(tilt) * z, math.cos(tilt) * z - math.sin(tilt) * x
     turned = (math.cos(yaw) * ahead - math.sin(yaw) * y, math.sin(yaw) * ahead + math.cos(yaw) * y, up)
-    return np.stack([part.ravel() for part in turned], axis=1)
+    return np.stack(turned, axis=1)
+
+
+def behind_prisms(rosette: Rosette, points_per_second: float, frame_rate: float) -> Float:
+    """Directions of a frame's rays one by one: what lies in a face's plane is stretched by the ratio of the indices."""
+    rays = []
+    for number in range(round(points_per_second / frame_rate)):
+        time = rosette.begin + number / points_per_second
+        ray = np.array([1.0, 0.0, 0.0])
+        for side, rate, wedge in zip((-1, 1), rosette.rates, rosette.wedges, strict=True):
+            turn = 2 * math.pi * math.fmod(rate * time, 1.0)
+            oblique = np.array([1.0, side * math.tan(wedge) * math.cos(turn), side * math.tan(wedge) * math.sin(turn)])
+            faces = [np.array([1.0, 0.0, 0.0]), oblique / math.sqrt(oblique @ oblique)]
+            for face, ratio in zip(faces[::-side], (1 / rosette.index, rosette.index), strict=True):
+                within = ratio * (ray - (ray @ face) * face)
+                ray = within + math.sqrt(1.0 - within @ within) * face
+        rays.append(ray)
+    return np.array(rays)
 
 
 def _judge_pose(case: Case, origin: Float, yaw: float, tilt: float, model: LidarModel) -> tuple[Boolean, Boolean]:

@@ -39,7 +39,8 @@ class SEIP_UL_sensor_types(RowList, bpy.types.UIList):
 
 
 def _in_short(model: LidarModel) -> str:
-    return f"{model.channels} · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
+    beams = model.channels if model.rosette is None else "rosette"
+    return f"{beams} · {model.max_range:g} m · ${model.price / 1000:,.3g}k"
 
 
 class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
@@ -121,13 +122,22 @@ class SEIP_PT_sensor_details(Sidebar, bpy.types.Panel):
 def _figures(model: LidarModel) -> list[tuple[str, str]]:
     low, high = math.degrees(model.elevations.min()), math.degrees(model.elevations.max())
     cheap, dear = model.price_range
-    return [
-        ("Channels", f"{model.channels}"),
-        ("Elevations", f"{low:.4g}…{high:.4g}°"),
+    reach = [
         ("Range", f"{model.min_range:g}…{model.max_range:g} m"),
         ("Points", f"{model.points_per_second:,.0f} /s"),
-        ("Rotation", f"{model.rotation_rate:g} Hz"),
-        ("Azimuth", f"{math.degrees(model.azimuth_step):.2g}°"),
+    ]
+    if model.rosette is None:
+        beams = [
+            ("Channels", f"{model.channels}"),
+            ("Elevations", f"{low:.4g}…{high:.4g}°"),
+            *reach,
+            ("Rotation", f"{model.rotation_rate:g} Hz"),
+            ("Azimuth", f"{math.degrees(model.azimuth_step):.2g}°"),
+        ]
+    else:
+        beams = [("Pattern", "rosette"), *reach, ("Accumulated", f"{1 / model.rotation_rate:g} s")]
+    return [
+        *beams,
         ("Field of view", f"{math.degrees(model.field_of_view):.4g}°"),
         ("Price", f"${cheap:,.0f}" if cheap == dear else f"${cheap:,.0f}–{dear:,.0f}"),
     ]
@@ -152,12 +162,18 @@ class SEIP_PT_beam_preview(Sidebar, bpy.types.Panel):
         if preview is None:
             return
         draw_sentence(layout, f"{preview.model.key} at {preview.height:.3g} m")
-        draw_sentence(
-            layout, f"Blue: within 2δ = {2 * preview.delta:.3g} m of the next ring inwards", icon="COLORSET_04_VEC"
-        )
-        draw_sentence(layout, "Orange: farther apart; road between may go unseen", icon="COLORSET_02_VEC")
-        before_it = " before it" if preview.tilt else ""
-        draw_sentence(layout, f"On a level road all{before_it} is within 2δ up to {preview.resolved_to():.0f} m.")
+        far = f"{preview.resolved_to():.0f} m"
+        if preview.model.rosette is not None:
+            near = f"all road in view is within δ = {preview.delta:.3g} m of a ray of the frame"
+            apart = "gaps; road in them goes unseen"
+            border = f"On a level road there is no gap up to {far}."
+        else:
+            near = f"within 2δ = {2 * preview.delta:.3g} m of the next ring inwards"
+            apart = "farther apart; road between may go unseen"
+            border = f"On a level road all{' before it' if preview.tilt else ''} is within 2δ up to {far}."
+        draw_sentence(layout, f"Blue: {near}", icon="COLORSET_04_VEC")
+        draw_sentence(layout, f"Orange: {apart}", icon="COLORSET_02_VEC")
+        draw_sentence(layout, border)
 
 
 CLASSES = (SEIP_UL_sensor_types, SEIP_PT_sensors, SEIP_PT_sensor_details, SEIP_PT_beam_preview)

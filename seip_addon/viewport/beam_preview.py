@@ -47,10 +47,13 @@ class Preview:
     def lines(self) -> BeamRings:
         """Return the lines to be drawn."""
         ground = float(self.place[2]) - self.height + LIFT
-        return beam_rings(self.model, self.place, self.axes, ground, 2 * self.delta)
+        return beam_rings(self.model, self.place, self.axes, ground, 2 * self.delta, self.resolved_to())
 
     def resolved_to(self) -> float:
-        """Return the radius, metres, to which all rings before the sensor are within 2δ of each other."""
+        """Return the radius, metres, to which all rings before the sensor are within 2δ of each other.
+
+        Of a rosette: to which all road in view has a ray of the frame within δ.
+        """
         return unresolved_from(self.model, self.height, self.delta, self.range_on_road(), self.tilt)
 
     @property

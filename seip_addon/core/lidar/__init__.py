@@ -9,6 +9,7 @@ from .catalogue import find_models, load_catalogue
 from .model import LidarModel
 from .noisy_returns import measured_returns, return_chance
 from .range_equation import RangeEquation
+from .rosette import Rosette
 from .surface_patches import surface_deviation
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "CarlaDropoff",
     "LidarModel",
     "RangeEquation",
+    "Rosette",
     "beam_directions",
     "find_models",
     "load_catalogue",

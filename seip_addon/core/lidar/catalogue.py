@@ -17,6 +17,7 @@ from ..storage.toml_table import Key, parse_toml, read_table
 from .carla_dropoff import CarlaDropoff
 from .model import LidarModel
 from .range_equation import MAKER_PROBABILITY, RangeEquation
+from .rosette import Rosette
 from .unit_files import is_unit_file, read_unit_file
 
 
@@ -84,9 +85,8 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
     where = f"LiDAR '{key}' in {file}"
     if not isinstance(table, dict):
         raise SeipError(f"{where} is no table; write [{key}] and its values below it")
-    if "elevations_deg" in table and _EVEN.keys() & table.keys():
-        raise SeipError(f"{where}: give either elevations_deg or {', '.join(_EVEN)}")
-    values = read_table(table, where, _KEYS | (_UNEVEN if "elevations_deg" in table else _EVEN))
+    values = read_table(table, where, _keys(table, where))
+    rosette = _rosette(values, where) if "pattern" in values else None
     if "channels" in values:
         low, high = values.pop("field_of_view_deg")
         if not low < high:
@@ -115,12 +115,48 @@ def _model(key: str, table: Any, file: str) -> LidarModel:  # noqa: ANN401 - wha
             assumed_beams=beams,
             assumed_law=assumed,
             field_of_view=field_of_view,
+            rosette=rosette,
             **angles,
             **given,
         )
     except SeipError as error:
         sentence = str(error)
         raise SeipError(f"{sentence} (in {file})" if key in sentence else f"{where}: {sentence}") from error
+
+
+def _keys(table: Mapping[str, Any], where: str) -> dict[str, Key]:
+    """Return the keys that a table may have, by how its beams are described."""
+    if "pattern" in table:
+        strange = sorted(((_ROTATION | _EVEN | _UNEVEN).keys() - _ROSETTE.keys()) & table.keys())
+        if strange:
+            raise SeipError(f"{where}: {strange[0]} is no figure of a rosette: leave it out, or leave out pattern")
+        return _KEYS | _ROSETTE
+    if "elevations_deg" in table and _EVEN.keys() & table.keys():
+        raise SeipError(f"{where}: give either elevations_deg or {', '.join(_EVEN)}")
+    return _KEYS | _ROTATION | (_UNEVEN if "elevations_deg" in table else _EVEN)
+
+
+def _rosette(values: dict[str, Any], where: str) -> Rosette:
+    """Take the figures of a rosette out of the values of a table, and put in what a model has in their place."""
+    figures = {name: values.pop(name) for name in _ROSETTE}
+    time, view = figures["accumulation_s"], figures["horizontal_field_of_view_deg"]
+    if not 0.001 <= time <= 100:
+        raise SeipError(f"{where}: accumulation_s must lie between 0.001 and 100 seconds, not {time:g}")
+    try:
+        (one, other), (first, second) = figures["prism_rates_rpm"], figures["prism_wedges_deg"]
+        wedges = math.radians(first), math.radians(second)
+        rosette = Rosette((one / 60.0, other / 60.0), wedges, figures["refractive_index"])
+    except SeipError as error:
+        raise SeipError(f"{where}: {error}") from error
+    drawn = 2 * math.degrees(rosette.reach)
+    if not abs(drawn - view) <= _VIEW_TOLERANCE:
+        raise SeipError(
+            f"{where}: its prisms draw a circle of {drawn:.1f} degrees, but horizontal_field_of_view_deg is {view:g}: "
+            "correct one of them"
+        )
+    values |= {"rotation_rate_hz": 1.0 / time, "elevations_deg": (), "azimuth_offsets_deg": ()}
+    values["horizontal_field_of_view_deg"] = view
+    return rosette
 
 
 def _dropoff(given: Mapping[str, float]) -> CarlaDropoff:
@@ -188,6 +224,12 @@ def _law(value: object) -> str:
     return str(value)
 
 
+def _pattern(value: object) -> str:
+    if value != "rosette":
+        raise ValueError(f"must be 'rosette', or left out where there are channels, not {value!r}")
+    return str(value)
+
+
 def _channels(value: object) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or not 2 <= value <= 10_000:
         raise ValueError(f"must be a whole number from 2 to 10,000, not {value!r}")
@@ -228,19 +270,32 @@ _KEYS = {
     "source": Key(str),
     "range_m": Key(_pair),
     "points_per_second": Key(_number),
-    "rotation_rate_hz": Key(_number),
     "price_usd": Key(_pair),
     "price_source": Key(str, None),
     "assumed": Key(str, ""),
-    "azimuth_offsets_deg": Key(_numbers, ()),
-    "horizontal_field_of_view_deg": Key(_number, 360.0),
-    "clockwise": Key(_boolean, False),  # noqa: FBT003 -- the value where none is given
     "range_noise_std_m": _OPTIONAL,
     "range_noise_growth_per_m": _OPTIONAL,
     "model": Key(_law, None),
     **_DETECTION,
     **dict.fromkeys(_DROPOFF, _OPTIONAL),
 }
+_ROTATION = {
+    "rotation_rate_hz": Key(_number),
+    "azimuth_offsets_deg": Key(_numbers, ()),
+    "horizontal_field_of_view_deg": Key(_number, 360.0),
+    "clockwise": Key(_boolean, False),  # noqa: FBT003 -- the value where none is given
+}
 _EVEN = {"channels": Key(_channels), "field_of_view_deg": Key(_pair)}
 _UNEVEN = {"elevations_deg": Key(_numbers)}
 """Beams at even elevations between two, or at elevations of their own."""
+
+_ROSETTE = {
+    "pattern": Key(_pattern),
+    "prism_rates_rpm": Key(_pair),
+    "prism_wedges_deg": Key(_pair),
+    "refractive_index": Key(_number),
+    "horizontal_field_of_view_deg": Key(_number),
+    "accumulation_s": Key(_number, 0.1),
+}
+"""Two prisms in place of channels that turn."""
+_VIEW_TOLERANCE = 0.1  # degrees: as data sheets round

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..arrays import Boolean, Float
+from ..arrays import Boolean, Float, Integer
 from ..errors import SeipError
 from .carla_dropoff import CarlaDropoff
 from .range_equation import RangeEquation
+from .rosette import Rosette
 
 DetectionLaw = RangeEquation | CarlaDropoff
 """Law by which returns are detected: physical, or the one of CARLA."""
@@ -19,7 +20,10 @@ DetectionLaw = RangeEquation | CarlaDropoff
 
 @dataclass(frozen=True, eq=False)
 class LidarModel:
-    """A LiDAR that turns all round, or scans a limited horizontal field of view in columns.
+    """A LiDAR that turns all round, scans a limited horizontal field of view in columns, or draws a rosette.
+
+    Each ray of a rosette is a channel of its own, with one azimuth step, in the order in which they go out: elevations,
+    azimuth offsets and field of view follow from the rosette, whatever is given.
 
     Parameters
     ----------
@@ -37,7 +41,8 @@ class LidarModel:
     points_per_second : float
         Single returns, all channels together.
     rotation_rate : float, hertz
-        Revolutions per second at which the sensor is used; frames where its field of view is limited.
+        Revolutions per second at which the sensor is used; frames where its field of view is limited. The rays of a
+        rosette's frame are all that it sends in that time.
     price_range : tuple of two floats, US dollars
         Lowest and highest price.
     price_source : str
@@ -57,6 +62,8 @@ class LidarModel:
         By which returns are detected.
     assumed_beams, assumed_law : str
         What of its beams, and of its law, no document says; empty where all is published.
+    rosette : Rosette, optional
+        Of a sensor whose pattern does not repeat.
     """
 
     key: str
@@ -78,11 +85,27 @@ class LidarModel:
     law: DetectionLaw = field(default_factory=CarlaDropoff)
     assumed_beams: str = ""
     assumed_law: str = ""
+    rosette: Rosette | None = None
 
     def __post_init__(self) -> None:
+        if self.rosette is not None:
+            self._draw(self.rosette)
         if self.azimuth_offsets.size == 0:
             object.__setattr__(self, "azimuth_offsets", np.zeros(len(self.elevations)))
         _require_valid(self)
+
+    def _draw(self, rosette: Rosette) -> None:
+        """Set the angles to those of the rays of one frame."""
+        points = self.points_per_second
+        if not 2 * self.rotation_rate <= points <= MAX_ROSETTE_RAYS * self.rotation_rate:
+            raise SeipError(
+                f"LiDAR '{self.key}': a rosette must be accumulated over 2 to {MAX_ROSETTE_RAYS:,} points: with "
+                f"{points:g} points per second take another time"
+            )
+        x, y, z = rosette.directions(np.arange(round(points / self.rotation_rate)) / points).T
+        object.__setattr__(self, "elevations", np.arctan2(z, np.hypot(x, y)))
+        object.__setattr__(self, "azimuth_offsets", np.arctan2(y, x))
+        object.__setattr__(self, "field_of_view", 2 * rosette.reach)
 
     @property
     def channels(self) -> int:
@@ -110,8 +133,13 @@ class LidarModel:
         return 0.0 if self.all_round else (self.azimuth_step - self.field_of_view) / 2
 
     def faces(self, vectors: Float) -> Boolean:
-        """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool."""
-        within: Boolean = np.abs(np.arctan2(vectors[:, 1], vectors[:, 0])) <= self.field_of_view / 2
+        """Return which vectors (n, 3) in the sensor's axes lie within its horizontal field of view, (n,) bool.
+
+        That of a rosette is a circle about its axis.
+        """
+        x, y, z = vectors.T
+        across = y if self.rosette is None else np.hypot(y, z)
+        within: Boolean = np.abs(np.arctan2(across, x)) <= self.field_of_view / 2
         return within
 
     @property
@@ -134,6 +162,23 @@ class LidarModel:
         steps = (float(self.azimuth_count), self.field_of_view)
         return hashlib.sha256(np.concatenate([self.elevations, self.azimuth_offsets, steps]).tobytes()).hexdigest()[:16]
 
+    def at(self, time: float) -> LidarModel:
+        """Return the sensor with the directions of the frame that begins at a time in seconds; only a rosette's move.
+
+        A rosette goes on where the frame before ended.
+        """
+        return self if self.rosette is None else replace(self, rosette=self.rosette.later(time))
+
+    def delay(self, ray: Integer) -> Float:
+        """Return when rays (n,) int64 go out after the beginning of the revolution or frame, (n,) float64, seconds."""
+        if self.rosette is not None:
+            return ray / self.points_per_second
+        steps = self.azimuth_count
+        order = ray % steps
+        if self.clockwise:  # all round it begins at azimuth zero, else at the other end of the field of view
+            order = -order % steps if self.all_round else steps - 1 - order
+        return order / (steps * self.rotation_rate)
+
     def in_air(self, extinction: float) -> LidarModel:
         """Return the sensor in air that takes so much more light, in 1/m, on each way."""
         return replace(self, law=self.law.in_air(extinction))
@@ -141,6 +186,8 @@ class LidarModel:
 
 MAX_RAYS = 50_000_000
 """Limit on the rays of a revolution: fifty times the finest type of the study."""
+MAX_ROSETTE_RAYS = 2_000_000
+"""Limit on the rays of a rosette's frame: twenty seconds of a sensor of 100,000 points per second."""
 
 
 def _require_valid(model: LidarModel) -> None:

@@ -81,8 +81,12 @@ class UnitBeams:
         Raises
         ------
         SeipError
-            The model has another number of channels, or columns or rate are out of range.
+            The model draws a rosette or has another number of channels, or columns or rate are out of range.
         """
+        if base.rosette is not None:
+            raise SeipError(
+                f"{source} has the beams of channels, but LiDAR '{base.key}' draws a rosette: name another one"
+            )
         if len(self.elevations) != base.channels:
             raise SeipError(
                 f"{source} has {len(self.elevations)} beams, but LiDAR '{base.key}' has {base.channels}: name another "

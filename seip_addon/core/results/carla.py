@@ -70,15 +70,17 @@ def _spawn(sensor: Sensor, origin: NDArray[np.float64]) -> dict[str, Any]:
 
 def _attributes(sensor: Sensor) -> dict[str, str]:
     model = sensor.model
+    half = model.field_of_view / 2
+    low, high = (model.elevations.min(), model.elevations.max()) if model.rosette is None else (-half, half)
     dropoff = model.law if isinstance(model.law, CarlaDropoff) else model.law.as_dropoff()
     values = {
         "role_name": sensor.label,
-        "channels": len(model.elevations),
+        "channels": _rows(model),
         "range": model.max_range,
         "points_per_second": round(model.points_per_second),
         "rotation_frequency": model.rotation_rate,
-        "upper_fov": math.degrees(model.elevations.max()),
-        "lower_fov": math.degrees(model.elevations.min()),
+        "upper_fov": math.degrees(high),
+        "lower_fov": math.degrees(low),
         "horizontal_fov": math.degrees(model.field_of_view),
         "atmosphere_attenuation_rate": dropoff.attenuation,
         "noise_stddev": model.range_noise_std,
@@ -89,8 +91,33 @@ def _attributes(sensor: Sensor) -> dict[str, str]:
     return {name: f"{value:.10g}" if isinstance(value, float) else str(value) for name, value in values.items()}
 
 
+def _rows(model: LidarModel) -> int:
+    """Return the channels of CARLA's raster: for a rosette as many as make its steps equal both ways."""
+    return model.channels if model.rosette is None else max(2, math.isqrt(model.channels))
+
+
 def _note(model: LidarModel) -> str:
     """Say what CARLA cannot express, or nothing where it can express all."""
+    parts = [_of_rosette(model)] if model.rosette is not None else _of_channels(model)
+    if not isinstance(model.law, CarlaDropoff):
+        parts.append(
+            f"detects a surface by its reflectivity and angle, where CARLA loses returns by range alone: the drop-"
+            f"off is that of {DROPOFF_REFLECTIVITY:.0%} reflectivity"
+        )
+    if model.min_range > 0.0:
+        parts.append(f"returns nothing nearer than {model.min_range:g} m, where CARLA does")
+    return f"{model.name} {'; it '.join(parts)}" if parts else ""
+
+
+def _of_rosette(model: LidarModel) -> str:
+    across = math.degrees(model.field_of_view)
+    return (
+        f"draws a rosette of {across:.3g} degrees that does not repeat, where CARLA repeats an even raster of "
+        f"{_rows(model)} rows over the square about it, with as many points"
+    )
+
+
+def _of_channels(model: LidarModel) -> list[str]:
     parts = []
     descending = np.sort(model.elevations)[::-1]
     even = np.linspace(descending[0], descending[-1], len(descending))
@@ -106,11 +133,4 @@ def _note(model: LidarModel) -> str:
             f"fires channels up to {math.degrees(ahead):.2f} degrees of azimuth off the direction of its head, where "
             "CARLA fires all along it"
         )
-    if not isinstance(model.law, CarlaDropoff):
-        parts.append(
-            f"detects a surface by its reflectivity and angle, where CARLA loses returns by range alone: the drop-"
-            f"off is that of {DROPOFF_REFLECTIVITY:.0%} reflectivity"
-        )
-    if model.min_range > 0.0:
-        parts.append(f"returns nothing nearer than {model.min_range:g} m, where CARLA does")
-    return f"{model.name} {'; it '.join(parts)}" if parts else ""
+    return parts

@@ -177,24 +177,37 @@ class Scanner:
         Of the rays, in site axes.
     coarse_directions : (r, 3) float32
         The same, for points: 1e-5 m at 200 m.
+    delay : (r,) float64, seconds
+        After the beginning of the revolution at which each ray goes out.
     threads : int
         How many scanners may scan at once to advantage.
     """
 
     def __init__(self, sensor: MountedSensor, ground: ReflectiveSurface, seed: int) -> None:
-        self.sensor, self._model, self._seed = sensor, sensor.model, seed
-        self._windows = BeamWindows(sensor.model)
-        pattern = BeamPattern(sensor.model)
-        self._steps, self.threads = sensor.model.azimuth_count, ground.caster.threads
-        rays = np.arange(sensor.model.channels * self._steps)
-        self.directions: Float = pattern.directions(rays) @ sensor.orientation.T
+        self.sensor, self._ground, self._seed, self.threads = sensor, ground, seed, ground.caster.threads
+        self.delay = sensor.model.delay(np.arange(sensor.model.channels * sensor.model.azimuth_count))
+        self._model = sensor.model
+        self._cast_at_ground()
+
+    def aim(self, time: float) -> None:
+        """Turn the rays to where they are in the frame that begins at a time in seconds; only a rosette's move."""
+        model = self.sensor.model.at(time)
+        if model.rosette != self._model.rosette:
+            self._model = model
+            self._cast_at_ground()
+
+    def _cast_at_ground(self) -> None:
+        """Cast all rays against what stands still."""
+        sensor, rays = self.sensor, np.arange(len(self.delay))
+        self._windows = BeamWindows(self._model)
+        self.directions: Float = BeamPattern(self._model).directions(rays) @ sensor.orientation.T
         self.coarse_directions: NDArray[np.float32] = self.directions.astype(np.float32)
         self._distance = np.full(len(rays), np.inf)
         self._intensity = np.zeros(len(rays))
         self._chance = np.zeros(len(rays), dtype=np.float32)
         for begin in range(0, len(rays), _RAYS_AT_ONCE):
             part = slice(begin, begin + _RAYS_AT_ONCE)
-            hits = self._cast(ground, sensor.xyz, self.directions[part], rays[part])
+            hits = self._cast(self._ground, sensor.xyz, self.directions[part], rays[part])
             self._distance[hits.ray], self._chance[hits.ray] = hits.distance, hits.chance
             self._intensity[hits.ray] = self._model.law.intensity(hits.distance, hits.reflected)
         self._still_hits: dict[int, tuple[Motion, _Hits]] = {}
@@ -204,16 +217,8 @@ class Scanner:
         """Whether no ray ends on anything that stands still."""
         return not np.isfinite(self._distance).any()
 
-    @property
-    def delay(self) -> Float:
-        """Seconds after the beginning of the revolution at which each azimuth step is taken, (azimuth_count,)."""
-        order = np.arange(self._steps)
-        if self._model.clockwise:  # all round it begins at azimuth zero, else at the other end of the field of view
-            order = -order % self._steps if self._model.all_round else order[::-1]
-        return order / (self._steps * self._model.rotation_rate)
-
     def scan(self, traffic: MovingTraffic, users: int) -> Scan:
-        """Return what the rays end on with traffic that is one of so many road users."""
+        """Return what the rays, as they are aimed, end on with traffic that is one of so many road users."""
         distance, intensity, chance = self._distance.copy(), self._intensity.copy(), self._chance.copy()
         instance = np.full(len(distance), STATIC_INSTANCE, dtype=np.int32)
         unoccluded = np.zeros(users, dtype=np.int64)
@@ -253,7 +258,7 @@ class Scanner:
             origin = motion.attitude[0].T @ (self.sensor.xyz - motion.position[0])[:, None]
             directions = motion.attitude[0].T @ directions.T
         else:
-            position, attitude = motion.at(self.delay[ray % self._steps])
+            position, attitude = motion.at(self.delay[ray])
             origin = np.einsum("ni,nij->jn", self.sensor.xyz - position, attitude)
             directions = np.einsum("ni,nij->jn", directions, attitude)
         passing = np.flatnonzero(shape.may_hit(origin, directions, self._model.max_range))

@@ -100,6 +100,8 @@ class Simulation:
 
     def measure(self, number: int, snapshot: Snapshot, scans: Sequence[Scan]) -> Frame:
         """Return what the sensors make of their scans at an instant: noisy and incomplete, with labels."""
+        for scanner in self.scanners:
+            scanner.aim(snapshot.time)
         parts = [
             _returns(scanner, scan, sensor, self._random(sensor, number), rolling=self._settings.rolling_shutter)
             for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
@@ -113,8 +115,13 @@ class Simulation:
         rolling = self._settings.rolling_shutter
         motions = moving(self._trajectories, snapshot, self._revolution) if rolling else still(snapshot)
         traffic = MovingTraffic.of(motions, [self._shapes[motion.user] for motion in motions])
+
+        def scan(scanner: Scanner) -> Scan:
+            scanner.aim(snapshot.time)
+            return scanner.scan(traffic, len(self._trajectories))
+
         with ThreadPoolExecutor(min(len(self.scanners), self._threads)) as pool:
-            return list(pool.map(lambda scanner: scanner.scan(traffic, len(self._trajectories)), self.scanners))
+            return list(pool.map(scan, self.scanners))
 
     def _random(self, sensor: int, frame: int) -> np.random.Generator | None:
         if not self._settings.noise:
@@ -242,7 +249,7 @@ def _returns(
     points = scanner.coarse_directions.take(ray, axis=0)
     points *= measured.astype(np.float32)[:, None]
     points += sensor.xyz.astype(np.float32)
-    delay = scanner.delay[ray % sensor.model.azimuth_count] if rolling else np.zeros(len(ray))
+    delay = scanner.delay[ray] if rolling else np.zeros(len(ray))
     return {
         "points": points,
         "sensor": np.full(len(ray), number, dtype=np.int16),

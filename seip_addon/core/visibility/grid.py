@@ -132,6 +132,7 @@ def visibility_key(site: Site, models: Mapping[str, LidarModel], settings: Visib
         inputs += [model.elevations, model.azimuth_offsets, float(model.azimuth_count)]
         inputs += [float(model.min_range), float(model.max_range)]
         inputs += [] if model.all_round else [f"field of view {model.field_of_view!r}"]
+        inputs += [] if model.rosette is None else ["rosette"]
     if site.candidates.tilt.any():
         inputs.append(site.candidates.tilt)
     return digest(*inputs)

@@ -10,12 +10,15 @@ the tolerance of the ray caster, the return of each of them must be: which of th
    (`occlusion`). Of each other bundle the middle ray is cast, and the halves beside it are bundles anew.
 
 No ray is cast twice, neither for two targets nor for two sensors that share it.
+
+The rays of a rosette have no neighbours in rows: all of them that can return from near a target are cast
+(`ray_culling`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -25,6 +28,7 @@ from ..lidar import BeamPattern, LidarModel
 from .beam_culling import Beams, NearRays, counted, disc_patches, may_return, near_rays, target_patches
 from .near_surfaces import NearSurfaces
 from .occlusion import stopped_by
+from .ray_culling import rays_near
 from .settings import VisibilitySettings
 from .target_index import TargetIndex
 
@@ -129,6 +133,25 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
     cast : int
         Number of rays.
     """
+    turning = [model for model in position.models if model.rosette is None]
+    if len(turning) == len(position.models):
+        return _seen_by_channels(position, surfaces)
+    seen, cast = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool), 0
+    if turning:
+        of_these = np.array([model.rosette is None for model in position.models])
+        seen[of_these], cast = _seen_by_channels(replace(position, models=turning), surfaces)
+    index = TargetIndex(surfaces.xyz, position.settings.delta)
+    patches = target_patches(position.origin, surfaces, np.ones(len(surfaces.xyz), dtype=bool))
+    for number, model in enumerate(position.models):
+        if model.rosette is not None:
+            rays = rays_near(patches, position.yaw + model.azimuth_offsets, model.elevations, model.max_range)
+            seen[number] = _seen_by_rays(position, model, rays, surfaces, index)
+            cast += len(rays)
+    return seen, cast
+
+
+def _seen_by_channels(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
+    """Find which targets sensors see whose rays are the azimuth steps of channels; see `seen_by_near_rays`."""
     beams = Beams.of(position.models, position.yaw, position.settings)
     returns = _Returns(position, beams, surfaces)
     seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
@@ -165,21 +188,36 @@ def seen_by_near_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[B
 def seen_by_all_rays(position: ScanPosition, surfaces: NearSurfaces) -> tuple[Boolean, int]:
     """Find which targets are seen by casting every ray of every sensor: the reference."""
     index = TargetIndex(surfaces.xyz, position.settings.delta)
-    seen = np.zeros((len(position.models), len(surfaces.xyz)), dtype=bool)
-    cast = 0
-    for number, model in enumerate(position.models):
-        pattern = BeamPattern(model, position.yaw)
-        total = model.channels * model.azimuth_count
-        for begin in range(0, total, _RAYS_AT_ONCE):
-            directions = pattern.directions(np.arange(begin, min(begin + _RAYS_AT_ONCE, total)))
-            distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
-            counts = position.counting(model, directions, distance, triangle)
-            directions, distance = directions[counts], distance[counts]
-            ray, target = index.pairs_within_delta(_points(position.origin, directions, distance))
-            strong = position.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
-            seen[number, target[strong]] = True
-        cast += total
-    return seen, cast
+    rays = [np.arange(model.channels * model.azimuth_count) for model in position.models]
+    seen = [
+        _seen_by_rays(position, model, own, surfaces, index) for model, own in zip(position.models, rays, strict=True)
+    ]
+    return np.array(seen), sum(map(len, rays))
+
+
+def _seen_by_rays(
+    position: ScanPosition, model: LidarModel, rays: Integer, surfaces: NearSurfaces, index: TargetIndex
+) -> Boolean:
+    """Return which targets a sensor sees by casting rays of it, (t,) bool.
+
+    Parameters
+    ----------
+    rays : (n,) int64
+        As in `BeamPattern`.
+    index : TargetIndex
+        Of the targets.
+    """
+    pattern = BeamPattern(model, position.yaw)
+    seen = np.zeros(len(surfaces.xyz), dtype=bool)
+    for begin in range(0, len(rays), _RAYS_AT_ONCE):
+        directions = pattern.directions(rays[begin : begin + _RAYS_AT_ONCE])
+        distance, triangle = position.caster.cast(position.origin, directions, model.max_range)
+        counts = position.counting(model, directions, distance, triangle)
+        directions, distance = directions[counts], distance[counts]
+        ray, target = index.pairs_within_delta(_points(position.origin, directions, distance))
+        strong = position.counting_at_borders(model, surfaces, directions[ray], distance[ray], target)
+        seen[target[strong]] = True
+    return seen
 
 
 class _Returns:

@@ -16,7 +16,7 @@ from traffic_by_hand import make_model, make_trajectories, parked
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.orientation import rotated
-from seip_addon.core.lidar import RangeEquation, beam_directions
+from seip_addon.core.lidar import RangeEquation, Rosette, beam_directions
 from seip_addon.core.progress import finish
 from seip_addon.core.robustness.traffic_instants import (
     BATCH_SECONDS,
@@ -52,19 +52,22 @@ MODELS = {
         key="near-blind", min_range=6.0, max_range=45.0, azimuth_offsets=np.linspace(-0.1, 0.1, 7)
     ),
     "one-way": make_model(key="one-way", field_of_view=np.radians(140)),
+    "rosette": make_model(
+        key="rosette", points_per_second=30e3, rosette=Rosette((60.0, -43.0), (np.radians(25), np.radians(24)), 1.7)
+    ),
 }
 XYZ = np.array([[9.0, 9.0, 5.0], [-9.0, 12.0, 3.5], [0.0, -30.0, 6.0]])
 SITE = replace(
     junction_site(spacing=2.0),
     candidates=make_candidates(
-        np.repeat(XYZ, 3, axis=0),
-        ["coarse", "near-blind", "one-way"] * 3,
-        np.repeat(XYZ[:, 2], 3),
-        np.array([0.0, 0.7, -2.4, 2.0, -2.0, -0.8, 3.0, -0.4, 1.6]),
-        np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.15, 0.1, 0.0, 0.0]),
+        np.concatenate([np.repeat(XYZ, 3, axis=0), XYZ[[0, 2]]]),
+        ["coarse", "near-blind", "one-way"] * 3 + ["rosette"] * 2,
+        np.append(np.repeat(XYZ[:, 2], 3), XYZ[[0, 2], 2]),
+        np.array([0.0, 0.7, -2.4, 2.0, -2.0, -0.8, 3.0, -0.4, 1.6, -2.3, 1.5]),
+        np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.15, 0.1, 0.0, 0.0, 0.0, 0.2]),
     ),
 )
-POSES = np.arange(9)
+POSES = np.arange(11)
 AROUND = Surroundings(SITE, MODELS, VisibilitySettings(delta=DELTA), engine=ANY)
 
 

@@ -19,7 +19,8 @@ from shapely import box
 from synthetic_junction import junction_site, make_candidates, prism, rectangle, varied_reflectivity
 
 from seip_addon.core.errors import SeipError
-from seip_addon.core.lidar import LidarModel, RangeEquation, load_catalogue
+from seip_addon.core.geometry.orientation import orientation
+from seip_addon.core.lidar import BeamPattern, LidarModel, RangeEquation, load_catalogue
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.site.site import Site, Targets
 from seip_addon.core.visibility.chunks import Rows
@@ -31,7 +32,7 @@ from seip_addon.core.visibility.grid import (
     visibility_key,
 )
 from seip_addon.core.visibility.ray_casting import Engine, make_ray_caster
-from seip_addon.core.visibility.ring_resolution import resolution_warnings
+from seip_addon.core.visibility.ring_resolution import resolution_warnings, unresolved_from
 from seip_addon.core.visibility.store import CheckpointFolder, stored_visibility
 
 Float = NDArray[np.float64]
@@ -502,6 +503,32 @@ def test_warnings_name_the_radius_from_which_rings_are_too_far_apart() -> None:
     # rings of 8 m / tan 15°, tan 13°, …: 29.86, 34.65, 41.16 m; the first two are 4.8 m apart
     assert "type1: beyond 30 m (at 8 m height)" in warning
     assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
+
+
+def test_warnings_name_the_radius_from_which_a_rosette_leaves_gaps() -> None:
+    models = load_catalogue()
+    site = junction_site(positions=8, sensors=["mid40"], heights=[8.0])
+    (warning,) = resolution_warnings(site, models, VisibilitySettings(1.0))
+    assert "mid40: from 24 m (at 8 m height) on a frame of 0.1 s leaves level road in view more than δ = 1 m" in warning
+    assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
+
+
+@pytest.mark.parametrize(("height", "delta", "tilt"), [(5.4, 1.0, 0.0), (8.0, 2.0, 0.2)])
+def test_no_road_nearer_than_a_rosettes_gaps_is_missed(height: float, delta: float, tilt: float) -> None:
+    """Of random points on a level road in view, hardly any before the radius that is named is far from all rays."""
+    model = replace(load_catalogue()["mid70"], rotation_rate=2.0)
+    border = unresolved_from(model, height, delta, 90.0, tilt)
+    assert 20.0 < border < 80.0
+    turned = orientation(0.0, tilt)
+    ways = BeamPattern(model).directions(np.arange(model.channels)) @ turned.T
+    ends = ways[ways[:, 2] < 0]
+    ends = ends[:, :2] * (-height / ends[:, 2:])
+    road = np.random.default_rng(4).uniform((0, -60), (90, 60), (2000, 2))
+    road = road[model.faces(np.column_stack([road, np.full(len(road), -height)]) @ turned)]
+    gap = np.array([np.hypot(*(ends - point).T).min() for point in road])
+    radius = np.hypot(*road.T)
+    assert (gap[radius < border] < delta).mean() > 0.99  # gaps are looked for at points, not everywhere
+    assert (gap[radius > border] > delta).any()
 
 
 def test_warnings_say_when_targets_are_too_far_apart_for_delta() -> None:
