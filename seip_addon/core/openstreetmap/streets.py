@@ -269,7 +269,7 @@ def shown_name(tags: Tags) -> dict[str, str]:
     """Return the name of a street that pictures can show: in English where theirs has no letters for it."""
     name = tags.get("name", "")
     english = tags.get("name:en")
-    return {"name": english} if english and any(_FIRST_OTHER <= character for character in name) else {}
+    return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
 
 
 def is_one_way(tags: Tags) -> bool:
