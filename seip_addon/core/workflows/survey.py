@@ -20,6 +20,7 @@ from ..placement.objective import Objective, Solution, optimise, placement_probl
 from ..placement.search_limits import SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
+from ..results.located import LOCATED_FILES, missing_sentence
 from ..results.placement_record import PlacementRecord, Provenance, placement_record
 from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
@@ -299,9 +300,11 @@ def record_of(
         (see `place`), the settings of ``robustness`` or of ``traffic`` that the solution was chosen with.
     """
     objective = {"goal": asdict(solution.objective), "pose_errors": False, "render": False}
+    missing = missing_sentence(survey.site, LOCATED_FILES)
+    notes = (*solution.placement.notes, *([missing] if missing else []))
     return placement_record(
         survey.site,
-        solution,
+        replace(solution, placement=replace(solution.placement, notes=notes)),
         provenance,
         settings={**survey.settings.as_record(), **objective, **asked},
         inputs=inputs_of(survey) | {"visibility": survey.grid.key},
