@@ -26,7 +26,14 @@ MAX_LABELLED = 40  # more sensors than these get no labels on the picture
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
-    """Write a figure as PNG; the same figure gives the same bytes.
+    """Write a figure as PNG; see `as_png`."""
+    content = as_png(figure)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def as_png(figure: Figure) -> bytes:
+    """Return a figure as PNG; the same figure gives the same bytes.
 
     A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
     """
@@ -34,8 +41,9 @@ def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
     # Octrees keep rare colours, which here carry meaning; the median cut would mix them with frequent ones.
     picture = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    with whole_file(path) as temporary:
-        picture.save(temporary, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+    content = io.BytesIO()
+    picture.save(content, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+    return content.getvalue()
 
 
 def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
