@@ -85,7 +85,7 @@ def draw_sensors(
     """
     if 0 < len(points) <= MAX_LABELLED:
         words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" for s in deployment.sensors]
-        _draw_callouts(axes, points, words, road, zorder - 0.5)
+        draw_callouts(axes, points, words, road, zorder - 0.5)
     markers = markers_of(deployment)
     hidden = np.zeros(len(points), dtype=bool) if hidden is None else hidden
     for sensor, point, behind in zip(deployment.sensors, points, hidden, strict=True):
@@ -120,7 +120,8 @@ def percent(share: float) -> str:
     return f"{min(share, 1.0 if share == 1.0 else 0.999):.1%}"
 
 
-def _draw_callouts(axes: Axes, points: Float, words: list[str], road: Float, zorder: float) -> None:
+def draw_callouts(axes: Axes, points: Float, words: list[str], road: Float, zorder: float) -> None:
+    """Write words next to points (k, 2), in data coordinates, off the road (t, 2) and each other where they can be."""
     boxed = {"boxstyle": f"round,pad={LABEL_PADDING}", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6}
     texts = [
         axes.text(0, 0, label, ha="center", va="center", size=LABEL_SIZE, color=INK, bbox=boxed, zorder=zorder)

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from ..pictures.drawing import as_png
+from ..pictures.drawing import MAX_LABELLED, as_png, draw_callouts
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
 from .blind_spots import BlindSpot
 from .evidence import Evidence
@@ -46,15 +46,22 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
     style = {"cmap": ListedColormap(SEEN_COLOURS), "vmin": 0, "vmax": 2, "interpolation": "nearest"}
     axes.imshow(cells, origin="lower", extent=frame, aspect="auto", **style)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2)
-    for sensor, place in zip(evidence.sensors, sensors, strict=True):
-        boxed = {"boxstyle": "round,pad=0.2", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.85}
-        axes.annotate(
-            sensor.id, place, xytext=(8, 6), textcoords="offset points", size=9, color=INK, bbox=boxed, parse_math=False
-        )
+    if 0 < len(sensors) <= MAX_LABELLED:
+        draw_callouts(axes, sensors, [sensor.id for sensor in evidence.sensors], targets.xyz[:, :2], 3.0)
+    axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
     for number, spot in enumerate(spots, start=1):
         circle = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
-        axes.text(*spot.middle[:2], str(number), ha="center", va="center", size=9, weight="bold", color=INK, bbox=circle)
+        axes.text(
+            *spot.middle[:2],
+            str(number),
+            ha="center",
+            va="center",
+            size=9,
+            weight="bold",
+            color=INK,
+            bbox=circle,
+            zorder=5.0,
+        )
     return as_png(figure)
 
 
@@ -75,7 +82,7 @@ def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float]) -> by
     style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 7}
     axes.errorbar(price, share, yerr=(np.zeros(len(points)), missed), marker="o", linewidth=1.4, **style)
     for point, x, y in zip(points, price, share, strict=True):
-        axes.annotate(str(point.count), (x, y), xytext=(0, 8), textcoords="offset points", ha="center", size=9)
+        axes.annotate(str(point.count), (x, y), xytext=(0, 12), textcoords="offset points", ha="center", size=9)
     ring = {"markersize": 15, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
     axes.plot(placed[0] / 1000, 100 * placed[1], marker="o", label="this placement", **ring)
     axes.set(xlabel="price, thousand US dollars", ylabel="coverage, %")

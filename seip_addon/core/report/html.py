@@ -11,24 +11,27 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Nothing is fetched, and no script runs, whatever stands in the page."""
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 .3rem; }
-h2 { font-size: 1.2rem; margin: 2.2rem 0 .6rem; padding-top: .6rem; border-top: 1px solid #c9d1d7; break-after: avoid; }
-.summary { font-size: 1.15rem; margin: 0; }
-.created { color: #5d6b76; margin: .2rem 0 0; }
-figure { margin: 1rem 0; break-inside: avoid; }
-img { max-width: 100%; max-height: 22cm; border: 1px solid #c9d1d7; }
-figcaption { color: #5d6b76; font-size: .9rem; }
-table { border-collapse: collapse; margin: .8rem 0; font-size: .92rem; }
-th, td { text-align: left; vertical-align: top; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #dde3e7; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1d2b36; max-width: 62em; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.7em; line-height: 1.25; margin: 0 0 .2em; overflow-wrap: anywhere; }
+h2 { font-size: 1.2em; margin: 2em 0 .5em; padding-top: .5em; border-top: 1px solid #c9d1d7; break-after: avoid; }
+.summary { font-size: 1.15em; margin: 0; }
+.created { color: #5d6b76; margin: .2em 0 0; }
+figure { margin: 1em 0; break-inside: avoid; }
+img { max-width: 100%; max-height: 48em; border: 1px solid #c9d1d7; }
+figcaption { color: #5d6b76; font-size: .9em; }
+table { border-collapse: collapse; margin: .8em 0; font-size: .92em; }
+th, td { text-align: left; vertical-align: top; padding: .25em .9em .25em 0; border-bottom: 1px solid #dde3e7; }
 th { border-bottom-color: #1d2b36; }
-td { overflow-wrap: anywhere; }
+td:last-child { overflow-wrap: anywhere; }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr { break-inside: avoid; }
 thead { display: table-header-group; }
-code { display: block; background: #eef1f3; padding: .6rem .8rem; overflow-wrap: anywhere; white-space: pre-wrap; }
+code { display: block; background: #eef1f3; padding: .6em .8em; overflow-wrap: anywhere; white-space: pre-wrap; }
 @page { size: A4; margin: 18mm 16mm; }
-@media print { body { font-size: 10pt; margin: 0; max-width: none; padding: 0; } }
+@media print {
+  body { font-size: 9.5pt; margin: 0; max-width: none; padding: 0; }
+  img { max-height: 13cm; }
+}
 """
 
 
@@ -68,9 +71,7 @@ def _block(block: Block) -> str:
     if isinstance(block, Picture):
         data = base64.b64encode(block.png).decode("ascii")
         caption = escape(block.caption)
-        return (
-            f'<figure><img src="data:image/png;base64,{data}" alt="{caption}"><figcaption>{caption}</figcaption></figure>'
-        )
+        return f'<figure><img src="data:image/png;base64,{data}" alt="{caption}"><figcaption>{caption}</figcaption></figure>'
     return _table(block)
 
 

@@ -27,7 +27,8 @@ BODY, SMALL, HEADING, TITLE = 9.5, 8.0, 13.0, 18.0
 LEADING = 1.4  # of the size of the type
 GAP = 7.0  # between blocks
 COLUMN_GAP, ROW_GAP, LEAST_COLUMN = 9.0, 4.0, 26.0
-MOST_PICTURE = 470.0  # height of a picture
+MOST_PICTURE = 400.0  # height of a picture
+UNBROKEN = 150.0  # height up to which a table stays on one page
 KEPT_TOGETHER = 90.0  # room that must be left below a heading
 RULE, SHADE = "#c9d1d7", "#eef1f3"
 BULLET_INDENT = 12.0
@@ -134,8 +135,8 @@ class _Typesetter:
             [list(_wrapped(cell, width, SMALL, "normal")) for cell, width in zip(row, widths, strict=True)]
             for row in table.rows
         ]
-        first = _row_height(rows[0]) if rows else 0.0
-        self._need(_row_height(head) + first)
+        high = _row_height(head) + sum(map(_row_height, rows))
+        self._need(high if high <= UNBROKEN else _row_height(head) + _row_height(rows[0]))
         self._row(table, head, widths, weight="bold")
         for row in rows:
             if self._y - _row_height(row) < BOTTOM:
@@ -171,7 +172,9 @@ class _Typesetter:
         self._page.text(x / WIDTH, y / HEIGHT, text, **style)
 
     def _rule(self, y: float, color: str, right: float = WIDTH - RIGHT) -> None:
-        self._page.add_artist(Line2D((LEFT / WIDTH, right / WIDTH), (y / HEIGHT, y / HEIGHT), color=color, linewidth=0.6))
+        self._page.add_artist(
+            Line2D((LEFT / WIDTH, right / WIDTH), (y / HEIGHT, y / HEIGHT), color=color, linewidth=0.6)
+        )
 
     def _need(self, room: float) -> None:
         """Turn the page where less room is left."""
@@ -200,7 +203,9 @@ def _column_widths(table: Table) -> list[float]:
     columns = list(zip(table.head, *table.rows, strict=True))
     weights = ["bold"] + ["normal"] * len(table.rows)
     widths = [max(_width(cell, SMALL, w) for cell, w in zip(column, weights, strict=True)) for column in columns]
-    widths = [max(width + 0.5, LEAST_COLUMN if any(column) else 0.0) for width, column in zip(widths, columns, strict=True)]
+    widths = [
+        max(width + 0.5, LEAST_COLUMN if any(column) else 0.0) for width, column in zip(widths, columns, strict=True)
+    ]
     room = INNER - COLUMN_GAP * (len(widths) - 1)
     while sum(widths) > room:
         widest = max(range(len(widths)), key=widths.__getitem__)

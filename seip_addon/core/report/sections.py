@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Float
 from ..pictures.drawing import percent
 from ..placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE
+from ..results.located import LOCATED_FILES
 from ..results.placement_record import RecordedSensor, relevant_warnings
 from .blind_spots import BlindSpot, blind_spots, seen_places
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
@@ -121,14 +122,14 @@ def _site(evidence: Evidence) -> Iterator[Block]:
     x, y, z = record.site.origin_m
     yield Paragraph(
         f"The region of interest is {len(targets) * evidence.cell:,.0f} m² of road, looked at in "
-        f"{len(targets):,} squares of {targets.spacing:g} m. Map coordinates are metres; the middle of the scene is at "
+        f"{len(targets):,} squares of {targets.spacing:g} m. Map coordinates are metres; the scene has its origin at "
         f"map ({x:,.2f}, {y:,.2f}, {z:,.2f})."
     )
     obstacle = evidence.geo_reference.obstacle
     if obstacle:
         yield Paragraph(f"There are no latitudes and longitudes: {obstacle}.")
     else:
-        yield Paragraph(f"Latitudes and longitudes are on WGS 84, by the map's projection {_projection(evidence)}.")
+        yield Paragraph(f"Latitudes and longitudes are on WGS 84, by the map's projection “{_projection(evidence)}”.")
     if "view.png" in evidence.pictures:
         yield Picture(evidence.pictures["view.png"], "The site with the sensors and what they see.")
 
@@ -170,18 +171,21 @@ def _sensors(evidence: Evidence) -> Iterator[Block]:
     else:
         yield Paragraph("Prices are of the sensors alone: posts, mounting, power and backhaul are not counted.")
     yield _coordinates(record.sensors)
+    if not evidence.geo_reference.obstacle:
+        yield Paragraph("Elevation is the height of the optical centre above the map's zero.")
 
 
 def _coordinates(sensors: Sequence[RecordedSensor]) -> Table:
     """Return the table of where the optical centres are."""
     rows = [(sensor.id, *(f"{value:.3f}" for value in sensor.map_m), *_degrees(sensor)) for sensor in sensors]
     head = ("", "Map x, m", "Map y, m", "Map z, m", "Latitude, °", "Longitude, °", "Elevation, m")
-    return Table(head, tuple(rows), frozenset(range(1, 7)))
+    return Table(head[: max(map(len, rows), default=1)], tuple(rows), frozenset(range(1, 7)))
 
 
-def _degrees(sensor: RecordedSensor) -> tuple[str, str, str]:
+def _degrees(sensor: RecordedSensor) -> tuple[str, ...]:
+    """Return latitude, longitude and elevation of a sensor; nothing where they are not known."""
     if sensor.latitude_deg is None or sensor.longitude_deg is None or sensor.elevation_m is None:
-        return "–", "–", "–"
+        return ()
     return f"{sensor.latitude_deg:.8f}", f"{sensor.longitude_deg:.8f}", f"{sensor.elevation_m:.2f}"
 
 
@@ -233,21 +237,23 @@ def _spot_table(evidence: Evidence, spots: Sequence[BlindSpot], middles: Float) 
     places = evidence.geo_reference.geographic(middles)
     rows = []
     for number, (spot, middle) in enumerate(zip(spots, middles, strict=True)):
-        located = ("–", "–") if places is None else tuple(f"{places[number, axis]:.6f}" for axis in (1, 0))
+        located = () if places is None else tuple(f"{places[number, axis]:.6f}" for axis in (1, 0))
         plan = tuple(f"{value:.1f}" for value in middle[:2])
         rows.append((str(number + 1), f"{spot.area:,.0f}", spot.where, *plan, *located))
     head = ("", "Area, m²", "Where", "Map x, m", "Map y, m", "Latitude, °", "Longitude, °")
-    return Table(head, tuple(rows), frozenset({1, 3, 4, 5, 6}))
+    return Table(head[: len(rows[0])], tuple(rows), frozenset({1, 3, 4, 5, 6}))
 
 
 def _certificate(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     yield Paragraph(certificate_sentence(evidence))
-    notes = [_sentence(note) for note in record.notes if not note.startswith(POSE_ERRORS)]
+    elsewhere = (POSE_ERRORS, *LOCATED_FILES)
+    notes = [_sentence(note) for note in record.notes if not note.startswith(elsewhere)]
     if record.greedy is not None:
+        lost = record.greedy.gap_to_placement
         notes.append(
-            f"Choosing one sensor after the other, each the best at the time, gives {record.greedy.gap_to_placement:.2%} "
-            "less."
+            "Choosing one sensor after the other, each the best at the time, gives "
+            f"{f'{lost:.2%} less' if lost > 0 else 'no less'}."
         )
     notes.append("“Proven” is said of the model: of this scene, these sensors and this rule of what counts as seen.")
     yield Bullets(tuple(notes))

@@ -164,4 +164,3 @@ def _within(areas: Sequence[NamedArea], xyz: Float) -> Boolean:
     """Return which targets (t, 3) lie in which areas, (a, t) bool."""
     rows = [shapely.intersects_xy(area.polygon, xyz[:, 0], xyz[:, 1]) for area in areas]
     return np.array(rows, dtype=bool).reshape(len(areas), len(xyz))
-
