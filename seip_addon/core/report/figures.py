@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ..pictures.drawing import MAX_LABELLED, as_png, draw_callouts
 from ..pictures.palette import INK, PAPER, SEEN_COLOURS, SOFT_INK
+from ..pictures.plan_style import Style
 from .blind_spots import BlindSpot
 from .evidence import Evidence
 from .losses import FrontPoint
@@ -39,29 +40,20 @@ def blind_spot_map(evidence: Evidence, spots: Sequence[BlindSpot]) -> bytes:
 
     column = np.round((x - x.min()) / targets.spacing).astype(np.int64)
     row = np.round((y - y.min()) / targets.spacing).astype(np.int64)
-    cells = np.ma.masked_all((row.max() + 1, column.max() + 1), dtype=np.int64)
+    cells = np.full((row.max() + 1, column.max() + 1), np.nan)
     cells[row, column] = np.minimum(evidence.seen_by, 2)
     half = targets.spacing / 2
     frame = (x.min() - half, x.max() + half, y.min() - half, y.max() + half)
-    style = {"cmap": ListedColormap(SEEN_COLOURS), "vmin": 0, "vmax": 2, "interpolation": "nearest"}
+    style: Style = {"cmap": ListedColormap(SEEN_COLOURS), "vmin": 0, "vmax": 2, "interpolation": "nearest"}
     axes.imshow(cells, origin="lower", extent=frame, aspect="auto", **style)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     if 0 < len(sensors) <= MAX_LABELLED:
         draw_callouts(axes, sensors, [sensor.id for sensor in evidence.sensors], targets.xyz[:, :2], 3.0)
     axes.plot(*sensors.T, linestyle="none", marker="^", markersize=10, mfc=INK, mec=PAPER, mew=1.2, zorder=4.0)
     for number, spot in enumerate(spots, start=1):
-        circle = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
-        axes.text(
-            *spot.middle[:2],
-            str(number),
-            ha="center",
-            va="center",
-            size=9,
-            weight="bold",
-            color=INK,
-            bbox=circle,
-            zorder=5.0,
-        )
+        circle: Style = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK, "linewidth": 1.2}
+        style = {"ha": "center", "va": "center", "size": 9, "weight": "bold", "color": INK, "zorder": 5.0}
+        axes.text(float(spot.middle[0]), float(spot.middle[1]), str(number), bbox=circle, **style)
     return as_png(figure)
 
 
@@ -79,11 +71,11 @@ def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float]) -> by
     price = [point.price / 1000 for point in points]
     share = [100 * point.coverage for point in points]
     missed = [100 * point.missed for point in points]
-    style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 7}
-    axes.errorbar(price, share, yerr=(np.zeros(len(points)), missed), marker="o", linewidth=1.4, **style)
+    style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 7}
+    axes.errorbar(price, share, yerr=np.array([np.zeros(len(points)), missed]), marker="o", linewidth=1.4, **style)
     for point, x, y in zip(points, price, share, strict=True):
         axes.annotate(str(point.count), (x, y), xytext=(0, 12), textcoords="offset points", ha="center", size=9)
-    ring = {"markersize": 15, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
+    ring: Style = {"markersize": 15, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
     axes.plot(placed[0] / 1000, 100 * placed[1], marker="o", label="this placement", **ring)
     axes.set(xlabel="price, thousand US dollars", ylabel="coverage, %")
     axes.margins(0.1, 0.15)

@@ -69,9 +69,9 @@ def _block(block: Block) -> str:
     if isinstance(block, Bullets):
         return "<ul>\n" + "\n".join(f"<li>{escape(line)}</li>" for line in block.lines) + "\n</ul>"
     if isinstance(block, Picture):
-        data = base64.b64encode(block.png).decode("ascii")
+        source = f"data:image/png;base64,{base64.b64encode(block.png).decode('ascii')}"
         caption = escape(block.caption)
-        return f'<figure><img src="data:image/png;base64,{data}" alt="{caption}"><figcaption>{caption}</figcaption></figure>'
+        return f'<figure><img src="{source}" alt="{caption}"><figcaption>{caption}</figcaption></figure>'
     return _table(block)
 
 

@@ -18,6 +18,7 @@ from matplotlib.textpath import text_to_path
 from PIL import Image
 
 from ..pictures.palette import INK, PAPER, SOFT_INK
+from ..pictures.plan_style import Style
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
 
 WIDTH, HEIGHT = 595.0, 842.0
@@ -33,7 +34,7 @@ KEPT_TOGETHER = 90.0  # room that must be left below a heading
 RULE, SHADE = "#c9d1d7", "#eef1f3"
 BULLET_INDENT = 12.0
 CODE_PADDING = 6.0
-TEXT = {"family": "DejaVu Sans", "parse_math": False, "va": "baseline"}
+TEXT: Style = {"family": "DejaVu Sans", "parse_math": False, "va": "baseline"}
 MONO = "DejaVu Sans Mono"
 
 

@@ -12,7 +12,7 @@ from ..arrays import Float
 from ..pictures.drawing import percent
 from ..placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE
 from ..results.located import LOCATED_FILES
-from ..results.placement_record import RecordedSensor, relevant_warnings
+from ..results.placement_record import RecordedObjective, RecordedSensor, relevant_warnings
 from .blind_spots import BlindSpot, blind_spots, seen_places
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
 from .evidence import ROBUST_PICTURES, TRAFFIC_PICTURES, Evidence
@@ -69,24 +69,27 @@ def certificate_sentence(evidence: Evidence) -> str:
         return MOVED_MESSAGE
     if any(note.startswith(CHOSEN_FOR) for note in evidence.record.notes):
         return found.certificate
-    others = f"among the {places:,} places where a sensor may hang"
-    if found.cheapest:
-        if found.status == "optimal":
-            return f"No other choice {others} reaches the coverage that was asked for at a lower price: this is proven."
-        if found.bound is None:
-            return f"Another choice {others} may be cheaper; by how much is not known."
-        less = _dollars(max(0.0, found.value - found.bound))
-        return f"No other choice {others} is more than {less} cheaper: this much is proven."
-    what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights,"
-    if found.status == "optimal":
-        return f"No other choice {others} that keeps to the same rules covers more {what}: this is proven."
+    choice = f"choice among the {places:,} places where a sensor may hang that keeps to the same rules"
     if found.bound is None:
-        return f"Another choice {others} may cover more {what}; how much more is not known."
+        return f"Another {choice} may be better; how much better is not known."
+    better = _cheaper(found) if found.cheapest else _more_coverage(evidence)
+    proven = "this is proven" if found.status == "optimal" else "this much is proven, and no more was found out"
+    return f"No other {choice} {better}: {proven}."
+
+
+def _cheaper(found: RecordedObjective) -> str:
+    if found.status == "optimal" or found.bound is None:
+        return "reaches the coverage that was asked for at a lower price"
+    return f"is more than {_dollars(max(0.0, found.value - found.bound))} cheaper"
+
+
+def _more_coverage(evidence: Evidence) -> str:
+    found = evidence.record.objective
+    what = "of the road" if found.kind == "vanilla" else "of the road, counted by its weights"
+    if found.status == "optimal" or found.bound is None:
+        return f"covers more {what}"
     more = max(0.0, found.bound - found.value) / math.fsum(evidence.site.problem.weights)
-    return (
-        f"No other choice {others} that keeps to the same rules covers more than {_points(more)} more {what}: "
-        "this much is proven, and the search ended before it knew more."
-    )
+    return f"covers more than {_points(more)} more {what}"
 
 
 def _question(evidence: Evidence) -> Iterator[Block]:
@@ -105,8 +108,10 @@ def _question(evidence: Evidence) -> Iterator[Block]:
         yield Paragraph(f"Where must sensors hang to see as much as possible of the road{with_limits}?")
     rules = [
         f"Sensor types to choose from: {types}.",
-        f"Places to choose from: {counts.positions:,}, of which {counts.positions_on_poles:,} are on existing poles; "
-        f"with all heights, types and directions {counts.poses:,} candidates.",
+        (
+            f"Places to choose from: {counts.positions:,}, of which {counts.positions_on_poles:,} are on existing "
+            f"poles; with all heights, types and directions {counts.poses:,} candidates."
+        ),
     ]
     if goal.weighted:
         rules.append("The road in weighted regions counts for more than the rest.")
@@ -343,7 +348,7 @@ def _making(evidence: Evidence) -> Iterator[Block]:
     yield Paragraph(f"Made {record.times.created} with {versions}; solver {record.objective.solver}.")
     settings = ((name, json.dumps(value, ensure_ascii=False)) for name, value in record.settings.items())
     inputs = ((f"digest of {name}", value) for name, value in record.inputs.items())
-    yield Table(("Setting", "Value"), tuple((*settings, *inputs)))
+    yield Table(("Setting", "Value"), (*settings, *inputs))
 
 
 def _sentence(text: str) -> str:

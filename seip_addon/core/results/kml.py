@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from xml.etree import ElementTree as ET  # noqa: S405 -- written, never read
+from xml.etree import ElementTree as ET
 
 import shapely
 

@@ -50,7 +50,8 @@ class Located:
     def squares(self) -> Float:
         """Return the corners of the square of road round each target, (t, 4, 2) degrees, counter-clockwise."""
         corners = target_squares(self.site.targets).reshape(-1, 3)
-        return np.round(_geographic(self.site, corners)[:, :2], DECIMALS).reshape(-1, 4, 2)
+        degrees: Float = np.round(_geographic(self.site, corners)[:, :2], DECIMALS)
+        return degrees.reshape(-1, 4, 2)
 
     def seers(self, target: int) -> list[str]:
         """Return the labels of the sensors that see a target."""

@@ -81,7 +81,7 @@ class SiteFile:
         return replace(self.problem, visible=grid.visible)
 
 
-def save_site_file(  # noqa: PLR0913, PLR0917  # the parts of a result
+def save_site_file(
     path: str | os.PathLike[str],
     key: str,
     geometry: SceneGeometry,

@@ -85,6 +85,6 @@ def _check(name: str, value: object, path: str | os.PathLike[str]) -> None:
     known = [each.name for each in fields(InstalledCost)]
     if name not in known:
         raise SeipError(f"{path} has the key {name!r}, which no installed cost has; there are {', '.join(known)}")
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 0 <= float(value) <= MOST or not math.isfinite(value):
-        raise SeipError(f"{name} in {path} must be a number of at least 0, not {value!r}")
+    number = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    if not 0 <= number <= MOST:
+        raise SeipError(f"{name} in {path} must be a number from 0 to {MOST:g}, not {value!r}")
