@@ -80,7 +80,7 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
         const=DEFAULTS,
         type=Path,
         metavar="TOML",
-        help="count what posts, mounting, power and backhaul cost, by a table of your own or the shipped one",
+        help="prices with posts, power and backhaul, by the shipped table or yours",
     )
     metres = parser.add_argument_group("grid and candidates, in metres")
     add_settings(metres, SurveySettings, "grid_spacing")

@@ -46,6 +46,7 @@ def test_the_folder_holds_every_result(folder):
         "candidates.csv",
         "visibility.npz",
         "carla_spawn.json",
+        "site.npz",
         "plan.png",
         "placed.blend",
     }
@@ -79,7 +80,7 @@ def test_the_saved_scene_holds_the_sensors(folder):
 def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
     again = run(tmp_path / "again", "--count", "2")
     assert comparable(again) == comparable(load_placement_record(folder / "placement.json"))
-    for name in ("candidates.csv", "carla_spawn.json", "plan.png"):
+    for name in ("candidates.csv", "carla_spawn.json", "site.npz", "plan.png"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 

@@ -91,7 +91,8 @@ def rings(polygon: shapely.Polygon) -> list[list[list[float]]]:
 def missing_sentence(site: Site, files: Sequence[str]) -> str:
     """Say why files that need longitude and latitude are missing; empty where they are not."""
     obstacle = site.geo_reference.obstacle
-    return f"{' and '.join(files)} are not written: {obstacle}" if obstacle else ""
+    verb = "are" if len(files) > 1 else "is"
+    return f"{' and '.join(files)} {verb} not written: {obstacle}" if obstacle else ""
 
 
 def _geographic(site: Site, points: Float) -> Float:
