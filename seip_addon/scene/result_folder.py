@@ -15,6 +15,7 @@ from ..core.lidar import LidarModel
 from ..core.pictures.plan_view import save_plan_view
 from ..core.placement.objective import Solution, placement_problem
 from ..core.progress import Progress, finish
+from ..core.report.write import FILES as REPORT_FILES
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
 from ..core.results.geojson import save_geojson
@@ -30,9 +31,13 @@ from .write import write_result
 
 FILES = (
     *("candidates.csv", "carla_spawn.json", "placement.geojson", "placement.kml", "site.npz"),
+    *REPORT_FILES,
     *("plan.png", "view.png", "placed.blend", "placement.json"),
 )
-"""In the order in which they take their places: where ``placement.json`` stands, everything else does."""
+"""In the order in which they take their places: where ``placement.json`` stands, everything else does.
+
+Reports are written later, on the result; one on an earlier result goes with it.
+"""
 
 
 @contextmanager
