@@ -20,24 +20,23 @@ from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
 from ..core.results.geojson import save_geojson
 from ..core.results.kml import save_kml
-from ..core.results.located import located
+from ..core.results.located import LOCATED_FILES, located
 from ..core.results.placement_record import PlacementRecord, relevant_warnings, save_placement_record
 from ..core.results.site_file import save_site_file
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from .blend_file import save_blend
+from .gltf import save_glb
 from .render import save_rendered_view
 from .write import write_result
 
 FILES = (
-    *("candidates.csv", "carla_spawn.json", "placement.geojson", "placement.kml", "site.npz"),
-    *REPORT_FILES,
-    *("plan.png", "view.png", "placed.blend", "placement.json"),
+    *("candidates.csv", "carla_spawn.json", "site.npz", "plan.png", "view.png"),
+    *("scene.glb", "placed.blend", "placement.json"),
 )
-"""In the order in which they take their places: where ``placement.json`` stands, everything else does.
-
-Reports are written later, on the result; one on an earlier result goes with it.
-"""
+"""In the order in which they take their places: where ``placement.json`` stands, everything else does."""
+MAY_BE_MISSING = (*LOCATED_FILES, *REPORT_FILES)
+"""Files of where the map's projection is known, and reports, which are written later: those on an earlier result go."""
 
 
 @contextmanager
@@ -50,7 +49,7 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
     Yields
     ------
     dict of str to path
-        In the same folder, by the names of `FILES`.
+        In the same folder, by the names of `FILES` and `MAY_BE_MISSING`.
 
     Raises
     ------
@@ -58,7 +57,7 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
         A file cannot be written.
     """
     mark = secrets.token_hex(4)
-    part = {name: folder / f".{mark}.{name}" for name in FILES}
+    part = {name: folder / f".{mark}.{name}" for name in (*MAY_BE_MISSING, *FILES)}
     try:
         yield part
         (folder / FILES[-1]).unlink(missing_ok=True)
@@ -106,6 +105,7 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     with result_files(folder) as part:
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
+        save_glb(part["scene.glb"])
         finish(write_tables(part, geometry, site, solution, record, visible, models))
         if render:
             save_rendered_view(part["view.png"], scene, site, deployment)
