@@ -46,7 +46,7 @@ def test_the_record_and_the_maps_agree(folder):
     record = load_placement_record(folder / "placement.json")
     features = json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["features"]
     points = [one["geometry"]["coordinates"] for one in features if one["properties"]["kind"] == "sensor"]
-    assert points == [[one.longitude_deg, one.latitude_deg, round(one.elevation_m, 3)] for one in record.sensors]
+    assert points == [[one.longitude_deg, one.latitude_deg, round(one.altitude_m, 3)] for one in record.sensors]
     assert (folder / "placement.kml").is_file()
     assert record.settings["installed_cost"]["new_post_usd"] > 0
     assert all(one.installation_usd > 0 for one in record.sensors)

@@ -177,21 +177,21 @@ def _sensors(evidence: Evidence) -> Iterator[Block]:
         yield Paragraph("Prices are of the sensors alone: posts, mounting, power and backhaul are not counted.")
     yield _coordinates(record.sensors)
     if not evidence.geo_reference.obstacle:
-        yield Paragraph("Elevation is the height of the optical centre above the map's zero.")
+        yield Paragraph("Altitude is the height of the optical centre above the map's zero.")
 
 
 def _coordinates(sensors: Sequence[RecordedSensor]) -> Table:
     """Return the table of where the optical centres are."""
     rows = [(sensor.id, *(f"{value:.3f}" for value in sensor.map_m), *_degrees(sensor)) for sensor in sensors]
-    head = ("", "Map x, m", "Map y, m", "Map z, m", "Latitude, °", "Longitude, °", "Elevation, m")
+    head = ("", "Map x, m", "Map y, m", "Map z, m", "Latitude, °", "Longitude, °", "Altitude, m")
     return Table(head[: max(map(len, rows), default=1)], tuple(rows), frozenset(range(1, 7)))
 
 
 def _degrees(sensor: RecordedSensor) -> tuple[str, ...]:
-    """Return latitude, longitude and elevation of a sensor; nothing where they are not known."""
-    if sensor.latitude_deg is None or sensor.longitude_deg is None or sensor.elevation_m is None:
+    """Return latitude, longitude and altitude of a sensor; nothing where they are not known."""
+    if sensor.latitude_deg is None or sensor.longitude_deg is None or sensor.altitude_m is None:
         return ()
-    return f"{sensor.latitude_deg:.8f}", f"{sensor.longitude_deg:.8f}", f"{sensor.elevation_m:.2f}"
+    return f"{sensor.latitude_deg:.8f}", f"{sensor.longitude_deg:.8f}", f"{sensor.altitude_m:.2f}"
 
 
 def _coverage(evidence: Evidence) -> Iterator[Block]:

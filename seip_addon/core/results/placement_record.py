@@ -103,7 +103,7 @@ class RecordedSensor:
         Its type's key in the catalogue.
     roll_deg : float, optional
         Of a sensor that a hand has put elsewhere, and of no other.
-    latitude_deg, longitude_deg, elevation_m : float, optional
+    latitude_deg, longitude_deg, altitude_m : float, optional
         On WGS 84, and the height above the map's zero; None where the map's projection is not known.
     installation_usd : float, optional
         Of the price, what it takes to install the sensor; None where prices are those of sensors alone.
@@ -127,7 +127,7 @@ class RecordedSensor:
     roll_deg: float | None = None
     latitude_deg: float | None = None
     longitude_deg: float | None = None
-    elevation_m: float | None = None
+    altitude_m: float | None = None
     installation_usd: float | None = None
 
     @property
@@ -392,7 +392,7 @@ def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
 
 def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
     place = site.geographic(sensor.xyz[None])
-    longitude, latitude, elevation = (None, None, None) if place is None else place[0]
+    longitude, latitude, altitude = (None, None, None) if place is None else place[0]
     return RecordedSensor(
         id=sensor.label,
         pose=sensor.pose,
@@ -412,7 +412,7 @@ def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
         roll_deg=tilt_degrees(sensor.roll) if sensor.pose is None else None,
         latitude_deg=None if latitude is None else _rounded(latitude, 8),
         longitude_deg=None if longitude is None else _rounded(longitude, 8),
-        elevation_m=None if elevation is None else _rounded(elevation, 6),
+        altitude_m=None if altitude is None else _rounded(altitude, 6),
         installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
     )
 

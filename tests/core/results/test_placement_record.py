@@ -252,7 +252,7 @@ def test_latitude_and_longitude_are_those_of_the_map_and_its_header(example, run
     for entry in record.sensors:
         projected = place.mercator(math.radians(entry.latitude_deg), math.radians(entry.longitude_deg))
         assert projected == pytest.approx(np.add(entry.map_m, place.header_offset[:3])[:2].tolist(), abs=2e-3)
-        assert entry.elevation_m == pytest.approx(entry.map_m[2] + 400.0, abs=1e-6)
+        assert entry.altitude_m == pytest.approx(entry.map_m[2] + 400.0, abs=1e-6)
         assert entry.latitude_deg == round(entry.latitude_deg, 8)
     assert violations(content_of(record), SCHEMA) == []
 
@@ -269,7 +269,7 @@ def test_a_record_of_before_there_were_latitudes_is_read(example, run):
     content = content_of(make_record(example, run))
     del content["site"]["geo_reference"]
     for sensor in content["sensors"]:
-        for name in ("latitude_deg", "longitude_deg", "elevation_m"):
+        for name in ("latitude_deg", "longitude_deg", "altitude_m"):
             del sensor[name]
     assert violations(content, SCHEMA) == []
     assert parsed_record(json.dumps(content)) == parsed_record(make_record(example, run).text())
