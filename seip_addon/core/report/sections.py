@@ -117,6 +117,7 @@ def _question(evidence: Evidence) -> Iterator[Block]:
         rules.append("The road in weighted regions counts for more than the rest.")
     if goal.min_distance > 0:
         rules.append(f"Sensors are at least {goal.min_distance:g} m apart.")
+    rules += [_sentence(note) for note in record.notes if note.startswith(CHOSEN_FOR)]
     rules += [f"There must be a sensor at {name}." for name in goal.mandatory]
     rules += [f"There must be no sensor at {name}." for name in goal.forbidden]
     yield Bullets(tuple(rules))
@@ -252,7 +253,7 @@ def _spot_table(evidence: Evidence, spots: Sequence[BlindSpot], middles: Float) 
 def _certificate(evidence: Evidence) -> Iterator[Block]:
     record = evidence.record
     yield Paragraph(certificate_sentence(evidence))
-    elsewhere = (POSE_ERRORS, *LOCATED_FILES)
+    elsewhere = (POSE_ERRORS, CHOSEN_FOR, *LOCATED_FILES)
     notes = [_sentence(note) for note in record.notes if not note.startswith(elsewhere)]
     if record.greedy is not None:
         lost = record.greedy.gap_to_placement

@@ -15,6 +15,8 @@ from .headings import degrees, tilt_degrees
 from .located import Located, rings
 
 Feature = dict[str, Any]
+MOST_CELLS = 100_000
+"""Targets up to which each has a cell of its own, in some 30 MB; beyond, those that the same sensors see are joined."""
 
 
 def save_geojson(path: str | os.PathLike[str], placed: Located) -> None:
@@ -35,6 +37,11 @@ def _features(placed: Located) -> Iterator[Feature]:
     yield _feature("region of interest", _multipolygon(placed.region), name=placed.site.name)
     for area, polygons in placed.weighted:
         yield _feature("weighted region", _multipolygon(polygons), name=area.name, weight=area.weight)
+    if len(placed.site.targets) > MOST_CELLS:
+        for seers, polygons in placed.patches():
+            patch = _multipolygon(polygons)
+            yield _feature("coverage patch", patch, seen_by=seers, times_seen=len(seers))
+        return
     for target, square in enumerate(placed.squares().tolist()):
         cell = {"type": "Polygon", "coordinates": [[*square, square[0]]]}
         seers = placed.seers(target)

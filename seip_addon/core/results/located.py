@@ -20,7 +20,7 @@ LOCATED_FILES = ("placement.geojson", "placement.kml")
 DECIMALS = 8  # of degrees: about a millimetre
 GAP = 0.06
 """Cracks in the region up to twice this (metres) are closed."""
-GRID = 1e-6  # metres to which the corners of squares are rounded where they are joined
+METRE_DECIMALS = 6  # to which the corners of squares are rounded, so that neighbours share theirs
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +60,12 @@ class Located:
 
     def patches(self) -> Iterator[tuple[list[str], tuple[shapely.Polygon, ...]]]:
         """Yield for each set of sensors, by their labels, the road that these see and no others."""
-        squares = target_squares(self.site.targets)[:, :, :2]
+        squares = np.round(target_squares(self.site.targets)[:, :, :2], METRE_DECIMALS)
         rows: Boolean = self.deployment.rows.reshape(len(self.sensors), len(squares))
         sets, which = np.unique(rows.T, axis=0, return_inverse=True)
         for number in range(len(sets)):
             own = which.ravel() == number
-            area = shapely.union_all(shapely.polygons(squares[own]), grid_size=GRID)
+            area = shapely.coverage_union_all(shapely.polygons(squares[own]))
             yield self.seers(int(np.argmax(own))), _polygons(self.site, area)
 
 

@@ -13,6 +13,7 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.opendrive.geo_reference import GeoReference
 from seip_addon.core.placement import Placement
 from seip_addon.core.placement.objective import Objective, Solution, placement_problem
+from seip_addon.core.results import geojson
 from seip_addon.core.results.geojson import save_geojson
 from seip_addon.core.results.kml import NAMESPACE, save_kml
 from seip_addon.core.results.located import located, missing_sentence
@@ -121,6 +122,16 @@ def test_the_same_placement_gives_the_same_bytes(placed, tmp_path):
         save(tmp_path / name, placed)
         save(tmp_path / f"again {name}", placed)
         assert (tmp_path / name).read_bytes() == (tmp_path / f"again {name}").read_bytes()
+
+
+def test_of_many_targets_those_that_the_same_sensors_see_are_joined(placed, tmp_path, monkeypatch):
+    monkeypatch.setattr(geojson, "MOST_CELLS", 10)
+    save_geojson(tmp_path / "a.geojson", placed)
+    features = json.loads((tmp_path / "a.geojson").read_text(encoding="utf-8"))["features"]
+    patches = of_kind(features, "coverage patch")
+    assert len(patches) == len(list(placed.patches()))
+    assert not of_kind(features, "coverage cell")
+    assert all(shape(one["geometry"]).is_valid for one in patches)
 
 
 def test_without_a_projection_there_is_none_and_a_sentence_says_why(example):
