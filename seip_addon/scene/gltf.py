@@ -34,6 +34,6 @@ def save_glb(path: Path) -> None:
                 export_cameras=False,
                 export_lights=False,
             )
-    except (RuntimeError, AttributeError) as error:
+    except (RuntimeError, AttributeError, TypeError) as error:  # it is missing, or of another version
         LOG.warning("%s is not written: Blender's glTF exporter failed (%s)", path.name, error)
         path.unlink(missing_ok=True)

@@ -13,6 +13,7 @@ from .map_furniture import footprint
 from .road_surface import CARRIAGEWAY, in_groups, lane_outline
 
 CROSSING = "crosswalk"
+GRID = 1e-3  # metres to which outlines are rounded, so that no odd one fails
 LEAST_AREA = 1.0
 """Square metres within the region of interest, below which a place is left out."""
 
@@ -45,7 +46,7 @@ def named_places(
         *((name, lane_outline(own)) for name, own in streets.items()),
         *((name, shapely.union_all(parts)) for name, parts in crossings.items()),
     ]
-    within = ((name, area.intersection(region)) for name, area in areas)
+    within = ((name, shapely.intersection(area, region, grid_size=GRID)) for name, area in areas)
     return tuple(NamedArea(name, area) for name, area in within if area.area >= LEAST_AREA)
 
 
