@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Boolean, Float, Integer
-from ..results.site_file import Area
+from ..results.site_file import PLACE, WEIGHTED, Area
 from ..site.targets import Targets
 
 DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
@@ -69,8 +69,8 @@ def blind_spots(targets: Targets, seen: Boolean, areas: Sequence[Area]) -> list[
 
 def seen_places(targets: Targets, seen_by: Integer, areas: Sequence[Area]) -> list[SeenPlace]:
     """Return what is seen of each named area; where no street is named, of the road towards each side as well."""
-    parts = [(area.name, area.within) for area in areas]
-    if not any(area.kind == "place" for area in areas):
+    parts = [(f"{area.name} (weighted)" if area.kind == WEIGHTED else area.name, area.within) for area in areas]
+    if not any(area.kind == PLACE for area in areas):
         parts += _arms(targets)
     return [
         SeenPlace(

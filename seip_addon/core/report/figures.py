@@ -74,7 +74,7 @@ def front_chart(points: Sequence[FrontPoint], placed: tuple[float, float]) -> by
     style: Style = {"color": SEEN_COLOURS[2], "ecolor": SOFT_INK, "capsize": 4, "markersize": 7}
     axes.errorbar(price, share, yerr=np.array([np.zeros(len(points)), missed]), marker="o", linewidth=1.4, **style)
     for point, x, y in zip(points, price, share, strict=True):
-        axes.annotate(str(point.count), (x, y), xytext=(0, 12), textcoords="offset points", ha="center", size=9)
+        axes.annotate(str(point.count), (x, y), xytext=(8, -13), textcoords="offset points", size=9)
     ring: Style = {"markersize": 15, "mfc": "none", "mec": INK, "mew": 1.6, "linestyle": "none"}
     axes.plot(placed[0] / 1000, 100 * placed[1], marker="o", label="this placement", **ring)
     axes.set(xlabel="price, thousand US dollars", ylabel="coverage, %")

@@ -307,8 +307,8 @@ def _front(evidence: Evidence, points: Sequence[FrontPoint]) -> Iterator[Block]:
     share = math.fsum(weights[evidence.seen]) / math.fsum(weights)
     weighted = " Coverage counts the road by its weights here." if float(np.ptp(weights)) > 0 else ""
     yield Paragraph(
-        "The best choice of one sensor, of two, and so on, under the same rules and without a budget; each was "
-        f"searched for a limited time only.{weighted}"
+        "The choice of one sensor, of two, and so on, that sees most under the same rules, whatever it costs: a search "
+        f"with a budget may find more for the money. Each was searched for a limited time only.{weighted}"
     )
     yield Picture(
         front_chart(points, (evidence.record.price_usd, share)),
