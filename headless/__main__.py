@@ -9,6 +9,7 @@ import sys
 VERBS = {
     "build-scene": "build a Blender scene from an OpenDRIVE map",
     "place": "choose the sensors of a scene",
+    "report": "write a report on a placement, HTML and PDF",
     "study": "coverage of types × heights × numbers",
     "robust": "choose sensors for pose errors, failures or several looks",
     "in-traffic": "choose sensors for a road full of traffic",

@@ -49,7 +49,8 @@ def _in_words(solution: Solution) -> str:
         for sensor in deployment.sensors
     ]
     central = "" if deployment.central is None else f", central {deployment.central:.2%}"
-    lines.append(f"coverage {deployment.coverage:.2%}{central}, price ${deployment.price:,.0f}")
+    installed = " installed" if any(sensor.installation is not None for sensor in deployment.sensors) else ""
+    lines.append(f"coverage {deployment.coverage:.2%}{central}, price ${deployment.price:,.0f}{installed}")
     lines.append(solution.certificate)
     if solution.greedy is not None and placement.objective > 0:
         lines.append(

@@ -24,6 +24,7 @@ from seip_addon.core.placement.objective import Solution
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.results.placement_record import Provenance, versions
 from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site
 from seip_addon.core.site.weather import weather_of
@@ -73,6 +74,14 @@ def add_options(parser: argparse.ArgumentParser, *, in_full: bool = False) -> No
     add_settings(sensors, CandidateSettings, "sensors")
     add_settings(sensors, SurveySettings, "catalogue")
     add_settings(sensors, CandidateSettings, "heights", "tilts", "yaws", "assumed_poles")
+    sensors.add_argument(
+        "--installed-cost",
+        nargs="?",
+        const=DEFAULTS,
+        type=Path,
+        metavar="TOML",
+        help="prices with posts, power and backhaul, by the shipped table or yours",
+    )
     metres = parser.add_argument_group("grid and candidates, in metres")
     add_settings(metres, SurveySettings, "grid_spacing")
     add_settings(metres, VisibilitySettings, "delta")
@@ -185,6 +194,7 @@ def _settings(options: argparse.Namespace) -> SurveySettings:
         candidates=candidates,
         visibility=visibility,
         weather=weather_of(options.weather),
+        installed_cost=None if options.installed_cost is None else load_installed_cost(options.installed_cost),
         reflectivity=tuple(options.reflectivity),
         time_limit=limit,
     )

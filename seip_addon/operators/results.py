@@ -16,6 +16,7 @@ from ..core.errors import SeipError
 from ..core.placement.deployment import sensor_at
 from ..core.placement.objective import Objective, target_weights
 from ..core.progress import Progress
+from ..core.report.write import write_report
 from ..core.results.comparison import compare, packed_counts, unpacked_counts
 from ..core.results.placement_record import PlacementRecord, Provenance, parsed_record, versions
 from ..core.results.ranking import Ranked, rank_added, rank_alone
@@ -25,6 +26,7 @@ from ..core.visibility.visibility_model import VisibilityModel, visibility_model
 from ..core.workflows.moved_sensors import evaluate_moved_sensors
 from ..core.workflows.survey import Survey, record_of
 from ..scene.blend_file import save_blend
+from ..scene.gltf import save_glb
 from ..scene.render import render_elsewhere
 from ..scene.result_folder import result_files, write_tables
 from ..scene.sensors import labelled_sensors, read_sensors
@@ -370,6 +372,7 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         show_seen_by(scene, unpacked_counts(scene.seip.result.seen))  # it may show a comparison, or sensors on the move
     with result_files(folder) as part:
         save_blend(part["placed.blend"])
+        save_glb(part["scene.glb"])
         yield Progress(0, 0, "reading the scene")
         state = yield from finding
         survey, solution = state.placed()
@@ -379,7 +382,42 @@ def _exported(folder: Path, scene: bpy.types.Scene) -> Generator[Progress, None,
         yield from write_tables(part, survey.geometry, site, solution, record, visible, survey.models)
         if render:
             yield from render_elsewhere(part["view.png"], part["placed.blend"], name, site, solution.deployment)
+    survey.grid.save(folder / "visibility.npz")
     return state
+
+
+def no_report(scene: bpy.types.Scene) -> str:
+    """Say why no report can be written; empty if one can be."""
+    folder = bpy.path.abspath(scene.seip.result.folder)
+    missing = no_folder(scene)
+    if missing or (Path(folder) / "placement.json").is_file():
+        return missing
+    return f"Press {SEIP_OT_export_result.bl_label} first: the report is on the result in the folder."
+
+
+class SEIP_OT_write_report(LongWork[tuple[Path, ...]], bpy.types.Operator):
+    """Write a report on the exported result into its folder: a page of HTML and a PDF"""
+
+    bl_idname = "seip.write_report"
+    bl_label = "Write Report"
+    bl_options = {"REGISTER"}
+    stopped_message = "stopped; no report was written"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the operator is enabled; otherwise the tooltip says why not."""
+        sentence = no_report(context.scene)
+        if sentence:
+            cls.poll_message_set(sentence)
+        return not sentence
+
+    def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, tuple[Path, ...]]:
+        """Return the work, which reads files alone."""
+        return write_report(Path(bpy.path.abspath(scene.seip.result.folder)))
+
+    def conclude(self, _scene: bpy.types.Scene, result: tuple[Path, ...]) -> None:
+        """Say where the report is."""
+        self.report({"INFO"}, f"written: {' and '.join(path.name for path in result)} in {result[0].parent}")
 
 
 CLASSES = (
@@ -391,4 +429,5 @@ CLASSES = (
     SEIP_OT_follow_sensors,
     SEIP_OT_evaluate_sensors,
     SEIP_OT_export_result,
+    SEIP_OT_write_report,
 )

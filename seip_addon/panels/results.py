@@ -171,6 +171,7 @@ class SEIP_PT_results_files(_Result, bpy.types.Panel):
         if sentence:
             draw_sentence(layout, sentence, icon="INFO")
         draw_run(layout, results.SEIP_OT_export_result.bl_idname, icon="EXPORT")
+        draw_run(layout, results.SEIP_OT_write_report.bl_idname, icon="FILE_TEXT")
 
 
 CLASSES = (

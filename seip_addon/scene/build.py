@@ -17,6 +17,7 @@ from . import contract
 from .blend_file import CLIP_END, CLIP_START
 from .daylight import add_daylight
 from .meshes import mesh_of
+from .named_places import places_text
 
 DRESSING = "Dressing"
 VIEW = "View"
@@ -77,6 +78,7 @@ def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     scene[contract.MAP] = map_name
     scene[contract.GEO_REFERENCE] = model.geo_reference or ""
     scene[contract.HEADER_OFFSET] = model.header_offset.tolist()
+    scene[contract.PLACES] = places_text(model.places)
     scene.unit_settings.system = "METRIC"
     scene.unit_settings.scale_length = 1.0
 

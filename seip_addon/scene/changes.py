@@ -89,7 +89,9 @@ def _fingerprint(sources: Iterable[bpy.types.Object], scene: bpy.types.Scene) ->
     lines = sorted(
         repr((_traits(obj, layer), [n for n, objects in roles.items() if obj in objects])) for obj in sources
     )
-    return digest(repr(scene.get(contract.ORIGIN)), repr(scene.get(contract.TITLE, scene.name)), *lines)
+    stored = [scene.get(name) for name in (contract.ORIGIN, contract.GEO_REFERENCE, contract.HEADER_OFFSET)]
+    place = (repr(value.to_list() if hasattr(value, "to_list") else value) for value in stored)
+    return digest(*place, repr(scene.get(contract.TITLE, scene.name)), *lines)
 
 
 def _traits(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> tuple[object, ...]:

@@ -12,10 +12,12 @@ from ..core.errors import SeipError
 from ..core.site.check import Problem, SceneContents, Surface
 from ..core.site.scene_geometry import SceneGeometry
 from . import contract
+from .named_places import places_of
 from .read import (
     Shown,
     area_of,
     foot_sentences,
+    geo_reference_of,
     geometry_of,
     hidden_members,
     hidden_sentence,
@@ -118,10 +120,11 @@ def _odd_scene(scene: bpy.types.Scene) -> Iterator[Problem]:
             f"The scene's unit scale is {scale:g}, but one unit of Blender is taken for one metre: "
             "set the unit scale to 1 and scale the objects.",
         )
-    try:
-        origin_of(scene)
-    except SeipError as error:
-        yield Problem("ERROR", _sentence(str(error)))
+    for read in (origin_of, geo_reference_of, places_of):
+        try:
+            read(scene)
+        except SeipError as error:
+            yield Problem("ERROR", _sentence(str(error)))
 
 
 def _without_role(

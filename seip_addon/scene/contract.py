@@ -39,6 +39,7 @@ LABEL = "seip_label"
 BEAMS = "seip_beams"
 POSITION = "seip_position"
 HEADER_OFFSET = "seip_header_offset"
+PLACES = "seip_places"
 CATEGORY = "seip_category"
 PAINT = "seip_paint"
 

@@ -13,9 +13,11 @@ import numpy as np
 from ..core.arrays import Boolean, Float, Integer
 from ..core.errors import SeipError
 from ..core.geometry.plan import outline
+from ..core.opendrive.geo_reference import GeoReference
 from ..core.site.scene_geometry import DEFAULT_WEIGHT, Mesh, NamedArea, Pole, SceneGeometry, joined
 from . import contract
 from .materials import reflectivity
+from .named_places import places_of
 
 SHAFT_REACH = 0.5
 """Of a pole's faces those within this (metres, in plan) of its foot are its shaft: arms may rise above it."""
@@ -130,6 +132,8 @@ def geometry_of(scene: bpy.types.Scene, parts: list[Shown], hidden: dict[str, li
         forbidden_areas=_areas(parts, contract.FORBIDDEN_AREAS),
         mandatory_areas=_areas(parts, contract.MANDATORY_AREAS),
         poles=poles_of(parts),
+        geo_reference=geo_reference_of(scene),
+        places=places_of(scene),
     )
     hidden_sentences = (hidden_sentence(name, objects) for name, objects in hidden.items())
     return SceneReading(geometry, (*hidden_sentences, *foot_sentences(parts)))
@@ -367,14 +371,31 @@ def _finite_origin(part: Shown) -> Float:
 
 def origin_of(scene: bpy.types.Scene) -> Float:
     """Return the map coordinates (3,) of the scene's local origin, metres."""
-    stored = scene.get(contract.ORIGIN, (0.0, 0.0, 0.0))
+    return np.array(_numbers(scene, contract.ORIGIN, ("three", 3), "(metres)"))
+
+
+def geo_reference_of(scene: bpy.types.Scene) -> GeoReference:
+    """Return what the builder of the scene knew of where on the Earth its map is."""
+    text = scene.get(contract.GEO_REFERENCE, "")
+    if not isinstance(text, str):
+        raise SeipError(
+            f"scene property {contract.GEO_REFERENCE} must be the text of the map's <geoReference>, not {text!r}"
+        )
+    x, y, z, heading = _numbers(scene, contract.HEADER_OFFSET, ("four", 4), "(x, y, z in metres, heading in radians)")
+    return GeoReference(text, (x, y, z, heading))
+
+
+def _numbers(scene: bpy.types.Scene, name: str, many: tuple[str, int], units: str) -> list[float]:
+    """Return the numbers that a property of a scene holds; zeros where there is none."""
+    word, count = many
+    stored = scene.get(name, (0.0,) * count)
     try:
         values = [] if isinstance(stored, str) else [float(value) for value in stored]
     except (TypeError, ValueError):
         values = []
-    if len(values) != 3 or not all(map(math.isfinite, values)):
-        raise SeipError(f"scene property {contract.ORIGIN} must be three finite numbers (metres), not {stored!r}")
-    return np.array(values)
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise SeipError(f"scene property {name} must be {word} finite numbers {units}, not {stored!r}")
+    return values
 
 
 def hidden_members(scene: bpy.types.Scene, members: dict[str, set[bpy.types.Object]]) -> dict[str, list[str]]:

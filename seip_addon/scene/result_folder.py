@@ -13,19 +13,30 @@ from ..core.arrays import Boolean
 from ..core.errors import SeipError
 from ..core.lidar import LidarModel
 from ..core.pictures.plan_view import save_plan_view
-from ..core.placement.objective import Solution
+from ..core.placement.objective import Solution, placement_problem
 from ..core.progress import Progress, finish
+from ..core.report.write import FILES as REPORT_FILES
 from ..core.results.candidate_table import save_candidate_table
 from ..core.results.carla import save_carla_spawns
+from ..core.results.geojson import save_geojson
+from ..core.results.kml import save_kml
+from ..core.results.located import LOCATED_FILES, located
 from ..core.results.placement_record import PlacementRecord, relevant_warnings, save_placement_record
+from ..core.results.site_file import save_site_file
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
 from .blend_file import save_blend
+from .gltf import save_glb
 from .render import save_rendered_view
 from .write import write_result
 
-FILES = ("candidates.csv", "carla_spawn.json", "plan.png", "view.png", "placed.blend", "placement.json")
+FILES = (
+    *("candidates.csv", "carla_spawn.json", "site.npz", "plan.png", "view.png"),
+    *("scene.glb", "placed.blend", "placement.json"),
+)
 """In the order in which they take their places: where ``placement.json`` stands, everything else does."""
+MAY_BE_MISSING = (*LOCATED_FILES, *REPORT_FILES)
+"""Files of where the map's projection is known, and reports, which are written later: those on an earlier result go."""
 
 
 @contextmanager
@@ -38,7 +49,7 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
     Yields
     ------
     dict of str to path
-        In the same folder, by the names of `FILES`.
+        In the same folder, by the names of `FILES` and `MAY_BE_MISSING`.
 
     Raises
     ------
@@ -46,7 +57,7 @@ def result_files(folder: Path) -> Iterator[dict[str, Path]]:
         A file cannot be written.
     """
     mark = secrets.token_hex(4)
-    part = {name: folder / f".{mark}.{name}" for name in FILES}
+    part = {name: folder / f".{mark}.{name}" for name in (*MAY_BE_MISSING, *FILES)}
     try:
         yield part
         (folder / FILES[-1]).unlink(missing_ok=True)
@@ -94,6 +105,7 @@ def write_result_folder(  # noqa: PLR0913  # everything that a result is made of
     with result_files(folder) as part:
         write_result(scene, site, deployment)
         save_blend(part["placed.blend"])
+        save_glb(part["scene.glb"])
         finish(write_tables(part, geometry, site, solution, record, visible, models))
         if render:
             save_rendered_view(part["view.png"], scene, site, deployment)
@@ -115,6 +127,12 @@ def write_tables(  # noqa: PLR0913, PLR0917  # as above
     save_carla_spawns(part["carla_spawn.json"], deployment, site.origin)
     yield Progress(1, 3, "writing tables")
     save_candidate_table(part["candidates.csv"], site, models, visible, deployment)
+    problem = placement_problem(site, visible, models, solution.objective)
+    save_site_file(part["site.npz"], record.inputs["visibility"], geometry, site, solution, problem)
+    placed = located(geometry, site, deployment)
+    if placed is not None:
+        save_geojson(part["placement.geojson"], placed)
+        save_kml(part["placement.kml"], placed)
     yield Progress(2, 3, "drawing the plan")
     warnings = relevant_warnings(record.warnings, models, (sensor.model.key for sensor in deployment.sensors))
     save_plan_view(part["plan.png"], geometry, site, deployment, [*solution.caption, *warnings])

@@ -139,7 +139,7 @@ def _describe(empty: bpy.types.Object, sensor: Sensor) -> None:
         "seip_yaw_deg": math.degrees(sensor.yaw),
         "seip_tilt_deg": math.degrees(sensor.tilt),
         "seip_range": sensor.model.max_range,
-        "seip_price": sensor.model.price,
+        "seip_price": sensor.price,
         "seip_coverage": sensor.alone,
         "seip_coverage_added": sensor.added,
         "seip_coverage_marginal": sensor.marginal,

@@ -159,7 +159,7 @@ def test_an_export_that_fails_or_is_stopped_leaves_the_earlier_one_whole(placed,
     bpy.ops.seip.export_result()
     out = tmp_path / "out"
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert before.keys() == set(FILES) - {"view.png"}
+    assert before.keys() == {*FILES, "visibility.npz"} - {"view.png"}
     placed.seip.goal.count = 1
     bpy.ops.seip.solve_placement()
     work = bpy.types.SEIP_OT_export_result.prepare(type("Operator", (), {})(), placed)

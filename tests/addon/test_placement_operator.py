@@ -31,13 +31,18 @@ def labels(scene: bpy.types.Scene) -> list[str]:
 def test_panel_and_batch_write_the_same_placement(junction, tmp_path, small_scene):
     assert bpy.ops.seip.solve_placement() == {"FINISHED"}
     junction.seip.result.folder = str(tmp_path / "panel")
+    with pytest.raises(RuntimeError, match=r"Press Export first"):
+        bpy.ops.seip.write_report()
     assert bpy.ops.seip.export_result() == {"FINISHED"}
+    assert bpy.ops.seip.write_report() == {"FINISHED"}
+    assert (tmp_path / "panel" / "report.pdf").is_file()
+    assert "searched for a limited time" in (tmp_path / "panel" / "report.html").read_text(encoding="utf-8")
     key = session.state_of(junction).survey.grid.key
     place.main([str(small_scene), *OPTIONS, "-o", str(tmp_path / "batch")])
     panel, batch = (load_placement_record(tmp_path / name / "placement.json") for name in ("panel", "batch"))
     assert comparable(panel) == comparable(batch)
     assert VisibilityGrid.load(tmp_path / "batch" / "visibility.npz").key == key
-    for name in ("candidates.csv", "carla_spawn.json"):
+    for name in ("candidates.csv", "carla_spawn.json", "site.npz", "visibility.npz"):
         assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "batch" / name).read_bytes()
 
 

@@ -91,7 +91,7 @@ def make_frames(seed=0, count=3, **how):
     return [(f"{number:06d}", make_frame(seed=[seed, number], time=number / 10, **how)) for number in range(count)]
 
 
-def make_run(name="a", split="train", key=None, sensors=None):
+def make_run(name="a", split="train", key=None, sensors=None, **more):
     return TrafficRun(
         name=name,
         split=split,
@@ -99,6 +99,7 @@ def make_run(name="a", split="train", key=None, sensors=None):
         sensors=sensors or make_sensors(),
         origin=ORIGIN,
         record={"seeds": {"traffic": 3, "scans": 5}},
+        **more,
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
+from seip_addon.core.opendrive.geo_reference import GeoReference
 from tests.datasets.scan_frames import ORIGIN, make_frame, make_frames, make_run, make_sensors, rotation, write
 
 HALF_A_LEVEL = 0.5 / 255 + 1e-6
@@ -323,6 +324,39 @@ def test_las_by_laspy(frames, tmp_path):
         assert (found.instance == frame.instance).all()
         assert (found.gps_time == frame.time + frame.delay.astype(float)).all()
         assert (np.array(found.return_number) == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("projection", "code"), [("+proj=utm +zone=32", "32632"), ("+proj=tmerc +lat_0=52.5 +lon_0=13.4", None)]
+)
+def test_las_says_where_on_the_earth_it_is(frames, tmp_path, projection, code):
+    laspy = reader("laspy")
+    reader("lazrs")
+    place = GeoReference(projection, (500_000.0, 5_000_000.0, 30.0, 0.0))
+    write("las", frames, make_run(geo_reference=place), tmp_path)
+    name, frame = frames[0]
+    path = tmp_path / f"train/a/{name}.laz"
+    found = laspy.read(path)
+    expected = frame.points.astype(np.float64) + ORIGIN + (500_000.0, 5_000_000.0, 30.0)
+    assert np.abs(found.xyz - expected).max() <= 0.0005 + 1e-9
+    assert found.header.global_encoding.wkt
+    (record,) = [one for one in found.header.vlrs if one.user_id == "LASF_Projection"]
+    content = record.record_data_bytes()
+    assert (record.record_id, content[-1:], content.count(b"\0")) == (2112, b"\0", 1)
+    text = content[:-1].decode("ascii")
+    assert text.startswith('PROJCS["WGS 84 / ')
+    assert text.count("[") == text.count("]")
+    assert (f'AUTHORITY["EPSG","{code}"]]' in text) is (code is not None)
+    assert 'PARAMETER["central_meridian",' in text
+
+
+def test_las_of_a_map_without_a_projection_claims_none(frames, tmp_path):
+    laspy = reader("laspy")
+    reader("lazrs")
+    write("las", frames, make_run(geo_reference=GeoReference("+proj=merc")), tmp_path)
+    found = laspy.read(tmp_path / f"train/a/{frames[0][0]}.laz")
+    assert not [one for one in found.header.vlrs if one.user_id == "LASF_Projection"]
+    assert np.abs(found.xyz - frames[0][1].points.astype(np.float64) - ORIGIN).max() <= 0.0005 + 1e-9
 
 
 def test_an_empty_cloud_by_laspy(tmp_path):

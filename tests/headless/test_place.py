@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -46,6 +47,8 @@ def test_the_folder_holds_every_result(folder):
         "candidates.csv",
         "visibility.npz",
         "carla_spawn.json",
+        "site.npz",
+        "scene.glb",
         "plan.png",
         "placed.blend",
     }
@@ -76,10 +79,18 @@ def test_the_saved_scene_holds_the_sensors(folder):
     assert {item["seip_sensor"] for item in empties} == {"type1"}
 
 
+def test_the_glb_holds_the_sensors_and_the_coverage(folder):
+    content = (folder / "scene.glb").read_bytes()
+    magic, version, length, size = struct.unpack("<4sIII", content[:16])
+    assert (magic, version, length) == (b"glTF", 2, len(content))
+    names = {node["name"] for node in json.loads(content[20 : 20 + size])["nodes"]}
+    assert {"Coverage", "S1 body", "S2 body"} <= names
+
+
 def test_the_same_run_gives_the_same_bytes(folder, tmp_path, run):
     again = run(tmp_path / "again", "--count", "2")
     assert comparable(again) == comparable(load_placement_record(folder / "placement.json"))
-    for name in ("candidates.csv", "carla_spawn.json", "plan.png"):
+    for name in ("candidates.csv", "carla_spawn.json", "site.npz", "scene.glb", "plan.png"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
 

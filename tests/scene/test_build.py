@@ -6,8 +6,9 @@ import pytest
 import shapely
 from mathutils import Vector
 
+from seip_addon.core.opendrive.geo_reference import GeoReference
 from seip_addon.core.progress import finish
-from seip_addon.core.site.scene_geometry import ASSUMED
+from seip_addon.core.site.scene_geometry import ASSUMED, NamedArea
 from seip_addon.core.streetscape.model import SiteModel
 from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree
@@ -37,11 +38,12 @@ def model():
     return SiteModel(
         "A crossing with quite a long name, längs der Straße " * 3,
         ORIGIN,
-        None,
+        "EPSG:32632",
         np.arange(4.0),
         parts,
         shapely.box(0, 0, 10, 10),
         (),
+        places=(NamedArea("Mill Lane", shapely.box(0, 0, 5, 5)),),
     )
 
 
@@ -104,6 +106,8 @@ def test_the_scene_knows_where_it_is(model):
     assert scene[contract.TITLE] == model.name
     assert scene[contract.MAP] == "map.xodr"
     assert list(scene[contract.HEADER_OFFSET]) == [0, 1, 2, 3]
+    assert read_scene(scene).geometry.geo_reference == GeoReference("EPSG:32632", (0.0, 1.0, 2.0, 3.0))
+    assert [place.name for place in read_scene(scene).geometry.places] == ["Mill Lane"]
     assert bpy.data.objects["Middle"][contract.WEIGHT] == 3.0
     assert (scene.unit_settings.system, scene.unit_settings.scale_length) == ("METRIC", 1.0)
 

@@ -99,11 +99,12 @@ def test_a_unit_scale_that_is_none_of_metres(scene):
     assert "unit scale is 0.01" in only(scene)[2]
 
 
-def test_a_broken_origin(scene):
-    scene["seip_origin"] = "here"
+@pytest.mark.parametrize("name", ["seip_origin", "seip_header_offset", "seip_places"])
+def test_a_broken_property_of_the_scene(scene, name):
+    scene[name] = "here"
     severity, _, text = only(scene)
     assert severity == "ERROR"
-    assert "seip_origin" in text
+    assert name in text
 
 
 def test_hidden_objects_do_not_count(scene):

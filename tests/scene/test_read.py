@@ -5,11 +5,15 @@ import hashlib
 import bpy
 import numpy as np
 import pytest
+import shapely
 from mathutils import Vector
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive.geo_reference import GeoReference
+from seip_addon.core.site.scene_geometry import NamedArea
 from seip_addon.scene import contract
 from seip_addon.scene.materials import REFLECTIVITY, material, set_reflectivity
+from seip_addon.scene.named_places import places_text
 from seip_addon.scene.read import read_scene
 
 
@@ -43,6 +47,22 @@ def put(scene, item, where, at=(0, 0, 0)):
 
 def occluders(scene):
     return {mesh.name: mesh.triangles for mesh in read_scene(scene).geometry.occluders}
+
+
+def test_the_scene_remembers_where_on_the_earth_it_is(scene):
+    assert read_scene(scene).geometry.geo_reference == GeoReference()
+    scene["seip_geo_reference"] = "EPSG:32632"
+    scene["seip_header_offset"] = [1.0, 2.0, 3.0, 0.5]
+    assert read_scene(scene).geometry.geo_reference == GeoReference("EPSG:32632", (1.0, 2.0, 3.0, 0.5))
+
+
+def test_named_places_come_back_as_they_were(scene):
+    assert read_scene(scene).geometry.places == ()
+    hole = shapely.box(0, 0, 9, 9).difference(shapely.box(3, 3, 6, 6))
+    scene["seip_places"] = places_text([NamedArea("Längs “Weg”", hole), NamedArea("b", shapely.box(0, 0, 1, 1))])
+    first, second = read_scene(scene).geometry.places
+    assert (first.name, second.name) == ("Längs “Weg”", "b")
+    assert first.polygon.equals(hole)
 
 
 def test_region_road_and_origin_arrive_in_metres(scene):
@@ -311,6 +331,14 @@ def test_reading_changes_nothing(scene):
         (lambda s: s.__setitem__("seip_origin", [1.0, 2.0]), "seip_origin must be three finite numbers"),
         (lambda s: s.__setitem__("seip_origin", "1,2,3"), "seip_origin must be three finite numbers .* not '1,2,3'"),
         (lambda s: s.__setitem__("seip_origin", "123"), "seip_origin must be three finite numbers"),
+        (
+            lambda s: s.__setitem__("seip_header_offset", [1.0]),
+            r"seip_header_offset must be four finite numbers \(x, y",
+        ),
+        (lambda s: s.__setitem__("seip_geo_reference", 32), "must be the text of the map's <geoReference>, not 32"),
+        (lambda s: s.__setitem__("seip_places", "[[1, 2]]"), "seip_places holds no named places: delete it"),
+        (lambda s: s.__setitem__("seip_places", '[["a", "POLYGON"]]'), "seip_places holds no named places: delete it"),
+        (lambda s: s.__setitem__("seip_places", 3), "seip_places holds no named places: delete it"),
         (
             lambda s: sheet(s, "w", (contract.WEIGHTED_REGIONS,), 1, 1).__setitem__("seip_weight", "high"),
             "seip_weight of object 'w' must be a number",

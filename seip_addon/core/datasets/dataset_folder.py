@@ -158,11 +158,12 @@ def _entry_of(manifest: Record, run: TrafficRun, kind: Format, folder: Path) -> 
 def _new_entry(run: TrafficRun, kind: Format) -> Record:
     sensors = [_sensor_record(sensor, run) for sensor in run.sensors]
     parts = [part for sensor in run.sensors for part in (sensor.label, sensor.model, sensor.xyz, sensor.orientation)]
+    place = [repr(run.geo_reference)] if run.geo_reference.projection else []
     return {
         "name": run.name,
         "split": run.split,
         "finished": False,
-        "key": digest(SCHEMA, kind.key, run.key, run.origin, *parts),
+        "key": digest(SCHEMA, kind.key, run.key, run.origin, *place, *parts),
         "simulation_key": run.key,
         "simulation": dict(run.record),
         "origin_m": run.origin.tolist(),

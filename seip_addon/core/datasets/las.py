@@ -1,4 +1,9 @@
-"""LAZ, the compressed form of LAS 1.4, in map coordinates: for surveyors' programs and geographic information systems.
+"""LAZ, the compressed form of LAS 1.4, for surveyors' programs and geographic information systems.
+
+Coordinates are those of the map. Where the map names a projection that is known they are projected ones, map
+coordinates and the offset of the map's header, and the file says so: the record ``LASF_Projection`` 2112 holds the
+reference system as well-known text 1 (OGC 01-009), as point format 6 asks for. It has no vertical part, because
+OpenDRIVE does not say what heights count from.
 
 One file for each frame, in point format 6. The point source id is the number of the sensor from 1, because 0 means
 the file itself; the GPS time is the time of the simulation; the intensity has 16 bits; the extra dimension
@@ -46,13 +51,17 @@ def _laz(sample: Sample) -> bytes:
     frame = sample.frame
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales = np.full(3, RESOLUTION)
-    header.offsets = np.round(sample.run.origin)
+    mercator, origin = sample.run.geo_reference.mercator, sample.run.origin
+    if mercator is not None:
+        origin = sample.run.geo_reference.projected(origin[None])[0]
+        header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(mercator.wkt))
+    header.offsets = np.round(origin)
     header.generating_software = "SEIP"
     header.system_identifier = "simulation"
     header.global_encoding.wkt = True  # what point format 6 requires, with or without a reference system
     header.add_extra_dim(laspy.ExtraBytesParams("instance", np.int32, "road user, -1 for none"))
     points = laspy.LasData(header)
-    points.x, points.y, points.z = (frame.points.astype(np.float64) + sample.run.origin).T
+    points.x, points.y, points.z = (frame.points.astype(np.float64) + origin).T
     points.intensity = np.round(np.clip(frame.intensity, 0.0, 1.0) * 65535).astype(np.uint16)
     points.point_source_id = (frame.sensor + 1).astype(np.uint16)
     points.gps_time = frame.time + frame.delay.astype(np.float64)

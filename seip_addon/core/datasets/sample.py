@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Boolean, Float
 from ..errors import SeipError
+from ..opendrive.geo_reference import GeoReference
 from ..scans.frame import Frame, Labels
 
 SPLITS = ("train", "val", "test")
@@ -66,6 +67,8 @@ class TrafficRun:
         In the order of the frames' sensor numbers.
     origin : (3,) float64, metres
         Map coordinates of the local origin: map = local + origin.
+    geo_reference : GeoReference
+        Where on the Earth the map is.
     record : mapping
         What else the manifest shall say of the simulation (seeds, settings, versions): values that JSON can hold.
     """
@@ -75,6 +78,7 @@ class TrafficRun:
     key: str
     sensors: tuple[SensorPose, ...]
     origin: Float
+    geo_reference: GeoReference = field(default_factory=GeoReference)
     record: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

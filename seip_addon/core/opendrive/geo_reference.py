@@ -1,10 +1,23 @@
-"""From latitude and longitude to the metres of a map, where its reference is a transverse Mercator projection."""
+"""Between latitude and longitude and the metres of a map whose reference is a transverse Mercator projection."""
 
 import math
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..arrays import Float
+
 _SEMI_MAJOR_AXIS, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # of WGS 84; GRS 80 differs by 0.1 mm
+_THIRD_FLATTENING = _FLATTENING / (2 - _FLATTENING)
+_ECCENTRICITY = math.sqrt(_FLATTENING * (2 - _FLATTENING))
+_RADIUS = _SEMI_MAJOR_AXIS / (1 + _THIRD_FLATTENING) * (1 + _THIRD_FLATTENING**2 / 4 + _THIRD_FLATTENING**4 / 64)
+_GEOGRAPHIC_WKT = (
+    'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],'
+    'AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],'
+    'UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]'
+)
+_NEWTON_STEPS = 5  # two reach the last bit away from the poles
 _UTM = re.compile(r"EPSG:+(258|326|327)(\d\d)\b", re.IGNORECASE)
 _WORLD_DATUMS = {"WGS84", "GRS80", "ETRS89"}
 
@@ -24,19 +37,63 @@ class TransverseMercator:
 
         After Krüger (1912) with four terms: within 1,000 km of the central meridian exact to a millimetre.
         """
-        n = _FLATTENING / (2 - _FLATTENING)
-        radius = _SEMI_MAJOR_AXIS / (1 + n) * (1 + n**2 / 4 + n**4 / 64)
-        xi, eta = self._on_sphere(latitude, longitude - self.longitude, n)
-        origin, _ = self._on_sphere(self.latitude, 0.0, n)
+        xi, eta = self._on_sphere(latitude, longitude - self.longitude)
+        origin, _ = self._on_sphere(self.latitude, 0.0)
         return (
-            self.false_easting + self.scale * radius * eta,
-            self.false_northing + self.scale * radius * (xi - origin),
+            self.false_easting + self.scale * _RADIUS * eta,
+            self.false_northing + self.scale * _RADIUS * (xi - origin),
         )
 
-    def _on_sphere(self, latitude: float, east: float, n: float) -> tuple[float, float]:
-        root = 2 * math.sqrt(n) / (1 + n)
+    def inverse(self, easting: Float, northing: Float) -> tuple[Float, Float]:
+        """Return latitude and longitude (n,), radians, of eastings and northings (n,), metres.
+
+        Krüger's other series, after which the latitude is found from the conformal one by Newton's method.
+        """
+        n = _THIRD_FLATTENING
+        origin, _ = self._on_sphere(self.latitude, 0.0)
+        xi = (northing - self.false_northing) / (self.scale * _RADIUS) + origin
+        eta = (easting - self.false_easting) / (self.scale * _RADIUS)
+        terms = (
+            n / 2 - 2 * n**2 / 3 + 37 * n**3 / 96 - n**4 / 360,
+            n**2 / 48 + n**3 / 15 - 437 * n**4 / 1440,
+            17 * n**3 / 480 - 37 * n**4 / 840,
+            4397 * n**4 / 161280,
+        )
+        pairs = list(enumerate(terms, start=1))
+        xi, eta = (
+            xi - sum(b * np.sin(2 * j * xi) * np.cosh(2 * j * eta) for j, b in pairs),
+            eta - sum(b * np.cos(2 * j * xi) * np.sinh(2 * j * eta) for j, b in pairs),
+        )
+        wanted = np.sin(xi) / np.hypot(np.sinh(eta), np.cos(xi))  # tangent of the conformal latitude
+        longitude = self.longitude + np.arctan2(np.sinh(eta), np.cos(xi))
+        return np.arctan(_tangent_of_latitude(wanted)), (longitude + math.pi) % math.tau - math.pi
+
+    @property
+    def wkt(self) -> str:
+        """The projected reference system as well-known text 1 (OGC 01-009), which LAS files hold."""
+        zone = round((math.degrees(self.longitude) + 183) / 6)
+        name, authority = "Transverse Mercator", ""
+        for south in (False, True):
+            if self == _utm(zone, south=south):
+                name = f"UTM zone {zone}{'S' if south else 'N'}"
+                authority = f',AUTHORITY["EPSG","{327 if south else 326}{zone:02d}"]'
+        parameters = {
+            "latitude_of_origin": round(math.degrees(self.latitude), 12),
+            "central_meridian": round(math.degrees(self.longitude), 12),
+            "scale_factor": self.scale,
+            "false_easting": self.false_easting,
+            "false_northing": self.false_northing,
+        }
+        given = "".join(f'PARAMETER["{key}",{value!r}],' for key, value in parameters.items())
+        return (
+            f'PROJCS["WGS 84 / {name}",{_GEOGRAPHIC_WKT},PROJECTION["Transverse_Mercator"],{given}'
+            f'UNIT["metre",1,AUTHORITY["EPSG","9001"]],AXIS["Easting",EAST],AXIS["Northing",NORTH]{authority}]'
+        )
+
+    def _on_sphere(self, latitude: float, east: float) -> tuple[float, float]:
+        n = _THIRD_FLATTENING
         sine = math.sin(latitude)
-        conformal = math.sinh(math.atanh(sine) - root * math.atanh(root * sine))
+        conformal = math.sinh(math.atanh(sine) - _ECCENTRICITY * math.atanh(_ECCENTRICITY * sine))
         xi = math.atan2(conformal, math.cos(east))
         eta = math.atanh(math.sin(east) / math.hypot(1.0, conformal))
         terms = (
@@ -50,6 +107,77 @@ class TransverseMercator:
             xi + sum(a * math.sin(2 * j * xi) * math.cosh(2 * j * eta) for j, a in pairs),
             eta + sum(a * math.cos(2 * j * xi) * math.sinh(2 * j * eta) for j, a in pairs),
         )
+
+
+@dataclass(frozen=True)
+class GeoReference:
+    """What a map says of where on the Earth it is.
+
+    Parameters
+    ----------
+    projection : str
+        As the map gives it; empty where it gives none.
+    header_offset : (4,) float
+        To be added to map coordinates x, y, z (metres) for projected ones, and a heading (radians).
+    """
+
+    projection: str = ""
+    header_offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def mercator(self) -> TransverseMercator | None:
+        """The projection; None where it is not known, or the header turns the map."""
+        return None if self.header_offset[3] else projection(self.projection)
+
+    def projected(self, points: Float) -> Float:
+        """Return easting, northing and height, metres, of points (n, 3) in map coordinates, which no heading turns."""
+        moved: Float = points + np.array(self.header_offset[:3])
+        return moved
+
+    def geographic(self, points: Float) -> Float | None:
+        """Return where on WGS 84 points of the map are.
+
+        Parameters
+        ----------
+        points : (n, 3) float64, metres
+            Map coordinates.
+
+        Returns
+        -------
+        (n, 3) float64 or None
+            Longitude and latitude, degrees, and the height above the map's zero, metres; None where the projection is
+            not known.
+        """
+        mercator = self.mercator
+        if mercator is None:
+            return None
+        easting, northing, height = self.projected(points).T
+        latitude, longitude = mercator.inverse(easting, northing)
+        return np.column_stack([np.degrees(longitude), np.degrees(latitude), height])
+
+    @property
+    def obstacle(self) -> str:
+        """Why places have no latitude and longitude, as a sentence's part; empty where they have them."""
+        if self.mercator is not None:
+            return ""
+        if not self.projection:
+            return "the scene's map names no projection"
+        if self.header_offset[3] and projection(self.projection) is not None:
+            return "the header of the scene's map turns its coordinates"
+        return f"the projection of the scene's map, {self.projection!r}, is none that is known"
+
+
+def _tangent_of_latitude(conformal: Float) -> Float:
+    """Return the tangent of the latitude (n,), given that of the conformal latitude; after Karney (2011), eq. 19-21."""
+    squared = _ECCENTRICITY**2
+    tangent = conformal / (1 - squared)
+    for _ in range(_NEWTON_STEPS):
+        secant = np.hypot(1.0, tangent)
+        sigma = np.sinh(_ECCENTRICITY * np.arctanh(_ECCENTRICITY * tangent / secant))
+        reached = tangent * np.hypot(1.0, sigma) - sigma * secant
+        slope = (1 - squared) * secant / (1 + (1 - squared) * tangent**2)
+        tangent = tangent + (conformal - reached) / (np.hypot(1.0, reached) * slope)
+    return tangent
 
 
 def projection(geo_reference: str | None) -> TransverseMercator | None:

@@ -26,7 +26,14 @@ MAX_LABELLED = 40  # more sensors than these get no labels on the picture
 
 
 def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
-    """Write a figure as PNG; the same figure gives the same bytes.
+    """Write a figure as PNG; see `as_png`."""
+    content = as_png(figure)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def as_png(figure: Figure) -> bytes:
+    """Return a figure as PNG; the same figure gives the same bytes.
 
     A palette of the 256 colours that stand for all others makes a file a third to a fifth as large.
     """
@@ -34,8 +41,9 @@ def save_png(path: str | os.PathLike[str], figure: Figure) -> None:
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
     # Octrees keep rare colours, which here carry meaning; the median cut would mix them with frequent ones.
     picture = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    with whole_file(path) as temporary:
-        picture.save(temporary, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+    content = io.BytesIO()
+    picture.save(content, format="PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
+    return content.getvalue()
 
 
 def draw_polygons(axes: Axes, polygons: Iterable[Float], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
@@ -77,7 +85,7 @@ def draw_sensors(
     """
     if 0 < len(points) <= MAX_LABELLED:
         words = [f"{s.label}  {s.model.key} · {s.height:.3g} m{s.turned}" for s in deployment.sensors]
-        _draw_callouts(axes, points, words, road, zorder - 0.5)
+        draw_callouts(axes, points, words, road, zorder - 0.5)
     markers = markers_of(deployment)
     hidden = np.zeros(len(points), dtype=bool) if hidden is None else hidden
     for sensor, point, behind in zip(deployment.sensors, points, hidden, strict=True):
@@ -112,7 +120,8 @@ def percent(share: float) -> str:
     return f"{min(share, 1.0 if share == 1.0 else 0.999):.1%}"
 
 
-def _draw_callouts(axes: Axes, points: Float, words: list[str], road: Float, zorder: float) -> None:
+def draw_callouts(axes: Axes, points: Float, words: list[str], road: Float, zorder: float) -> None:
+    """Write words next to points (k, 2), in data coordinates, off the road (t, 2) and each other where they can be."""
     boxed = {"boxstyle": f"round,pad={LABEL_PADDING}", "facecolor": PAPER, "edgecolor": SOFT_INK, "linewidth": 0.6}
     texts = [
         axes.text(0, 0, label, ha="center", va="center", size=LABEL_SIZE, color=INK, bbox=boxed, zorder=zorder)

@@ -8,7 +8,7 @@ import numpy as np
 from ..arrays import Boolean, Float, Integer
 from ..geometry.orientation import describe_turn, orientation
 from ..lidar import LidarModel
-from ..site.site import Site
+from ..site.site import Candidates, Site
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +43,8 @@ class Sensor:
         Share of the targets that it alone sees: what is lost without it.
     roll : float, radians
         How far it is rolled about its azimuth zero; only a hand does that.
+    installation : float, dollars, optional
+        What it costs to install it there; None where prices are those of sensors alone.
     """
 
     label: str
@@ -59,6 +61,12 @@ class Sensor:
     added: float = 0.0
     marginal: float = 0.0
     roll: float = 0.0
+    installation: float | None = None
+
+    @property
+    def price(self) -> float:
+        """Its price in dollars: installed where that is counted."""
+        return self.model.price + (self.installation or 0.0)
 
     @property
     def orientation(self) -> Float:
@@ -90,6 +98,8 @@ class Deployment:
     weighted : float
         Share of the targets' weight that is seen.
     price : float, dollars
+    rows : (k, t) bool
+        What each of them sees.
     """
 
     sensors: tuple[Sensor, ...]
@@ -99,6 +109,14 @@ class Deployment:
     central: float | None
     weighted: float
     price: float
+    rows: Boolean
+
+
+def pose_prices(candidates: Candidates, models: Mapping[str, LidarModel]) -> Float:
+    """Return what a sensor at each candidate pose costs (c,), in dollars: installed where that is counted."""
+    prices = np.array([models[key].price for key in candidates.sensor])
+    installation = candidates.installation
+    return prices if installation is None else prices + installation[candidates.position_of]
 
 
 def deploy(
@@ -142,7 +160,8 @@ def deployment_of(site: Site, mounted: Sequence[Sensor], rows: Boolean) -> Deplo
         seen_twice=_share(seen_by > 1),
         central=_share(seen[targets.central]) if targets.central.any() else None,
         weighted=weighted_share(seen, targets.weight),
-        price=float(sum(sensor.model.price for sensor in sensors)),
+        price=float(sum(sensor.price for sensor in sensors)),
+        rows=rows,
     )
 
 
@@ -180,6 +199,7 @@ def sensor_at(site: Site, models: Mapping[str, LidarModel], label: str, pose: in
         height=float(candidates.height[pose]),
         yaw=float(candidates.yaw[pose]),
         tilt=float(candidates.tilt[pose]),
+        installation=None if candidates.installation is None else float(candidates.installation[position]),
     )
 
 

@@ -15,7 +15,7 @@ from ..progress import Progress
 from ..settings import setting
 from ..site.site import Candidates, Site
 from . import Placement, PlacementProblem, cheapest_for_coverage, solve, solve_greedy
-from .deployment import Deployment, deploy
+from .deployment import Deployment, deploy, pose_prices
 from .search_limits import DEFAULT_LIMITS, SolverLimits
 
 DEFAULT_COUNT = 4  # sensors to place where neither a number nor a budget nor a coverage is asked for: the study's four
@@ -163,7 +163,7 @@ def placement_problem(
     return PlacementProblem(
         visible=visible,
         weights=target_weights(site, objective),
-        prices=np.array([models[key].price for key in candidates.sensor]),
+        prices=pose_prices(candidates, models),
         positions=candidates.position_of,
         xyz=candidates.xyz,
         labels=candidates.sensor,

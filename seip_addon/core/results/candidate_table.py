@@ -66,7 +66,7 @@ def _place(sensor: Sensor, site: Site, source: str) -> tuple[object, ...]:
         *(f"{value:.3f}" for value in sensor.xyz + site.origin),
         f"{degrees(sensor.yaw):.3f}",
         f"{tilt_degrees(sensor.tilt):.3f}",
-        f"{sensor.model.price:.2f}",
+        f"{sensor.price:.2f}",
     )
 
 

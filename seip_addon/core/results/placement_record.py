@@ -19,6 +19,7 @@ import numpy as np
 from ..arrays import Float
 from ..errors import SeipError
 from ..geometry.orientation import orientation
+from ..opendrive.geo_reference import GeoReference
 from ..placement import Placement
 from ..placement.deployment import Sensor
 from ..placement.objective import Objective, Solution, certificate
@@ -70,11 +71,24 @@ def relevant_warnings(warnings: Iterable[str], considered: Iterable[str], chosen
 
 
 @dataclass(frozen=True)
+class RecordedGeoReference:
+    """What the scene's map says of where on the Earth it is: see `GeoReference`."""
+
+    projection: str
+    header_offset_m: Point
+    header_heading_deg: float
+
+
+@dataclass(frozen=True)
 class RecordedSite:
-    """A scene, and the map coordinates of its local origin."""
+    """A scene, the map coordinates of its local origin, and what its map says of where that is.
+
+    Records of earlier versions hold no ``geo_reference``.
+    """
 
     name: str
     origin_m: Point
+    geo_reference: RecordedGeoReference | None = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +103,10 @@ class RecordedSensor:
         Its type's key in the catalogue.
     roll_deg : float, optional
         Of a sensor that a hand has put elsewhere, and of no other.
+    latitude_deg, longitude_deg, altitude_m : float, optional
+        On WGS 84, and the height above the map's zero; None where the map's projection is not known.
+    installation_usd : float, optional
+        Of the price, what it takes to install the sensor; None where prices are those of sensors alone.
     """
 
     id: str
@@ -107,6 +125,10 @@ class RecordedSensor:
     coverage_added: float
     coverage_marginal: float
     roll_deg: float | None = None
+    latitude_deg: float | None = None
+    longitude_deg: float | None = None
+    altitude_m: float | None = None
+    installation_usd: float | None = None
 
     @property
     def orientation(self) -> Float:
@@ -231,7 +253,7 @@ class PlacementRecord:
 
     def as_json(self) -> dict[str, Any]:
         """Return the value of ``placement.json``, its keys in order."""
-        return {"schema": SCHEMA, **asdict(self, dict_factory=_without_absent_roll)}
+        return {"schema": SCHEMA, **asdict(self, dict_factory=_without_absent)}
 
     def text(self) -> str:
         """Return the record in one line of JSON, for `parsed_record`."""
@@ -260,8 +282,8 @@ def placement_record(
     """
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
     return PlacementRecord(
-        site=RecordedSite(site.name, _metres(site.origin)),
-        sensors=tuple(_sensor(sensor, site.origin) for sensor in deployment.sensors),
+        site=RecordedSite(site.name, _metres(site.origin), _geo_reference(site.geo_reference)),
+        sensors=tuple(_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=_rounded(deployment.price, 2),
         coverage=RecordedCoverage(
             whole=_share(deployment.coverage),
@@ -353,11 +375,24 @@ def _finite(text: str) -> float:
     return value
 
 
-def _without_absent_roll(items: list[tuple[str, Any]]) -> dict[str, Any]:
-    return {name: value for name, value in items if name != "roll_deg" or value is not None}
+def _without_absent(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: value for name, value in items if name not in _LEFT_OUT or value is not None}
 
 
-def _sensor(sensor: Sensor, origin: Float) -> RecordedSensor:
+_LEFT_OUT = {"roll_deg", "installation_usd"}  # of a sensor, where it has none
+
+
+def _geo_reference(known: GeoReference) -> RecordedGeoReference | None:
+    if not known.projection:
+        return None
+    return RecordedGeoReference(
+        known.projection, _metres(np.array(known.header_offset[:3])), tilt_degrees(known.header_offset[3])
+    )
+
+
+def _sensor(sensor: Sensor, site: Site) -> RecordedSensor:
+    place = site.geographic(sensor.xyz[None])
+    longitude, latitude, altitude = (None, None, None) if place is None else place[0]
     return RecordedSensor(
         id=sensor.label,
         pose=sensor.pose,
@@ -366,15 +401,19 @@ def _sensor(sensor: Sensor, origin: Float) -> RecordedSensor:
         position=sensor.position_name,
         on_pole=sensor.on_pole,
         local_m=_metres(sensor.xyz),
-        map_m=_metres(sensor.xyz + origin),
+        map_m=_metres(sensor.xyz + site.origin),
         height_m=_rounded(sensor.height, 6),
         yaw_deg=degrees(sensor.yaw),
         tilt_deg=tilt_degrees(sensor.tilt),
-        price_usd=_rounded(sensor.model.price, 2),
+        price_usd=_rounded(sensor.price, 2),
         coverage_alone=_share(sensor.alone),
         coverage_added=_share(sensor.added),
         coverage_marginal=_share(sensor.marginal),
         roll_deg=tilt_degrees(sensor.roll) if sensor.pose is None else None,
+        latitude_deg=None if latitude is None else _rounded(latitude, 8),
+        longitude_deg=None if longitude is None else _rounded(longitude, 8),
+        altitude_m=None if altitude is None else _rounded(altitude, 6),
+        installation_usd=None if sensor.installation is None else _rounded(sensor.installation, 2),
     )
 
 

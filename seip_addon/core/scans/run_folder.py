@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import LidarModel
+from ..opendrive.geo_reference import GeoReference
 from ..progress import Progress
 from ..storage.files import digest, save_json
 from ..storage.source_digest import source_digest
@@ -46,6 +47,8 @@ class Run:
         With the engine's own name, not ``auto``.
     versions : mapping of str to str
         Of this program and what it stands on.
+    geo_reference : GeoReference
+        Where on the Earth the map is; frames do not follow from it, datasets may.
     """
 
     static: StaticScene
@@ -56,6 +59,7 @@ class Run:
     times: Float
     settings: ScanSettings
     versions: Mapping[str, str]
+    geo_reference: GeoReference = field(default_factory=GeoReference)
 
     @property
     def key(self) -> str:

@@ -231,6 +231,8 @@ class Candidates:
         Names of those groups.
     dropped : dict of str to int
         How many positions or poses were dropped, by reason.
+    installation : (p,) float64, dollars, optional
+        What it costs to install a sensor at each position; None where prices are those of sensors alone.
     """
 
     position: Float
@@ -246,6 +248,7 @@ class Candidates:
     mandatory: Boolean
     mandatory_name: Text
     dropped: dict[str, int]
+    installation: Float | None = None
 
     def __len__(self) -> int:
         """Return the number of poses."""

@@ -10,6 +10,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..opendrive.geo_reference import GeoReference
 
 DEFAULT_WEIGHT = 2.0
 """Of a weighted region that does not say its own."""
@@ -123,6 +124,10 @@ class SceneGeometry:
         Where a new post may stand, in plan.
     poles : tuple of Pole
         Existing posts that can carry a sensor.
+    geo_reference : GeoReference
+        Where on the Earth the scene's map is.
+    places : tuple of NamedArea
+        Streets and crossings of the map, in plan: results name them, and nothing else depends on them.
     """
 
     name: str
@@ -136,3 +141,5 @@ class SceneGeometry:
     forbidden_areas: tuple[NamedArea, ...] = ()
     mandatory_areas: tuple[NamedArea, ...] = ()
     poles: tuple[Pole, ...] = ()
+    geo_reference: GeoReference = field(default_factory=GeoReference)
+    places: tuple[NamedArea, ...] = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from shapely.geometry.base import BaseGeometry
@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from ..arrays import Float
 from ..errors import SeipError
 from ..lidar import LidarModel
+from ..opendrive.geo_reference import GeoReference
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined, ordered_surfaces
@@ -37,6 +38,8 @@ class Site:
         All static surfaces that a ray which counts can end on, roads included.
     reflectivity : (n,) float64, 0 to 1
         Of each.
+    geo_reference : GeoReference
+        Where on the Earth the scene's map is.
     """
 
     name: str
@@ -46,6 +49,14 @@ class Site:
     candidates: Candidates
     triangles: Float
     reflectivity: Float
+    geo_reference: GeoReference = field(default_factory=GeoReference)
+
+    def geographic(self, points: Float) -> Float | None:
+        """Return longitude, latitude (degrees, WGS 84) and height above the map's zero of local points, all (n, 3).
+
+        None where the map's projection is not known.
+        """
+        return self.geo_reference.geographic(points + self.origin)
 
 
 def make_site(
@@ -91,4 +102,5 @@ def make_site(
         candidates=with_yaws(candidates, models, settings.yaws, geometry.region, targets.xyz),
         triangles=triangles,
         reflectivity=reflectivity,
+        geo_reference=geometry.geo_reference,
     )

@@ -121,7 +121,7 @@ def _object(placed: PlacedObject, number: int, carriageway: BaseGeometry) -> tup
         return tuple(part for outline in placed.outlines for part in _outlined(placed, outline, name, number))
     if size <= 0 or placed.height < MIN_HEIGHT:
         return ()
-    base = _footprint(placed) + placed.position
+    base = footprint(placed) + placed.position
     return _block(placed, name, number, base, np.full(len(base), placed.height))
 
 
@@ -167,7 +167,7 @@ def _middle(placed: PlacedObject) -> Float:
     return placed.outlines[0].base.mean(axis=0) if placed.outlines else placed.position
 
 
-def _footprint(placed: PlacedObject) -> Float:
+def footprint(placed: PlacedObject) -> Float:
     """Return the corners (k, 3) of an object's box or cylinder about its position."""
     if placed.radius > 0:
         angle = np.arange(8) * (math.tau / 8)

@@ -15,7 +15,7 @@ from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, place
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.provenance import ProvenanceRow, provenance
-from ..site.scene_geometry import ASSUMED, DESCRIBED
+from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
 from . import road_surface, street_furniture
 from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
@@ -34,6 +34,7 @@ from .map_furniture import (
     pole_part,
     tree_part,
 )
+from .named_places import named_places
 from .parts import Part, Role
 from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
@@ -89,6 +90,8 @@ class SiteModel:
         What was assumed because the map does not say it, a sentence each.
     warnings : tuple of str
         Reasons to distrust results of the scene, one sentence each.
+    places : tuple of NamedArea
+        Streets and crossings of the map in the region, local axes.
     """
 
     name: str
@@ -99,6 +102,7 @@ class SiteModel:
     region: BaseGeometry
     notes: tuple[str, ...]
     warnings: tuple[str, ...] = ()
+    places: tuple[NamedArea, ...] = ()
 
     def provenance(self) -> tuple[ProvenanceRow, ...]:
         """Count what is there by kind and source; what is there to be looked at alone does not count."""
@@ -198,6 +202,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         region=street.region,
         notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
         warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
+        places=named_places(street.lanes, {road.id: road.name for road in road_map.roads}, placed, street.region),
     )
 
 

@@ -13,19 +13,21 @@ import numpy as np
 from ..errors import SeipError
 from ..lidar import CarlaDropoff, LidarModel, find_models, load_catalogue
 from ..placement import Placement
-from ..placement.deployment import deploy
+from ..placement.deployment import deploy, pose_prices
 from ..placement.integer_program import check_solver
 from ..placement.near_optimal import near_optimal_set
 from ..placement.objective import Objective, Solution, optimise, placement_problem, target_weights
 from ..placement.search_limits import SolverLimits
 from ..progress import Progress
 from ..results.headings import tilt_degrees
+from ..results.located import LOCATED_FILES, missing_sentence
 from ..results.placement_record import PlacementRecord, Provenance, placement_record
 from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
 from ..site.candidates import CandidateSettings, assumed_pole_warnings
 from ..site.far_objects import without_far_objects
+from ..site.installed_cost import InstalledCost
 from ..site.obstruction import bareness_warnings
 from ..site.scene_geometry import SceneGeometry
 from ..site.site import Site, make_site
@@ -62,6 +64,8 @@ class SurveySettings:
         For each answer.
     effort : float, units of work
         Alike, but counted, so that an answer can be had again: see `placement.solve`.
+    installed_cost : InstalledCost, optional
+        Counted in every price where it is given; else prices are those of sensors alone.
     spacings_because : str
         Why the spacings of targets and candidates are what they are; empty where the user chose them.
     """
@@ -80,6 +84,7 @@ class SurveySettings:
         "for each answer, in counted work, a unit about a second of a core: the same answer again",
         metavar="UNITS",
     )
+    installed_cost: InstalledCost | None = None
     spacings_because: str = ""
 
     def models(self) -> dict[str, LidarModel]:
@@ -119,6 +124,7 @@ class SurveySettings:
             "catalogue": [path.name for path in self.catalogue],
             "engine": self.engine,
             "solver": self.solver,
+            "installed_cost": self.installed_cost and asdict(self.installed_cost),
             "spacings_because": self.spacings_because,
             **limits,
         }
@@ -172,6 +178,9 @@ def lay_out(geometry: SceneGeometry, settings: SurveySettings, warnings: Sequenc
     models = settings.models()
     geometry = settings.weather.over(geometry)
     site = make_site(geometry, settings.candidates, settings.grid_spacing, settings.reach(), models)
+    if settings.installed_cost is not None:
+        candidates = settings.installed_cost.over(site.candidates, settings.candidates.bracket)
+        site = replace(site, candidates=candidates)
     near, far = without_far_objects(geometry, geometry.region, settings.reach())
     limits = (
         *far,
@@ -215,10 +224,9 @@ def inputs_of(layout: Layout) -> dict[str, str]:
     Two layouts with the same digests have the same answers to the same objective.
     """
     targets, candidates = layout.site.targets, layout.site.candidates
-    prices = np.array([layout.models[key].price for key in candidates.sensor])
     site = digest(
         *(targets.weight, targets.central, candidates.position_name, candidates.position_of),
-        *(candidates.mandatory, candidates.mandatory_name, prices),
+        *(candidates.mandatory, candidates.mandatory_name, pose_prices(candidates, layout.models)),
     )
     return {"visibility": grid_key(layout), "site": site}
 
@@ -292,9 +300,11 @@ def record_of(
         (see `place`), the settings of ``robustness`` or of ``traffic`` that the solution was chosen with.
     """
     objective = {"goal": asdict(solution.objective), "pose_errors": False, "render": False}
+    missing = missing_sentence(survey.site, LOCATED_FILES)
+    notes = (*solution.placement.notes, *([missing] if missing else []))
     return placement_record(
         survey.site,
-        solution,
+        replace(solution, placement=replace(solution.placement, notes=notes)),
         provenance,
         settings={**survey.settings.as_record(), **objective, **asked},
         inputs=inputs_of(survey) | {"visibility": survey.grid.key},

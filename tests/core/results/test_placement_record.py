@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive.geo_reference import GeoReference
 from seip_addon.core.placement import Placement
 from seip_addon.core.placement.objective import MOVED, Objective, Solution
 from seip_addon.core.results.placement_record import (
@@ -28,6 +29,7 @@ from tests.json_schema import violations
 from tests.small_junction import Example, make_example
 
 GOAL = Objective(count=3, central_weight=2.5, forbidden=("pole 1",))
+LEFT_OUT = ("roll_deg", "installation_usd")  # of sensors that have none
 SCHEMA = json.loads((Path(__file__).parents[3] / "docs" / "placement.schema.json").read_text(encoding="utf-8"))
 
 
@@ -64,10 +66,16 @@ def make_record(example, run, **changes) -> PlacementRecord:
     return placement_record(example.site, Solution(GOAL, best, greedy, example.deployment), **run)
 
 
+def located(example) -> Example:
+    """Return the junction in UTM zone 32."""
+    place = GeoReference("EPSG:32632", (-4_500_000.0, 5_300_000.0, 400.0, 0.0))
+    return replace(example, site=replace(example.site, geo_reference=place))
+
+
 def made_by_hand(example, run) -> PlacementRecord:
     """Return the record of sensors of which a hand has turned the first."""
     first, *others = example.deployment.sensors
-    turned = replace(first, pose=None, tilt=math.radians(-12.5), roll=math.radians(3.0))
+    turned = replace(first, pose=None, tilt=math.radians(-12.5), roll=math.radians(3.0), installation=1500.0)
     deployment = replace(example.deployment, sensors=(turned, *others))
     moved = solution([sensor.pose for sensor in others], objective=512.0, bound=math.nan, gap=math.inf, status=MOVED)
     return placement_record(example.site, Solution(GOAL, moved, None, deployment), **run)
@@ -83,7 +91,7 @@ def record(example, run, request) -> PlacementRecord:
 @pytest.fixture
 def whole(example, run) -> dict:
     """Return a record with all that one can hold, as JSON."""
-    by_hand = made_by_hand(example, run)
+    by_hand = made_by_hand(located(example), run)
     return content_of(replace(by_hand, sensors=by_hand.sensors[:1], greedy=make_record(example, run).greedy))
 
 
@@ -146,8 +154,8 @@ def test_the_keys_are_in_the_order_of_the_schema(record):
     content = content_of(record)
     assert list(content) == list(SCHEMA["properties"])
     for sensor in content["sensors"]:
-        named = SCHEMA["properties"]["sensors"]["items"]["required"]
-        assert list(sensor) == [*named, *(["roll_deg"] if sensor["pose"] is None else [])]
+        named = SCHEMA["properties"]["sensors"]["items"]["properties"]
+        assert list(sensor) == [name for name in named if name not in LEFT_OUT or sensor["pose"] is None]
 
 
 def test_a_sensor_is_turned_as_it_hangs(example, run):
@@ -187,7 +195,9 @@ def test_a_part_of_another_type_is_refused(whole, value):
         if sentence:
             assert re.fullmatch(r"the placement that this scene keeps .*; place the sensors again.*", sentence)
         elif violations(changed, SCHEMA):
-            assert is_open(place) or (place[-1], value) in {("status", "text"), ("roll_deg", None)}, place
+            assert is_open(place) or (place[-1], value) in {("status", "text"), *((name, None) for name in LEFT_OUT)}, (
+                place
+            )
 
 
 def test_a_text_that_no_file_can_hold_is_refused(record):
@@ -231,6 +241,38 @@ def test_map_coordinates_are_local_ones_plus_the_origin_to_the_micrometre(exampl
         assert np.allclose(np.subtract(entry.map_m, entry.local_m), example.site.origin, atol=2e-6, rtol=0)
         assert entry.local_m == pytest.approx(sensor.xyz.tolist(), abs=1e-6)
         assert entry.position == example.site.candidates.position_name[example.site.candidates.position_of[sensor.pose]]
+
+
+def test_latitude_and_longitude_are_those_of_the_map_and_its_header(example, run):
+    there = located(example)
+    record = make_record(there, run)
+    place = there.site.geo_reference
+    assert record.site.geo_reference.projection == "EPSG:32632"
+    assert record.site.geo_reference.header_offset_m == (-4_500_000.0, 5_300_000.0, 400.0)
+    for entry in record.sensors:
+        projected = place.mercator(math.radians(entry.latitude_deg), math.radians(entry.longitude_deg))
+        assert projected == pytest.approx(np.add(entry.map_m, place.header_offset[:3])[:2].tolist(), abs=2e-3)
+        assert entry.altitude_m == pytest.approx(entry.map_m[2] + 400.0, abs=1e-6)
+        assert entry.latitude_deg == round(entry.latitude_deg, 8)
+    assert violations(content_of(record), SCHEMA) == []
+
+
+def test_without_a_known_projection_there_is_no_latitude(example, run):
+    for place in (GeoReference(), GeoReference("+proj=merc"), GeoReference("EPSG:32632", (0.0, 0.0, 0.0, 0.5))):
+        record = make_record(replace(example, site=replace(example.site, geo_reference=place)), run)
+        assert {entry.latitude_deg for entry in record.sensors} == {None}
+        assert (record.site.geo_reference is None) == (not place.projection)
+        assert violations(content_of(record), SCHEMA) == []
+
+
+def test_a_record_of_before_there_were_latitudes_is_read(example, run):
+    content = content_of(make_record(example, run))
+    del content["site"]["geo_reference"]
+    for sensor in content["sensors"]:
+        for name in ("latitude_deg", "longitude_deg", "altitude_m"):
+            del sensor[name]
+    assert violations(content, SCHEMA) == []
+    assert parsed_record(json.dumps(content)) == parsed_record(make_record(example, run).text())
 
 
 def test_the_same_run_gives_the_same_bytes_but_for_times_and_versions(example, run, tmp_path):

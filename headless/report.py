@@ -1,0 +1,44 @@
+"""Write a report on a placement: one page of HTML and a PDF, for those who decide on it.
+
+python -m headless.report out/
+blender -b --python-exit-code 1 -P headless/report.py -- out/
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import runtime
+from headless.options import new_parser
+
+from seip_addon.core.report.evidence import load_evidence
+from seip_addon.core.report.write import EFFORT, write_report
+
+
+def main(argv: list[str]) -> None:
+    """Write the report into the folder of the placement."""
+    options = _parser().parse_args(argv)
+    load_evidence(options.folder)  # refuses a folder that is none of a placement before it is locked
+    runtime.check_folder(options.folder)
+    for path in runtime.finish_with_bar(write_report(options.folder, options.effort)):
+        runtime.print_line(str(path))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("report", "Write a report on a placement into its folder, as HTML and PDF.")
+    parser.add_argument("folder", type=Path, help="the folder that `seip place` has written")
+    parser.add_argument(
+        "--effort",
+        type=float,
+        default=EFFORT,
+        metavar="UNITS",
+        help="counted work, a unit about a second of a core, for each other number of sensors; 0 leaves them out",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    runtime.run(main)

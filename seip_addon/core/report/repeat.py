@@ -1,0 +1,85 @@
+"""The command that repeats a placement, from what its record holds."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from ..placement.objective import Objective
+from ..results.placement_record import PlacementRecord
+from ..settings import settings_of
+from ..site.candidates import CandidateSettings
+from ..site.installed_cost import load_installed_cost
+from ..visibility.settings import VisibilitySettings
+
+DEFAULT_GRID, DEFAULT_TIME = 1.0, 60.0  # metres, seconds: of `SurveySettings`
+
+
+def repeating_command(record: PlacementRecord) -> str:
+    """Return what to type in the folder of a result to have it again; empty where no one command makes it."""
+    settings: Mapping[str, Any] = record.settings
+    if record.objective.solver == "none" or "robustness" in settings or "traffic" in settings:
+        return ""
+    words = ["seip", "place", "placed.blend", *_of_candidates(settings), *_of_survey(settings)]
+    words += _options(VisibilitySettings, settings.get("visibility", {}))
+    words += _of_goal(settings["goal"])
+    words += ["--pose-errors"] if settings.get("pose_errors") else []
+    words += [] if settings.get("render") else ["--no-render"]
+    return shlex.join([*words, "-o", "again"])
+
+
+def _of_candidates(settings: Mapping[str, Any]) -> Iterator[str]:
+    candidates = dict(settings["candidates"])
+    if "tilts_deg" in candidates:
+        candidates["tilts"] = candidates.pop("tilts_deg")
+    yield from _options(CandidateSettings, candidates)
+
+
+def _of_goal(goal: Mapping[str, Any]) -> Iterator[str]:
+    values = dict(goal)
+    if values.get("central_weight") == "scene":
+        del values["central_weight"]
+        yield "--weighted"
+    yield from _options(Objective, values)
+
+
+def _of_survey(settings: Mapping[str, Any]) -> Iterator[str]:
+    if settings.get("grid_spacing_m", DEFAULT_GRID) != DEFAULT_GRID:
+        yield from ("--grid", f"{settings['grid_spacing_m']:.12g}")
+    for name in ("engine", "solver"):
+        if settings.get(name, "auto") != "auto":
+            yield from (f"--{name}", str(settings[name]))
+    if settings.get("time_limit_s", DEFAULT_TIME) != DEFAULT_TIME:
+        yield from ("--time-limit", f"{settings['time_limit_s']:.12g}")
+    if "effort" in settings:
+        yield from ("--effort", f"{settings['effort']:.12g}")
+    for name in ("catalogue", "reflectivity"):
+        if settings.get(name):
+            yield from (f"--{name}", *map(str, settings[name]))
+    weather = settings.get("weather", {})
+    said = [f"{name}={weather[name]:.12g}" for name in ("rain", "visibility") if weather.get(name)]
+    said += ["wet"] if weather.get("wet_road") else []
+    if said:
+        yield from ("--weather", *said)
+    cost = settings.get("installed_cost")
+    if cost:
+        shipped = cost == asdict(load_installed_cost())
+        yield from ("--installed-cost", *([] if shipped else ["costs.toml"]))
+
+
+def _options(kind: type, values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the options that set what differs from the defaults of a settings class."""
+    for name, (about, default) in settings_of(kind).items():
+        value = values.get(name, default)
+        given = list(value) if isinstance(value, list | tuple) else value
+        if given == (list(default) if isinstance(default, tuple) else default):
+            continue
+        yield f"--{about.option or name.replace('_', '-')}"
+        if not isinstance(given, bool):
+            yield from (_typed(one) for one in (given if isinstance(given, list) else [given]))
+
+
+def _typed(value: object) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,97 @@
+"""Installed costs: what posts, mounting, power and backhaul add to the price of a sensor, at one place."""
+
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.placement.deployment import deploy, pose_prices
+from seip_addon.core.placement.objective import Objective, optimise, placement_problem
+from seip_addon.core.progress import finish
+from seip_addon.core.site.installed_cost import DEFAULTS, load_installed_cost
+from tests.small_junction import Example, make_example
+
+
+@pytest.fixture(scope="module")
+def example() -> Example:
+    return make_example()
+
+
+def counted(example, cost, bracket=0.4) -> Example:
+    return replace(example, site=replace(example.site, candidates=cost.over(example.site.candidates, bracket)))
+
+
+def test_the_shipped_table_is_complete_and_plausible():
+    cost = load_installed_cost()
+    assert load_installed_cost(DEFAULTS) == cost
+    assert all(value >= 0 for value in asdict(cost).values())
+    assert cost.new_post_usd > cost.existing_pole_usd
+
+
+def test_each_price_is_the_sensor_and_its_place(example):
+    cost = load_installed_cost()
+    there = counted(example, cost)
+    candidates = there.site.candidates
+    on_pole = candidates.on_pole[candidates.position_of]
+    added = pose_prices(candidates, example.models) - pose_prices(example.site.candidates, example.models)
+    at_pole = cost.existing_pole_usd + cost.power_existing_pole_usd + cost.backhaul_usd
+    at_post = cost.new_post_usd + cost.power_new_post_usd + cost.backhaul_usd
+    assert set(added[on_pole]) == {at_pole}
+    assert set(added[~on_pole]) == {at_post}
+    arms = counted(example, cost, bracket=cost.mast_arm_beyond_m + 0.1).site.candidates
+    assert set(arms.installation[arms.on_pole]) == {at_pole + cost.mast_arm_usd}
+    assert set(arms.installation[~arms.on_pole]) == {at_post}
+
+
+def test_the_problem_and_the_deployment_count_the_same_prices(example):
+    there = counted(example, load_installed_cost())
+    problem = placement_problem(there.site, example.visible, example.models, Objective(count=3))
+    chosen = [sensor.pose for sensor in example.deployment.sensors]
+    deployment = deploy(there.site, example.models, example.visible, chosen)
+    assert deployment.price == pytest.approx(math.fsum(problem.prices[chosen]))
+    for sensor in deployment.sensors:
+        assert sensor.price == sensor.model.price + sensor.installation == problem.prices[sensor.pose]
+    assert all(sensor.installation is None for sensor in example.deployment.sensors)
+
+
+def test_a_budget_buys_less_and_moves_to_poles_that_are_there(example):
+    budget = Objective(budget=30_000.0)
+    bare = finish(optimise(example.site, example.visible, example.models, budget))
+    there = counted(example, replace(load_installed_cost(), new_post_usd=20_000.0))
+    installed = finish(optimise(there.site, example.visible, example.models, budget))
+    assert installed.deployment.price <= 30_000.0
+    assert len(installed.deployment.sensors) < len(bare.deployment.sensors)
+    assert all(sensor.on_pole for sensor in installed.deployment.sensors)
+
+
+def test_a_table_of_one_s_own_changes_what_it_names(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("new_post_usd = 9_000\n", encoding="utf-8")
+    assert load_installed_cost(path) == replace(load_installed_cost(), new_post_usd=9000.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("post = 3", "has the key 'post', which no installed cost has; there are new_post_usd, "),
+        ("backhaul_usd = -1", "backhaul_usd in .* must be a number from 0 to 1e.09, not -1"),
+        ("backhaul_usd = true", "not True"),
+        ("backhaul_usd = nan", "not nan"),
+        ('backhaul_usd = "much"', "not 'much'"),
+        ("backhaul_usd", "are no TOML"),
+    ],
+)
+def test_a_mistake_has_its_sentence(tmp_path, text, says):
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SeipError, match=says):
+        load_installed_cost(path)
+    with pytest.raises(SeipError, match="cannot read the installed costs"):
+        load_installed_cost(tmp_path / "nowhere.toml")
+
+
+def test_without_costs_nothing_is_added(example):
+    prices = np.array([example.models[key].price for key in example.site.candidates.sensor])
+    np.testing.assert_array_equal(pose_prices(example.site.candidates, example.models), prices)

@@ -1,0 +1,111 @@
+"""The report command: from a scene that knows where on the Earth it is to a page that can be sent."""
+
+import json
+import shlex
+
+from headless import place, report
+from headless import survey as surveys
+from headless.options import read_objective
+
+import bpy
+import pytest
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.report.repeat import repeating_command
+from seip_addon.core.results.placement_record import comparable, load_placement_record
+from seip_addon.scene import contract
+from seip_addon.scene.blend_file import open_blend, save_blend
+
+QUICK = ["--sensor", "type1", "--heights", "3.5", "--grid", "4", "--spacing", "16", "--no-render"]
+RULES = ["--count", "2", "--forbid", "signal pole 1", "--min-distance", "5", "--weighted", "--installed-cost"]
+
+
+@pytest.fixture(scope="module")
+def folder(small_scene, tmp_path_factory):
+    """The small junction in UTM zone 32, placed with rules and installed costs."""
+    made = tmp_path_factory.mktemp("located")
+    open_blend(small_scene)
+    scene = bpy.context.scene
+    scene[contract.GEO_REFERENCE] = "+proj=utm +zone=32 +datum=WGS84"
+    scene[contract.HEADER_OFFSET] = [-4_500_000.0, 5_300_000.0, 0.0, 0.0]
+    scene[contract.PLACES] = json.dumps([["Mill Lane", "POLYGON ((-36 -7, -7 -7, -7 7, -36 7, -36 -7))"]])
+    save_blend(made / "located.blend")
+    place.main([str(made / "located.blend"), "-o", str(made / "out"), *QUICK, *RULES])
+    return made / "out"
+
+
+def test_a_report_is_written_and_named(folder, capsys):
+    report.main([str(folder), "--effort", "0.2"])
+    assert capsys.readouterr().out.split() == [str(folder / "report.html"), str(folder / "report.pdf")]
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Mill Lane" in page
+    assert "Prices are of installed sensors" in page
+
+
+def test_the_record_and_the_maps_agree(folder):
+    record = load_placement_record(folder / "placement.json")
+    features = json.loads((folder / "placement.geojson").read_text(encoding="utf-8"))["features"]
+    points = [one["geometry"]["coordinates"] for one in features if one["properties"]["kind"] == "sensor"]
+    assert points == [[one.longitude_deg, one.latitude_deg, round(one.altitude_m, 3)] for one in record.sensors]
+    assert (folder / "placement.kml").is_file()
+    assert record.settings["installed_cost"]["new_post_usd"] > 0
+    assert all(one.installation_usd > 0 for one in record.sensors)
+    assert not any("not written" in note for note in record.notes)
+
+
+def test_the_command_of_a_record_asks_for_the_same_again(folder, tmp_path, monkeypatch):
+    record = load_placement_record(folder / "placement.json")
+    words = shlex.split(repeating_command(record))
+    assert words[:3] == ["seip", "place", "placed.blend"]
+    monkeypatch.chdir(folder)
+    place.main([*words[2:-1], str(tmp_path)])
+    assert comparable(load_placement_record(tmp_path / "placement.json")) == comparable(record)
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        ["--budget", "60000", "--heights", "4:5:0.5", "--tilts", "-5", "0", "10", "--yaws", "12", "--assumed-poles"],
+        ["--coverage", "0.9", "--central-weight", "4", "--require", "sidewalk 3", "signal pole 2", "--effort", "60"],
+        ["--weather", "rain=10", "visibility=200", "wet", "--reflectivity", "asphalt=0.12", "--time-limit", "5"],
+        ["--delta", "0.7", "--detection", "0.8", "--grid", "2", "--solver", "cbc", "--engine", "bvh", "--pose-errors"],
+        [],
+    ],
+)
+def test_every_option_survives_the_record(folder, typed):
+    parse = place._parser().parse_args  # noqa: SLF001  # what the command itself reads options with
+    asked = parse(["a.blend", "-o", "out", *typed])
+    settings = surveys._settings(asked)  # noqa: SLF001  # as above
+    record = load_placement_record(folder / "placement.json")
+    goal = read_objective(asked)
+    content = record.as_json()
+    content["settings"] = {
+        **settings.as_record(),
+        "goal": vars(goal),
+        "render": not asked.no_render,
+        "pose_errors": asked.pose_errors,
+    }
+    (folder.parent / "typed.json").write_text(json.dumps(content), encoding="utf-8")
+    words = shlex.split(repeating_command(load_placement_record(folder.parent / "typed.json")))
+    again = parse(words[2:])
+    assert surveys._settings(again) == settings  # noqa: SLF001  # as above
+    assert read_objective(again) == goal
+    assert (again.pose_errors, again.no_render) == (asked.pose_errors, asked.no_render)
+
+
+def test_a_new_placement_takes_the_report_on_the_old_one_away(folder, small_scene, tmp_path):
+    place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "1"])
+    report.main([str(tmp_path), "--effort", "0"])
+    place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "2"])
+    assert not (tmp_path / "report.html").exists()
+    assert not (tmp_path / "placement.kml").exists()
+    notes = load_placement_record(tmp_path / "placement.json").notes
+    assert "placement.geojson and placement.kml are not written: the scene's map names no projection" in notes
+
+
+def test_a_folder_that_is_none_is_not_made(tmp_path):
+    with pytest.raises(SeipError, match="there is no folder"):
+        report.main([str(tmp_path / "nowhere")])
+    assert not (tmp_path / "nowhere").exists()
+    with pytest.raises(SeipError, match=r"holds no placement\.json"):
+        report.main([str(tmp_path)])
