@@ -17,7 +17,7 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 
 from seip_addon.core.progress import finish
-from seip_addon.core.site.provenance import provenance_lines
+from seip_addon.core.site.sources import source_lines
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
@@ -37,7 +37,7 @@ def main(argv: list[str]) -> None:
     for note in model.notes:
         runtime.print_line(f"note: {note}")
     runtime.warn(model.warnings)
-    for line in provenance_lines(model.provenance()):
+    for line in source_lines(model.sources()):
         runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(

@@ -80,7 +80,7 @@ def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajecto
         files = runtime.finish_with_bar(steps)
         source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
         window = Extent(options.warm_up, end, road_bounds(geometry, ROAD_MARGIN))
-        read = runtime.finish_with_bar(read_sumo(files, window, geometry.origin, source))
+        read = runtime.finish_with_bar(read_sumo(files, window, geometry, source))
     fit = fit_to_road(smooth_walks(read.trajectories), geometry)
     runtime.warn((*read.warnings, *fit.warnings))
     simulated = fit.trajectories

@@ -254,7 +254,9 @@ def _meshes(parts: list[Shown], collection: str) -> tuple[Mesh, ...]:
         if collection not in part.collections:
             continue
         if part.triangles is not None:
-            meshes.append(Mesh(part.name, part.triangles, part.reflectivity))
+            source = str(part.source.get(contract.SOURCE, ""))
+            assumed = bool(part.source.get(contract.HEIGHT_ASSUMED, False))
+            meshes.append(Mesh(part.name, part.triangles, part.reflectivity, source, assumed))
         elif part.source not in instancers and collection != contract.POLES:
             raise SeipError(
                 f"object {part.name!r} in {collection!r} has no mesh: give it faces or take it out of the collection"

@@ -14,7 +14,17 @@ from ..site.scene_geometry import ASSUMED, FROM_MAP, SceneGeometry
 from ..site.site import Site
 from .drawing import SENSOR_MARK, markers_of, percent
 from .palette import INK, SEEN_COLOURS, SEEN_TWICE, SEEN_WORDS, SOFT_INK
-from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
+from .plan_style import (
+    ASSUMED_HEIGHT,
+    ASSUMED_MARK,
+    FORBIDDEN,
+    HEIGHT_CMAP,
+    MANDATORY,
+    POLE_MARK,
+    SIDEWALK_MARK,
+    WEIGHTED,
+    Style,
+)
 
 LEGEND_WIDTH = 3.7  # inches
 ROW_HEIGHT, LINE_HEIGHT, SMALL_LINE_HEIGHT = 0.42, 0.24, 0.15  # inches
@@ -54,14 +64,15 @@ class PlanLegend:
         weights = sorted({area.weight for area in geometry.weighted_regions})
         lines = [line for note in notes for line in wrap(note, LETTERS_PER_LINE)]
         assumed = any(pole.source == ASSUMED for pole in geometry.poles)
+        by_guess = any(mesh.height_assumed for mesh in geometry.occluders)
         below = 3.72 + LINE_HEIGHT * (
-            3 + assumed + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas)
+            3 + assumed + by_guess + len(weights) + bool(geometry.forbidden_areas) + bool(geometry.mandatory_areas)
         )
         below += 0.5 + SMALL_LINE_HEIGHT * len(lines) if lines else 0.0
         self._sensors(deployment, self.height - below)
         self._targets(site, deployment)
         self._map(geometry, site, weights)
-        self._heights(heights)
+        self._heights(heights, assumed=by_guess)
         if lines:
             self._notes(lines)
 
@@ -120,7 +131,7 @@ class PlanLegend:
                 self._line(f"{count} {words}")
         self.y += 0.14
 
-    def _heights(self, norm: Normalize) -> None:
+    def _heights(self, norm: Normalize, *, assumed: bool) -> None:
         self._heading("Obstacles, height above the road")
         highest = float(norm.vmax or 0.0)
         ramp = np.linspace(0.0, highest, 128)[None, :]
@@ -132,6 +143,10 @@ class PlanLegend:
         for share, align in ((0.0, "left"), (0.5, "center"), (1.0, "right")):
             unit = " m" if share == 1.0 else ""
             self._text(2.2 * share, f"{highest * share:g}{unit}", ha=align, size=8)
+        if assumed:
+            self.y += LINE_HEIGHT + 0.06
+            self._swatch(**ASSUMED_HEIGHT)
+            self._text(0.34, "height assumed")
 
     def _notes(self, lines: Iterable[str]) -> None:
         self.y += 0.34

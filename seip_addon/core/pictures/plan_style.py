@@ -19,4 +19,5 @@ ASSUMED_MARK: Style = {
     "mec": "#a3333d",
     "mew": 0.9,
 }
+ASSUMED_HEIGHT: Style = {"facecolor": "none", "edgecolor": "#c9cdc4", "hatch": "\\\\\\", "linewidth": 0.4}
 POLE_MARK: Style = {"linestyle": "none", "marker": "D", "markersize": 3.8, "mfc": "#f2c94c", "mec": INK, "mew": 0.6}

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,17 @@ from ..site.target_squares import target_squares
 from .drawing import add_axes, draw_polygons, draw_sensors, draw_title, save_png
 from .palette import INK, PAPER, SEEN_COLOURS, SEEN_TWICE, SOFT_INK
 from .plan_legend import LEGEND_WIDTH, PlanLegend
-from .plan_style import ASSUMED_MARK, FORBIDDEN, HEIGHT_CMAP, MANDATORY, POLE_MARK, SIDEWALK_MARK, WEIGHTED, Style
+from .plan_style import (
+    ASSUMED_HEIGHT,
+    ASSUMED_MARK,
+    FORBIDDEN,
+    HEIGHT_CMAP,
+    MANDATORY,
+    POLE_MARK,
+    SIDEWALK_MARK,
+    WEIGHTED,
+    Style,
+)
 
 DPI = 160
 MARGIN, HEAD = 0.3, 0.95  # inches
@@ -124,7 +134,7 @@ def _draw_targets(plan: Axes, site: Site, deployment: Deployment) -> None:
     draw_polygons(plan, squares, facecolors=colours, edgecolors="none", antialiaseds=False, zorder=TARGET)
 
 
-def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: BaseGeometry) -> Normalize:
+def _draw_obstacles(plan: Axes, occluders: Sequence[Mesh], site: Site, shown: BaseGeometry) -> Normalize:
     """Draw obstacles, darker the higher they are, and return the scale of heights."""
     triangles = np.concatenate([np.empty((0, 3, 3)), *(mesh.triangles for mesh in occluders)])
     flat = shapely.polygons(triangles[:, :, :2])
@@ -136,6 +146,9 @@ def _draw_obstacles(plan: Axes, occluders: Iterable[Mesh], site: Site, shown: Ba
     style = {"facecolors": HEIGHT_CMAP(norm(height[order])), "edgecolors": "none", "antialiaseds": False}
     draw_polygons(plan, triangles[order, :, :2], **style, zorder=OBSTACLE)
     draw_area(plan, outline(triangles), facecolor="none", edgecolor="#3d4542", linewidth=0.5, zorder=OBSTACLE)
+    for mesh in occluders:
+        if mesh.height_assumed:
+            draw_area(plan, _footprint(mesh, shown), **ASSUMED_HEIGHT, zorder=OBSTACLE)
     return norm
 
 

@@ -13,6 +13,7 @@ from ..pictures.drawing import percent
 from ..placement.objective import CHOSEN_FOR, MOVED, MOVED_MESSAGE
 from ..results.located import LOCATED_FILES
 from ..results.placement_record import RecordedObjective, RecordedSensor, relevant_warnings
+from ..site.sources import source_table
 from .blind_spots import BlindSpot, blind_spots, seen_places
 from .blocks import Block, Bullets, Code, Paragraph, Picture, Report, Section, Table
 from .evidence import ROBUST_PICTURES, TRAFFIC_PICTURES, Evidence
@@ -131,6 +132,10 @@ def _site(evidence: Evidence) -> Iterator[Block]:
         f"{len(targets):,} squares of {targets.spacing:g} m. Map coordinates are metres; the scene has its origin at "
         f"map ({x:,.2f}, {y:,.2f}, {z:,.2f})."
     )
+    if record.site.sources:
+        heading, *rows = source_table(record.site.sources)
+        yield Paragraph("Where the objects of the scene come from, and for how many place or height is assumed:")
+        yield Table(heading, tuple(rows), frozenset({2, 3, 4}))
     obstacle = evidence.geo_reference.obstacle
     if obstacle:
         yield Paragraph(f"There are no latitudes and longitudes: {obstacle}.")

@@ -24,6 +24,7 @@ from ..placement import Placement
 from ..placement.deployment import Sensor
 from ..placement.objective import Objective, Solution, certificate
 from ..site.site import Site
+from ..site.sources import SourceCount
 from ..storage.files import save_json
 from ..storage.json_dataclass import from_json
 from .headings import degrees, tilt_degrees
@@ -83,12 +84,18 @@ class RecordedGeoReference:
 class RecordedSite:
     """A scene, the map coordinates of its local origin, and what its map says of where that is.
 
-    Records of earlier versions hold no ``geo_reference``.
+    Records of earlier versions hold no ``geo_reference`` and no ``sources``.
+
+    Parameters
+    ----------
+    sources : tuple of SourceCount
+        Where the scene's surfaces come from.
     """
 
     name: str
     origin_m: Point
     geo_reference: RecordedGeoReference | None = None
+    sources: tuple[SourceCount, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -282,7 +289,7 @@ def placement_record(
     """
     deployment, placement, greedy = solution.deployment, solution.placement, solution.greedy
     return PlacementRecord(
-        site=RecordedSite(site.name, _metres(site.origin), _geo_reference(site.geo_reference)),
+        site=RecordedSite(site.name, _metres(site.origin), _geo_reference(site.geo_reference), site.sources),
         sensors=tuple(_sensor(sensor, site) for sensor in deployment.sensors),
         price_usd=_rounded(deployment.price, 2),
         coverage=RecordedCoverage(

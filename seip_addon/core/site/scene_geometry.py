@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..opendrive.geo_reference import GeoReference
+from .sources import SourceCount, count_sources
 
 DEFAULT_WEIGHT = 2.0
 """Of a weighted region that does not say its own."""
@@ -35,11 +36,17 @@ class Mesh:
         Corners in local site axes, z up.
     reflectivity : (n,) float64, optional
         Share of the light (0 to 1) that each triangle scatters back; `DEFAULT_REFLECTIVITY` where not given.
+    source : str
+        Who says that it is there, as of a `Pole`.
+    height_assumed : bool
+        Whether that source does not give its height.
     """
 
     name: str
     triangles: Float
     reflectivity: Float | None = None
+    source: str = ""
+    height_assumed: bool = False
 
 
 def joined(meshes: Sequence[Mesh]) -> Float:
@@ -143,3 +150,11 @@ class SceneGeometry:
     poles: tuple[Pole, ...] = ()
     geo_reference: GeoReference = field(default_factory=GeoReference)
     places: tuple[NamedArea, ...] = ()
+
+    def sources(self) -> tuple[SourceCount, ...]:
+        """Count the surfaces of which the scene says where they come from, by kind and source."""
+        return count_sources(
+            (mesh.name, mesh.source, mesh.height_assumed or mesh.source == ASSUMED)
+            for mesh in (*self.roads, *self.ground, *self.occluders)
+            if mesh.source
+        )

@@ -16,6 +16,7 @@ from ..opendrive.geo_reference import GeoReference
 from .candidates import Candidates, CandidateSettings, generate_candidates
 from .far_objects import without_far_objects
 from .scene_geometry import SceneGeometry, joined, ordered_surfaces
+from .sources import SourceCount
 from .targets import Targets, generate_targets
 from .yaws import with_yaws
 
@@ -40,6 +41,8 @@ class Site:
         Of each.
     geo_reference : GeoReference
         Where on the Earth the scene's map is.
+    sources : tuple of SourceCount
+        Where the scene's surfaces come from.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Site:
     triangles: Float
     reflectivity: Float
     geo_reference: GeoReference = field(default_factory=GeoReference)
+    sources: tuple[SourceCount, ...] = ()
 
     def geographic(self, points: Float) -> Float | None:
         """Return longitude, latitude (degrees, WGS 84) and height above the map's zero of local points, all (n, 3).
@@ -103,4 +107,5 @@ def make_site(
         triangles=triangles,
         reflectivity=reflectivity,
         geo_reference=geometry.geo_reference,
+        sources=geometry.sources(),
     )

@@ -14,8 +14,8 @@ from ..geometry.plan import outline, signed_area, without
 from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
-from ..site.provenance import ProvenanceRow, provenance
 from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
+from ..site.sources import SourceCount, count_sources
 from . import road_surface, street_furniture
 from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
@@ -104,10 +104,10 @@ class SiteModel:
     warnings: tuple[str, ...] = ()
     places: tuple[NamedArea, ...] = ()
 
-    def provenance(self) -> tuple[ProvenanceRow, ...]:
+    def sources(self) -> tuple[SourceCount, ...]:
         """Count what is there by kind and source; what is there to be looked at alone does not count."""
-        return provenance(
-            (part.name, part.source, part.height_assumed)
+        return count_sources(
+            (part.name, part.source, part.height_assumed or part.source == ASSUMED)
             for part in self.parts
             if part.source and set(part.roles) != {Role.DRESSING}
         )

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Float
 from ..errors import SeipError
 from ..progress import Progress
 from ..site.scene_geometry import SceneGeometry, joined
@@ -64,7 +63,7 @@ def load_traffic(files: TrafficFiles, geometry: SceneGeometry) -> Generator[Prog
         yield Progress(0, 0, "trajectories")
         return LoadedTraffic(load_trajectories(files.path, geometry), ())
     window = Extent(files.begin, files.end, road_bounds(geometry, ROAD_MARGIN))
-    read = yield from read_sumo(files, window, geometry.origin, files.path.name)
+    read = yield from read_sumo(files, window, geometry, files.path.name)
     fit = fit_to_road(read.trajectories, geometry)
     overlaps = yield from overlap_warnings(fit.trajectories)
     return LoadedTraffic(fit.trajectories, (*read.warnings, *fit.warnings, *overlaps))
@@ -88,21 +87,23 @@ def load_trajectories(path: Path, geometry: SceneGeometry) -> Trajectories:
 
 
 def read_sumo(
-    files: TrafficFiles, window: Extent, origin: Float, source: str
+    files: TrafficFiles, window: Extent, geometry: SceneGeometry, source: str
 ) -> Generator[Progress, None, LoadedTraffic]:
     """Read floating car data with the sizes of its vehicles; not put on the road yet.
 
     Parameters
     ----------
-    origin : (3,) float64, metres
-        Map coordinates of the local origin.
+    geometry : SceneGeometry
+        Of the scene, for its origin and its map's header: SUMO counts the offset there as part of the network's own.
     source : str
         What the trajectories come from, for people.
     """
-    offset = None if files.net is None else read_net_offset(files.net)
+    offset = (
+        None if files.net is None else read_net_offset(files.net) + np.array(geometry.geo_reference.header_offset[:2])
+    )
     data = yield from read_floating_car_data(files.path, offset, window)
     types = yield from read_vehicle_types(files.routes)
-    return LoadedTraffic(*read_trajectories(data, types, origin, source))
+    return LoadedTraffic(*read_trajectories(data, types, geometry.origin, source))
 
 
 def overlap_warnings(trajectories: Trajectories) -> Generator[Progress, None, tuple[str, ...]]:

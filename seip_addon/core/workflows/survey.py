@@ -22,6 +22,7 @@ from ..progress import Progress
 from ..results.headings import tilt_degrees
 from ..results.located import LOCATED_FILES, missing_sentence
 from ..results.placement_record import PlacementRecord, Provenance, placement_record
+from ..robustness.assumed_heights import height_notes
 from ..robustness.pose_study import PoseStudySettings, pose_message, pose_study
 from ..robustness.visibility_under_errors import Surroundings
 from ..settings import setting
@@ -267,7 +268,8 @@ def place(survey: Survey, objective: Objective, *, pose_errors: bool = False) ->
     """Optimise a placement on a survey, and note how far it can be trusted.
 
     The notes of the placement say how many others are as good (`near_optimal_set`). With ``pose_errors`` they also say
-    what it loses where its sensors do not hang quite as planned (`pose_message`): rays are cast for that alone.
+    what it loses where its sensors do not hang quite as planned (`pose_message`), and in a scene with assumed heights
+    what it sees where these are other (`height_notes`): rays are cast for that alone.
     """
     site, models, visible = survey.site, survey.models, survey.grid.visible
     solution = yield from optimise(site, visible, models, objective, survey.settings.limits)
@@ -276,6 +278,8 @@ def place(survey: Survey, objective: Objective, *, pose_errors: bool = False) ->
         problem = placement_problem(site, visible, models, objective)
         top = yield from near_optimal_set(problem, solution.placement.chosen)
         notes += [] if top is None else [top.message]
+    hung = solution.deployment
+    notes += height_notes(surroundings(survey), survey.geometry, hung.sensors, hung.coverage)
     if pose_errors and solution.deployment.sensors:
         study = yield from pose_study(surroundings(survey), solution.deployment, POSES_TRIED)
         notes.append(pose_message(study))

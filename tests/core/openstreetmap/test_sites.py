@@ -44,7 +44,7 @@ def test_a_kind_of_junction_becomes_a_sound_site(name, tmp_path):
     for part in model.parts:
         assert np.isfinite(part.solid.vertices).all()
         assert part.source or not {Role.ROADS, Role.GROUND, Role.OCCLUDERS, Role.POLES} & set(part.roles)
-    houses = {row.kind: row for row in model.provenance()}["Building"]
+    houses = {row.kind: row for row in model.sources()}["Building"]
     assert (houses.source, houses.assumed) == ("extract", 0)
     driving = plan(model, "Driving lanes")
     holes = [ring for part in shapely.get_parts(driving) for ring in part.interiors]
@@ -169,7 +169,7 @@ def test_a_place_between_junctions_needs_a_radius(tmp_path):
 
 def test_a_square_and_a_canopy(tmp_path):
     model = built(plaza(), tmp_path).model
-    names = {row.kind: row for row in model.provenance()}
+    names = {row.kind: row for row in model.sources()}
     assert names["Shelter"].assumed == 1
     assert names["Tree"].assumed == 0
     assert names["Footways"].count == 1
@@ -190,7 +190,7 @@ def test_a_site_description_adds_to_an_extract(tmp_path):
     description.write_text('name = "Here"\n[[wall]]\nline = [[150, 150], [160, 150]]\n', encoding="utf-8")
     model = built(crossing(), tmp_path, site=description).model
     assert model.name == "Here"
-    assert ("Wall", "site description") in {(row.kind, row.source) for row in model.provenance()}
+    assert ("Wall", "site description") in {(row.kind, row.source) for row in model.sources()}
 
 
 def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
@@ -201,7 +201,7 @@ def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
     middle = tuple((site.model.origin[:2] * 1.0).tolist())
     asked = AskedSite(near=middle, radius=60.0, osm=tmp_path / "place.osm")
     model = finish(build_site(map_path, asked)).model
-    rows = {row.kind: row for row in model.provenance()}
+    rows = {row.kind: row for row in model.sources()}
     assert (rows["Building"].count, rows["Building"].source) == (4, "extract")
     assert rows["Driving lanes"].source == "map"
     elsewhere = Extract(40.0, 5.0)

@@ -1,19 +1,15 @@
-"""Provenance of a scene: where each kind of object comes from, and how many of their heights are assumed."""
+"""Sources of a scene: where each kind of object comes from, and how many heights are assumed."""
 
 import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .scene_geometry import ASSUMED
-
 _NUMBER = re.compile(r"[ ._]*\d+( of the [a-z ]+)?$")
-UNKNOWN = "by hand"
-"""Source of what the scene does not say of where it comes from."""
 
 
 @dataclass(frozen=True)
-class ProvenanceRow:
+class SourceCount:
     """Objects of one kind and source.
 
     Parameters
@@ -32,29 +28,33 @@ class ProvenanceRow:
     assumed: int
 
 
-def provenance(objects: Iterable[tuple[str, str, bool]]) -> tuple[ProvenanceRow, ...]:
+def count_sources(objects: Iterable[tuple[str, str, bool]]) -> tuple[SourceCount, ...]:
     """Count objects by kind and source.
 
     Parameters
     ----------
-    objects : iterable of (name, source, height_assumed)
+    objects : iterable of (name, source, is assumed)
     """
     counts, assumed = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
-    for name, source, height_assumed in objects:
-        key = (_NUMBER.sub("", name) or name, source or UNKNOWN)
+    for name, source, is_assumed in objects:
+        key = (_NUMBER.sub("", name) or name, source)
         counts[key] += 1
-        assumed[key] += height_assumed or source == ASSUMED
-    return tuple(
-        ProvenanceRow(kind, source, number, assumed[kind, source]) for (kind, source), number in counts.items()
-    )
+        assumed[key] += is_assumed
+    return tuple(SourceCount(*key, number, assumed[key]) for key, number in counts.items())
 
 
-def provenance_lines(rows: Iterable[ProvenanceRow]) -> list[str]:
-    """Return a table as lines of text, with a heading."""
-    cells = [("part", "source", "count", "measured", "assumed")]
-    cells += [
+def source_table(rows: Iterable[SourceCount]) -> list[tuple[str, ...]]:
+    """Return the cells of a table, its heading first."""
+    heading = ("part", "source", "count", "measured", "assumed")
+    cells = [
         (row.kind, row.source, f"{row.count:,}", f"{row.count - row.assumed:,}", f"{row.assumed:,}") for row in rows
     ]
+    return [heading, *cells]
+
+
+def source_lines(rows: Iterable[SourceCount]) -> list[str]:
+    """Return the table as lines of text."""
+    cells = source_table(rows)
     widths = [max(len(row[column]) for row in cells) for column in range(5)]
     return [
         "  ".join([*(row[i].ljust(widths[i]) for i in (0, 1)), *(row[i].rjust(widths[i]) for i in (2, 3, 4))]).rstrip()
