@@ -50,6 +50,9 @@ def save_trade_off_chart(
             own = [way for way in ways if way.family == family]
             style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "markersize": 7, "zorder": 4}
             panel.plot([way.error for way in own], [way.seconds for way in own], label=family, **style)
+            for way in own:
+                if way.interval is not None:
+                    panel.hlines(way.seconds, *way.interval, color=colour, linewidth=2.0, zorder=2)
         _mark_default(panel, ways)
         panel.set_yscale("log")
         panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
