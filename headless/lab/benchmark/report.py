@@ -117,7 +117,7 @@ def load_json(path: str | os.PathLike[str]) -> tuple[Findings, list[Bar]]:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
         return _findings(record), [Bar(**bar) for bar in record["bars"]]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise SeipError(f"{path} holds no benchmark ({error}): measure all of it first") from error
+        raise SeipError(f"{path} holds no benchmark ({error}): delete it, and measure all of it") from error
 
 
 def save_page(path: str | os.PathLike[str], findings: Findings, checks: Sequence[Bar], pictures: str) -> None:

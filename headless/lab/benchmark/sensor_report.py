@@ -134,19 +134,20 @@ def _verdict(findings: SensorModelFindings) -> str:
     largest = max(abs(one.value) for one in beams)
     slower = [one.costs[FINEST].seconds / one.costs[SHIPPED].seconds for one in findings.sites]
     differing, compared = (sum(getattr(one, part) for one in findings.sites) for part in ("differing", "compared"))
+    left_out = ": it is left out" if largest < NEGLIGIBLE else ""
     text = (
         f"The law of detection changes coverage by {100 * least:.1f} to {100 * most:.1f} points, by more than its "
         f"interval in {sum(map(differs, law))} of {len(law)} comparisons. Divergence changes it by "
         f"{100 * largest:.2f} points at most, by more than its interval in {sum(map(differs, beams))} of {len(beams)}, "
-        f"for {_span(slower)} times the time{': it is left out' if largest < NEGLIGIBLE else ''}. The lazy engine, "
-        f"which is made for lines, decided {differing} pairs of pose and target otherwise than every diverging beam does, of "
-        f"{compared:,} that are seen."
+        f"for {_span(slower)} times the time{left_out}. The lazy engine, which is made for lines, decided {differing} "
+        f"pairs of pose and target otherwise than every diverging beam does, of {compared:,} that are seen."
     )
     if findings.precision is not None:
         change = findings.precision.change
         text += (
-            f" Average precision changes by {_points(change[PLAIN])} points without the law, {_told(change[PLAIN])}, "
-            f"and by {_points(change[SHIPPED])} without divergence, {_told(change[SHIPPED])}."
+            f" Average precision is off that with diverging beams by {_points(change[PLAIN])} points with plain range, "
+            f"{_told(change[PLAIN])}, and by {_points(change[SHIPPED])} with the range equation, "
+            f"{_told(change[SHIPPED])}: its detector has learnt from beams that are lines."
         )
     return text
 
