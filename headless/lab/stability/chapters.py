@@ -71,7 +71,7 @@ class StabilityScope:
     robust: RobustnessSettings = field(default_factory=RobustnessSettings)
     instants: tuple[int, int] = (24, 120)
     detector: Mapping[str, int] = field(default_factory=dict)
-    weather_effort: float = 20.0
+    weather_effort: float = 8.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,10 +128,10 @@ def weather_study(
     clear: dict[str, tuple[Integer, float]] = {}
     answers = []
     for done, words in enumerate(("", *WEATHERS)):
-        progress = Progress(done, 1 + len(WEATHERS), words or "clear air")
-        yield progress
         found, gaps, kept = {}, [], 0.0
-        for key in types:
+        for number, key in enumerate(types):
+            progress = Progress(2 * done + number, 2 * (1 + len(WEATHERS)), f"{key}, {words or 'clear air'}")
+            yield progress
             own = replace(settings.candidates, sensors=(key,))
             weather = weather_of(words.split())
             layout = lay_out(geometry, replace(settings, candidates=own, weather=weather))
