@@ -40,6 +40,7 @@ from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scans import static_scene
 from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.obstruction import bareness_warnings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
 from seip_addon.core.visibility.grid import compute_visibility
@@ -162,7 +163,8 @@ def compare_sensor_models(
         runtime.open_scene(scene)
         layout = lay_out(read_scene(bpy.context.scene).geometry, settings)
         amount = {"placements": scope.placements, "checked": scope.every_beam, "seed": seed}
-        sites.append(site_front(layout.site, models, counts=COUNTS, time_limit=time_limit, **amount))
+        front = site_front(layout.site, models, counts=COUNTS, time_limit=time_limit, **amount)
+        sites.append(replace(front, bare=bool(bareness_warnings(layout.geometry))))
         runs = runs_beside(scene)
         if number == 0 and runs and importlib.util.find_spec("torch"):
             from headless.detection.settings import TrainingSettings  # noqa: PLC0415 -- needs torch

@@ -144,6 +144,8 @@ class SiteFront:
     differing, compared : int
         Pairs of pose and target that the lazy engine decides otherwise with diverging beams than every beam cast does,
         and pairs that are seen, in the poses where both were tried.
+    bare : bool
+        Whether nothing at the site can hide anything.
     """
 
     site: str
@@ -154,6 +156,7 @@ class SiteFront:
     best: Mapping[str, Mapping[str, tuple[float, float]]]
     differing: int
     compared: int
+    bare: bool = False
 
     def change(self, model: str, count: str | None = None, seed: int = 0) -> IntervalEstimate:
         """Return by how much mean coverage differs from the finest model's, paired placement by placement.

@@ -50,7 +50,7 @@ def save_sensor_model_chart(folder: Path, findings: SensorModelFindings) -> None
         panels,
         f"Models of {findings.sensor}: processor time against the distance from diverging beams",
         f"coverage: mean over {findings.placements} random placements of each number of sensors · bars: 95 % intervals",
-        nought=NEGLIGIBLE,
+        nought=1e-3,
     )
 
 
@@ -65,8 +65,8 @@ def sensor_model_parts(findings: SensorModelFindings, pictures: str) -> list[str
         "is the return; rays within beams count one by one. Coverage is the mean over the same "
         f"{findings.placements} random placements of 1, 2 and 4 sensors, with its difference from that of diverging "
         "beams in points (paired bootstrap over placements, 95 %). The last column is of the best placement by each "
-        "model: what the model claims for it, and what it covers with diverging beams. Rows of a site stay until that "
-        "site is measured again."
+        "model: what the model claims for it, and what it covers with diverging beams. On a bare site nothing hides "
+        "anything. Rows of a site stay until that site is measured again."
     )
     if findings.precision is not None:
         text += " " + _about_precision(findings.precision)
@@ -108,7 +108,14 @@ def _site_rows(front: SiteFront) -> Iterable[tuple[str, ...]]:
             for n, own in counts.items()
         ]
         claimed, true = list(front.best[name].values())[-1]
-        yield front.site, name, f"{cost.seconds:.3g}", f"{cost.rays:,}", *covered, f"{claimed:.1%}, {true:.1%}"
+        yield (
+            f"{front.site}{', bare' if front.bare else ''}",
+            name,
+            f"{cost.seconds:.3g}",
+            f"{cost.rays:,}",
+            *covered,
+            f"{claimed:.1%}, {true:.1%}",
+        )
 
 
 def _precision_rows(front: PrecisionFront) -> Iterable[tuple[str, ...]]:
@@ -134,10 +141,12 @@ def _verdict(findings: SensorModelFindings) -> str:
     largest = max(abs(one.value) for one in beams)
     slower = [one.costs[FINEST].seconds / one.costs[SHIPPED].seconds for one in findings.sites]
     differing, compared = (sum(getattr(one, part) for one in findings.sites) for part in ("differing", "compared"))
+    lost = [_own(one, FINEST) - _own(one, PLAIN) for one in findings.sites]
     left_out = ": it is left out" if largest < NEGLIGIBLE else ""
     text = (
         f"The law of detection changes coverage by {100 * least:.1f} to {100 * most:.1f} points, by more than its "
-        f"interval in {sum(map(differs, law))} of {len(law)} comparisons. Divergence changes it by "
+        f"interval in {sum(map(differs, law))} of {len(law)} comparisons; the best placement by "
+        f"plain range covers {100 * min(lost):.1f} to {100 * max(lost):.1f} points less. Divergence changes it by "
         f"{100 * largest:.2f} points at most, by more than its interval in {sum(map(differs, beams))} of {len(beams)}, "
         f"for {_span(slower)} times the time{left_out}. The lazy engine, which is made for lines, decided {differing} "
         f"pairs of pose and target otherwise than every diverging beam does, of {compared:,} that are seen."
@@ -152,6 +161,11 @@ def _verdict(findings: SensorModelFindings) -> str:
     return text
 
 
+def _own(front: SiteFront, model: str) -> float:
+    """Return what the best placement of most sensors by a model covers by the finest."""
+    return list(front.best[model].values())[-1][1]
+
+
 def _changes(findings: SensorModelFindings, model: str) -> list[IntervalEstimate]:
     return [one.change(model, count) for one in findings.sites for count in one.coverage[model]]
 
@@ -161,7 +175,7 @@ def _told(change: IntervalEstimate) -> str:
 
 
 def _points(change: IntervalEstimate) -> str:
-    value, low, high = (f"{100 * part:+.2f}" for part in (change.value, change.low, change.high))
+    value, low, high = (f"{round(100 * part, 2) + 0.0:+.2f}" for part in (change.value, change.low, change.high))
     return f"{value} [{low}, {high}]"
 
 
