@@ -122,6 +122,12 @@ def test_every_model_sees_the_same_placements(front):
     assert claimed == true >= front.best[PLAIN]["2"][1]
 
 
+def test_more_sensors_than_positions_are_refused():
+    amount = {"placements": 1, "checked": 1, "seed": 0, "time_limit": 1.0}
+    with pytest.raises(SeipError, match="position"):
+        site_front(own_site(), sensor_models(LIDAR), counts=(1, 999), **amount)
+
+
 def test_the_best_placement_covers_most():
     site, random = own_site(), np.random.default_rng(1)
     visible = random.random((len(site.candidates), len(site.targets))) < 0.1

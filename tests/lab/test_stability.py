@@ -35,7 +35,6 @@ LITTLE = stability_chapters.StabilityScope(
     poses=PoseStudySettings(draws=20, draws_of_kind=5),
     robust=RobustnessSettings(scenarios=3, draws=20),
     instants=(2, 12),
-    weather_effort=0.1,
 )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import sys
 from dataclasses import replace
@@ -12,7 +11,7 @@ from unittest.mock import patch
 from headless import stability
 from headless.lab.detector.rows import REMEDIES
 from headless.lab.stability import weather as weather_limits
-from headless.lab.stability.chapters import CHAPTERS, StabilityScope
+from headless.lab.stability.chapters import CHAPTERS
 from headless.lab.stability.charts import save_weather_chart
 from headless.lab.stability.page import Chapter, Chart, put_chapter, save_page
 from headless.lab.stability.rows import Row
@@ -67,7 +66,7 @@ def surveyed(words=COARSE):
 def study():
     geometry = make_geometry(36.0)
     with patch.object(weather_limits, "WEATHERS", ("visibility=200", "visibility=50", "rain=50")):
-        return finish(weather_study(geometry, COARSE, count=2, effort=1.0))
+        return finish(weather_study(geometry, COARSE, count=2))
 
 
 def test_a_placement_for_the_weather_is_no_worse_in_it(study):
@@ -154,12 +153,12 @@ def test_a_new_chapter_comes_last(tmp_path):
 
 def test_one_chapter_is_studied_and_put_into_the_page(small_scene, tmp_path):
     argv = [str(small_scene), "-o", str(tmp_path), "--work", str(tmp_path / "work"), "--only", "weather"]
-    argv += ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "12"]
+    argv += ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "12", "--time-limit", "2"]
     with pytest.raises(SeipError, match="leave out --only"):
         stability.main(argv)
     save_page(tmp_path / "stability.md", "The lead.", [replace(CHAPTER, title="First", charts=())], "stability")
     with patch.object(weather_limits, "WEATHERS", ("visibility=50",)):
-        stability.main(argv, StabilityScope(weather_effort=0.5))
+        stability.main(argv)
     page = (tmp_path / "stability.md").read_text(encoding="utf-8")
     assert page.startswith("# Stability\n\nThe lead.\n\n## First")
     assert "## Weather: 8 × os1_128" in page
@@ -175,4 +174,3 @@ def test_remedies_name_what_users_have():
     assert REMEDIES["rain or fog"] in page
     assert "attenuation_per_m" not in page
     assert CHAPTERS[-1] == "weather"
-    assert math.isfinite(StabilityScope().weather_effort)

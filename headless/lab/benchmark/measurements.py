@@ -175,7 +175,7 @@ def compare_sensor_models(
             surveyed = with_grid(layout, grid)
             study = precision_front(surveyed, models, runs, work, count=COUNTS[-1], training=training)
             precision = yield from study
-    return SensorModelFindings(scope.modelled, DIVERGENCE, scope.placements, tuple(sites), precision)
+    return SensorModelFindings(scope.modelled, DIVERGENCE, scope.placements, tuple(sites), precision, seed)
 
 
 def placements(

@@ -15,7 +15,7 @@ from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.estimates import RESAMPLES, IntervalEstimate, percentiles
 from seip_addon.core.lidar import CarlaDropoff, LidarModel
 from seip_addon.core.placement import SolverLimits, solve
-from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.placement.objective import Objective, check_objective, placement_problem
 from seip_addon.core.progress import finish
 from seip_addon.core.site.candidates import Candidates
 from seip_addon.core.site.site import Site
@@ -213,6 +213,8 @@ class SensorModelFindings:
     sites : sequence of SiteFront
     precision : PrecisionFront or None
         None where no detector was tried.
+    seed : int
+        Of placements, scans and the training.
     """
 
     sensor: str
@@ -220,6 +222,7 @@ class SensorModelFindings:
     placements: int
     sites: Sequence[SiteFront] = field(default_factory=tuple)
     precision: PrecisionFront | None = None
+    seed: int = 0
 
     def over(self, earlier: SensorModelFindings | None) -> SensorModelFindings:
         """Return these findings with those of earlier sites, and of a detector, that were not measured again."""
@@ -282,8 +285,14 @@ def site_front(  # noqa: PLR0913  # what is measured, and how much of it
         Of the placements.
     time_limit : float, seconds
         For each best placement.
+
+    Raises
+    ------
+    SeipError
+        There are fewer positions than sensors.
     """
     settings, candidates, key = VisibilitySettings(), site.candidates, models[0].lidar.key
+    check_objective(site, {key: models[0].lidar}, Objective(count=max(counts)))
     engines = {model.name: VisibilityModel(site, settings, model.caster(site.triangles)) for model in models}
     costs = {model.name: Cost() for model in models}
     seen = {model.name: np.zeros((len(candidates), len(site.targets)), dtype=bool) for model in models}

@@ -60,8 +60,6 @@ class StabilityScope:
         Of traffic, to choose on and to evaluate on.
     detector : mapping of str to int
         See `detector_limits`: seeds and steps of trainings.
-    weather_effort : float, units of work
-        For each placement in a weather.
     """
 
     grids: int = 40
@@ -71,7 +69,6 @@ class StabilityScope:
     robust: RobustnessSettings = field(default_factory=RobustnessSettings)
     instants: tuple[int, int] = (24, 120)
     detector: Mapping[str, int] = field(default_factory=dict)
-    weather_effort: float = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +276,7 @@ def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
 def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
     """Study a fleet in rain and fog, and what they change for the scene's own types."""
     survey = scene.survey
-    study = yield from weather_study(survey.geometry, survey.settings, effort=scene.scope.weather_effort)
+    study = yield from weather_study(survey.geometry, survey.settings)
     best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
     deployment = deploy(survey.site, survey.models, survey.grid.visible, best.chosen)
     sensors = [MountedSensor(one.label, one.model, one.xyz, one.orientation) for one in deployment.sensors]

@@ -10,7 +10,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Integer
 from seip_addon.core.lidar import beam_directions, return_chance
-from seip_addon.core.placement import SolverLimits, solve
+from seip_addon.core.placement import solve
 from seip_addon.core.placement.objective import Objective, placement_problem
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.scans import MountedSensor, static_scene
@@ -108,18 +108,17 @@ def weather_study(
     *,
     types: tuple[str, str] = (FLEET, LONGER),
     count: int = FLEET_COUNT,
-    effort: float,
 ) -> Generator[Progress, None, WeatherStudy]:
     """Place sensors for clear air and for each weather, and look at all placements in the weather.
 
     Parameters
     ----------
     settings : SurveySettings
-        Of the surveys, but for weather, types and limits.
+        Of the surveys, but for weather and types.
     types : two str
         The one studied, and one that detects farther.
-    effort : float, units of work
-        For each placement.
+    count : int
+        Sensors.
 
     Yields
     ------
@@ -137,7 +136,7 @@ def weather_study(
             layout = lay_out(geometry, replace(settings, candidates=own, weather=weather))
             steps = compute_visibility(layout.site, layout.models, layout.settings.visibility, settings.engine)
             grid = yield from within(progress, steps)
-            chosen, gap = yield from within(progress, _placed(with_grid(layout, grid), count, effort))
+            chosen, gap = yield from within(progress, _placed(with_grid(layout, grid), count))
             clear.setdefault(key, (chosen, grid.coverage(chosen)))
             found[key] = grid.coverage(chosen)
             gaps.append(gap)
@@ -209,10 +208,9 @@ def _row(study: WeatherStudy, answer: WeatherAnswer) -> Row:
     )
 
 
-def _placed(survey: Survey, count: int, effort: float) -> Generator[Progress, None, tuple[Integer, float]]:
+def _placed(survey: Survey, count: int) -> Generator[Progress, None, tuple[Integer, float]]:
     problem = placement_problem(survey.site, survey.grid.visible, survey.models, Objective(count=count))
-    limits = SolverLimits(survey.settings.solver, math.inf, effort)
-    placement = yield from solve(problem, limits)
+    placement = yield from solve(problem, survey.settings.limits)
     return placement.chosen, placement.gap
 
 
