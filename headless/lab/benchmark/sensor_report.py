@@ -65,8 +65,8 @@ def sensor_model_parts(findings: SensorModelFindings, pictures: str) -> list[str
         "is the return; rays within beams count one by one. Coverage is the mean over the same "
         f"{findings.placements} random placements of 1, 2 and 4 sensors, with its difference from that of diverging "
         "beams in points (paired bootstrap over placements, 95 %). The last column is of the best placement by each "
-        "model: what the model claims for it, and what it covers with diverging beams. On a bare site nothing hides "
-        "anything. Rows of a site stay until that site is measured again."
+        "model, of equally good ones one: what the model claims for it, and what it covers with diverging beams. On a "
+        "bare site nothing hides anything. Rows of a site stay until that site is measured again."
     )
     if findings.precision is not None:
         text += " " + _about_precision(findings.precision)
@@ -148,8 +148,8 @@ def _verdict(findings: SensorModelFindings) -> str:
         f"interval in {sum(map(differs, law))} of {len(law)} comparisons; the best placement by "
         f"plain range covers {100 * min(lost):.1f} to {100 * max(lost):.1f} points less. Divergence changes it by "
         f"{100 * largest:.2f} points at most, by more than its interval in {sum(map(differs, beams))} of {len(beams)}, "
-        f"for {_span(slower)} times the time{left_out}. The lazy engine, which is made for lines, decided {differing} "
-        f"pairs of pose and target otherwise than every diverging beam does, of {compared:,} that are seen."
+        f"for {_span(slower)} times the time{left_out}. Of {compared:,} pairs of pose and target that are seen the "
+        f"lazy engine, which is made for lines, decides {differing} otherwise than every diverging beam does."
     )
     if findings.precision is not None:
         change = findings.precision.change
