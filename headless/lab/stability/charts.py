@@ -218,7 +218,8 @@ def save_weather_chart(path: str | os.PathLike[str], study: WeatherStudy, title:
         )
     panel.axhline(FAILS_BELOW, **LIMIT_LINE)
     panel.set_xticks(
-        at, ["clear", *(in_words(one.words).replace(" of ", "\n").replace(", ", "\n") for one in study.answers)]
+        at,
+        ["clear", *(in_words(one.words).replace(" of ", "\n").replace(", visibility ", "\n") for one in study.answers)],
     )
     panel.set_ylim(0, 1.03)
     _share_axis(panel)
