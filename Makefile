@@ -7,7 +7,7 @@
 # make settings    chart what other settings of the detector cost and gain (an hour)
 # make stability   drive every method to where it fails, and write docs/stability.md (two hours)
 # make traffic     simulate the shipped traffic again (installs Eclipse SUMO in the environment: 230 MB)
-# make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes)
+# make benchmark   measure speed and error again, and write docs/benchmark.md (20 minutes; 40 with PyTorch)
 # make extension   build the Blender extension in dist/
 # make lock        write wheels.lock anew, the digests of all pinned packages, after a pin has changed
 # make clean       remove what was built; make distclean removes the environment and the wheels as well

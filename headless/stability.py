@@ -1,6 +1,7 @@
 """Find where each method begins to fail, and write the stability page with its charts.
 
 python -m headless.stability scenes/junction.blend -o docs
+python -m headless.stability scenes/junction.blend -o docs --only weather
 blender -b --python-exit-code 1 site.blend -P headless/stability.py -- -o docs
 
 Chapters that are done are kept in the folder of work: a run that was stopped goes on with the next.
@@ -14,8 +15,8 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime, survey
-from headless.lab.stability.chapters import StabilityScope, StudiedScene, chapters, introduction
-from headless.lab.stability.page import load_chapter, save_chapter, save_page
+from headless.lab.stability.chapters import CHAPTERS, StabilityScope, StudiedScene, chapters, introduction
+from headless.lab.stability.page import load_chapter, put_chapter, save_chapter, save_page
 from headless.options import new_parser
 
 from seip_addon.core.errors import SeipError
@@ -34,6 +35,8 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
     charts = options.output / CHARTS
     for other in options.other:
         _check_other(other)
+    if options.only and not (options.output / PAGE).is_file():
+        raise SeipError(f"there is no page {options.output / PAGE} to put chapters into: leave out --only")
     runtime.check_folder(charts)
     surveyed, watch = survey.survey(
         argparse.Namespace(**vars(options) | {"output": options.work}),
@@ -50,7 +53,8 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
         source_digest("headless.stability"),
     )
     done = []
-    for name, work in chapters(scene):
+    asked = [(name, work) for name, work in chapters(scene) if name in (options.only or [name])]
+    for name, work in asked:
         kept = load_chapter(options.work / f"{name}.json", made_from)
         if kept is None or not all((charts / chart.file).exists() for chart in kept.charts):
             kept = watch.run(name, work(scene))
@@ -58,7 +62,11 @@ def main(argv: list[str], scope: StabilityScope | None = None) -> None:
             runtime.LOG.info(f"{kept.title}: {len(kept.rows)} rows, {watch.seconds[name]:.0f} s")
         done.append(kept)
     with runtime.incomplete_if_interrupted(options.output):
-        save_page(options.output / PAGE, introduction(scene), done, CHARTS)
+        if options.only:
+            for chapter in done:
+                put_chapter(options.output / PAGE, chapter, CHARTS)
+        else:
+            save_page(options.output / PAGE, introduction(scene), done, CHARTS)
     runtime.print_line(f"written to {options.output / PAGE}")
 
 
@@ -78,6 +86,9 @@ def _parser() -> argparse.ArgumentParser:
     survey.add_options(parser)
     parser.add_argument(
         "--other", nargs="+", type=Path, default=[], metavar="BLEND", help="scenes to try detectors on that learnt here"
+    )
+    parser.add_argument(
+        "--only", nargs="+", choices=CHAPTERS, metavar="CHAPTER", help=f"put these into the page: {', '.join(CHAPTERS)}"
     )
     parser.add_argument("--work", type=Path, default=Path("out/stability"), help="folder for what a rerun goes on from")
     return parser

@@ -1,7 +1,9 @@
 """The benchmark writes its page, charts and figures; what it compares is what it says."""
 
+import importlib.util
 import json
 import math
+import shutil
 import sys
 from functools import partial
 from pathlib import Path
@@ -23,12 +25,14 @@ import bpy
 import numpy as np
 import pytest
 
+from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.site.candidates import CandidateSettings
 from seip_addon.core.site.scene_geometry import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from small_junction import box_triangles, make_example
+from small_scene import save_small_scene
 
 SMALL = BenchmarkScope(
     layout=CandidateSettings(sensors=("type1",), heights=(3.5,), spacing=24.0),
@@ -41,6 +45,9 @@ SMALL = BenchmarkScope(
     spacings=(8.0, 4.0),
     scanned_by="type1",
     frames=1,
+    modelled="vlp16",
+    placements=3,
+    every_beam=1,
 )
 
 
@@ -48,14 +55,15 @@ SMALL = BenchmarkScope(
 def folder(small_scene, tmp_path_factory):
     pytest.importorskip("embreex", reason="embreex is not installed")
     folder = tmp_path_factory.mktemp("benchmark")
-    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--time-limit", "5"], SMALL)
+    work = ["--steps", "2", "--work", str(folder / "work")]
+    benchmark.main([str(small_scene), "-o", str(folder), "--places", "1", "--time-limit", "5", *work], SMALL)
     return folder
 
 
 @pytest.mark.slow
 def test_the_page_shows_charts_that_are_there(folder):
     page = (folder / "benchmark.md").read_text(encoding="utf-8")
-    for chart in ("visibility", "placement", "growth"):
+    for chart in ("visibility", "placement", "growth", "sensor_models"):
         assert f"(benchmark/{chart}.png)" in page
         assert (folder / "benchmark" / f"{chart}.png").read_bytes().startswith(b"\x89PNG")
 
@@ -72,6 +80,26 @@ def test_the_figures_hold_every_way(folder):
     assert len(record["bars"]) == 9
     assert record["scans"]["kept embree"]["rays"] == record["scans"]["anew bvh"]["rays"] == 4 * 60_000
     assert all(len(growth["seconds"]) == len(growth["size"]) for growth in record["growth"])
+
+
+@pytest.mark.slow
+def test_models_of_the_sensor_are_measured_alone(folder, small_scene, tmp_path):
+    shutil.copytree(folder, tmp_path / "docs")
+    before = json.loads((folder / "benchmark" / "benchmark.json").read_text(encoding="utf-8"))
+    other = save_small_scene(tmp_path, title="Another junction")
+    argv = [str(small_scene), "-o", str(tmp_path / "docs"), "--work", str(folder / "work"), "--steps", "2"]
+    benchmark.main([*argv, "--sensor-models", "--site", str(other), "--time-limit", "5"], SMALL)
+    after = json.loads((tmp_path / "docs" / "benchmark" / "benchmark.json").read_text(encoding="utf-8"))
+    assert {name: part for name, part in after.items() if name != "sensor_models"} == {
+        name: part for name, part in before.items() if name != "sensor_models"
+    }
+    assert [one["site"] for one in before["sensor_models"]["sites"]] == ["Small junction"]
+    assert [one["site"] for one in after["sensor_models"]["sites"]] == ["Small junction", "Another junction"]
+    assert (after["sensor_models"]["precision"] is None) == (importlib.util.find_spec("torch") is None)
+    page = (tmp_path / "docs" / "benchmark.md").read_text(encoding="utf-8")
+    assert "| Another junction | diverging beams |" in page
+    with pytest.raises(SeipError, match="holds no benchmark"):
+        benchmark.main([str(small_scene), "-o", str(tmp_path / "none"), "--sensor-models"], SMALL)
 
 
 def test_every_way_to_place_keeps_to_the_rules_and_none_beats_a_bound():

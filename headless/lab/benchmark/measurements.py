@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import logging
 import os
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 
+from headless import runtime
+from headless.coverage_study.cells import COUNTS
 from headless.lab.benchmark.approximations import approximations, with_triangles
 from headless.lab.benchmark.baselines import BASELINES, can_run
 from headless.lab.benchmark.fresh_process import alone
@@ -15,6 +20,7 @@ from headless.lab.benchmark.growth import Growth, Scaled, placement_growth, repe
 from headless.lab.benchmark.placement import SolverRun, compare
 from headless.lab.benchmark.report import Findings
 from headless.lab.benchmark.scans import scan_costs
+from headless.lab.benchmark.sensor_models import DIVERGENCE, SensorModelFindings, sensor_models, site_front
 from headless.lab.benchmark.street_visibility import street_problem
 from headless.lab.benchmark.visibility import (
     ENGINES,
@@ -24,19 +30,24 @@ from headless.lab.benchmark.visibility import (
     sampled_places,
     visibility_costs,
 )
+from headless.survey import runs_beside
 
+import bpy
 import numpy as np
 
 from seip_addon.core.lidar import LidarModel, find_models, load_catalogue
 from seip_addon.core.placement.objective import Objective, placement_problem
-from seip_addon.core.progress import finish
+from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scans import static_scene
 from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.site.obstruction import bareness_warnings
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.site.site import Site, make_site
 from seip_addon.core.visibility.grid import compute_visibility
 from seip_addon.core.visibility.ray_casting import make_ray_caster
 from seip_addon.core.visibility.settings import VisibilitySettings
+from seip_addon.core.workflows.survey import SurveySettings, lay_out, with_grid
+from seip_addon.scene.read import read_scene
 
 LOG = logging.getLogger(__name__)
 
@@ -65,6 +76,12 @@ class BenchmarkScope:
         Type of the sensors that scan traffic.
     frames : int
         Of scans.
+    modelled : str
+        Type whose models are compared.
+    placements : int
+        Random ones of each number of its sensors.
+    every_beam : int
+        Poses at which the lazy engine is held to every diverging beam.
     """
 
     layout: CandidateSettings = field(default_factory=CandidateSettings)
@@ -77,6 +94,9 @@ class BenchmarkScope:
     spacings: tuple[float, ...] = (4.0, 2.0, 1.0, 0.5)
     scanned_by: str = "type2"
     frames: int = 10
+    modelled: str = "os1_128"
+    placements: int = 16
+    every_beam: int = 12
 
 
 def measure(
@@ -113,6 +133,49 @@ def measure(
         "versions": {name: importlib.metadata.version(name) for name in ("bpy", "numpy", "embreex", "PuLP", "highspy")},
     }
     return Findings(setting, costs, degradation, limits, runs, growths, scans), names
+
+
+def compare_sensor_models(
+    scenes: Sequence[Path], time_limit: float, scope: BenchmarkScope, *, seed: int, steps: int, work: Path
+) -> Generator[Progress, None, SensorModelFindings]:
+    """Measure models of one LiDAR on scenes, and on the first one's traffic where there is any, and PyTorch.
+
+    Parameters
+    ----------
+    time_limit : float, seconds
+        For each best placement.
+    seed : int
+        Of placements, scans and the training.
+    steps : int
+        Of the training of the detector.
+    work : path
+        Folder of the detector.
+
+    Yields
+    ------
+    Progress
+    """
+    models = sensor_models(load_catalogue()[scope.modelled])
+    settings = SurveySettings(replace(scope.layout, sensors=(scope.modelled,)), time_limit=time_limit)
+    sites, precision = [], None
+    for number, scene in enumerate(scenes):
+        yield Progress(number, len(scenes), f"models of the sensor in {scene.name}")
+        runtime.open_scene(scene)
+        layout = lay_out(read_scene(bpy.context.scene).geometry, settings)
+        amount = {"placements": scope.placements, "checked": scope.every_beam, "seed": seed}
+        front = site_front(layout.site, models, counts=COUNTS, time_limit=time_limit, **amount)
+        sites.append(replace(front, bare=bool(bareness_warnings(layout.geometry))))
+        runs = runs_beside(scene)
+        if number == 0 and runs and importlib.util.find_spec("torch"):
+            from headless.detection.settings import TrainingSettings  # noqa: PLC0415 -- needs torch
+            from headless.lab.benchmark.sensor_precision import precision_front  # noqa: PLC0415 -- needs torch
+
+            grid = yield from compute_visibility(layout.site, layout.models, settings.visibility)
+            training = TrainingSettings(steps=steps, seed=seed)
+            surveyed = with_grid(layout, grid)
+            study = precision_front(surveyed, models, runs, work, count=COUNTS[-1], training=training)
+            precision = yield from study
+    return SensorModelFindings(scope.modelled, DIVERGENCE, scope.placements, tuple(sites), precision, seed)
 
 
 def placements(

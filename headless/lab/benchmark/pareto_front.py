@@ -22,6 +22,8 @@ class Method:
         0 for an exact answer.
     default : bool
         Whether it is what is done unless one asks for another.
+    interval : tuple of two float, optional
+        95 % interval of the error.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Method:
     seconds: float
     error: float
     default: bool = False
+    interval: tuple[float, float] | None = None
 
 
 def front(ways: Sequence[Method]) -> list[Method]:

@@ -12,7 +12,7 @@ from headless.charts.style import DASHED, new_figure, save_chart, set_title, sty
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogFormatter
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.pictures.callouts import place_callouts
@@ -50,8 +50,12 @@ def save_trade_off_chart(
             own = [way for way in ways if way.family == family]
             style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "markersize": 7, "zorder": 4}
             panel.plot([way.error for way in own], [way.seconds for way in own], label=family, **style)
+            for way in own:
+                if way.interval is not None:
+                    panel.hlines(way.seconds, *way.interval, color=colour, linewidth=2.0, zorder=2)
         _mark_default(panel, ways)
         panel.set_yscale("log")
+        panel.yaxis.set_minor_formatter(LogFormatter())  # within a decade, plain numbers
         panel.set_xscale("symlog", linthresh=nought, linscale=0.5)
         panel.set_xlim(-0.35 * nought, 2.5 * max(nought, *(way.error for way in ways)))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share * 100:g} %"))

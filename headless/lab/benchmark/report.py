@@ -6,14 +6,20 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
 
 from headless.lab.benchmark.growth import Growth
 from headless.lab.benchmark.placement import SolverRun
+from headless.lab.benchmark.resource_usage import Expense
 from headless.lab.benchmark.scans import ROAD_USERS, SENSORS, ScanCost
+from headless.lab.benchmark.sensor_models import PrecisionFront, SensorModelFindings, SiteFront
+from headless.lab.benchmark.sensor_report import sensor_model_parts, table
 from headless.lab.benchmark.visibility import ENGINES, Cost, Degradation
 
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval, IntervalEstimate
 from seip_addon.core.storage.files import whole_file
 
 
@@ -46,6 +52,7 @@ class Findings:
     runs: Sequence[SolverRun]
     growths: Sequence[Growth]
     scans: Mapping[str, ScanCost]
+    sensor_models: SensorModelFindings | None = None
 
 
 def bars(
@@ -92,9 +99,25 @@ def save_json(path: str | os.PathLike[str], findings: Findings, checks: Sequence
         "placement": runs,
         "growth": growths,
         "scans": {way: asdict(cost) | {"rate": cost.rate} for way, cost in findings.scans.items()},
+        "sensor_models": asdict(findings.sensor_models) if findings.sensor_models else None,
     }
     with whole_file(path) as temporary:
         temporary.write_text(json.dumps(_finite(record), indent=1) + "\n", encoding="utf-8")
+
+
+def load_json(path: str | os.PathLike[str]) -> tuple[Findings, list[Bar]]:
+    """Read what `save_json` wrote: findings, and the requirements that they were compared with.
+
+    Raises
+    ------
+    SeipError
+        There is no such file, or it is no benchmark's.
+    """
+    try:
+        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        return _findings(record), [Bar(**bar) for bar in record["bars"]]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise SeipError(f"{path} holds no benchmark ({error}): delete it, and measure all of it") from error
 
 
 def save_page(path: str | os.PathLike[str], findings: Findings, checks: Sequence[Bar], pictures: str) -> None:
@@ -105,6 +128,7 @@ def save_page(path: str | os.PathLike[str], findings: Findings, checks: Sequence
         *_about_placement(findings, pictures),
         *_about_growth(findings, pictures),
         *_about_scans(findings),
+        *(sensor_model_parts(findings.sensor_models, pictures) if findings.sensor_models else []),
     ]
     with whole_file(path) as temporary:
         temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
@@ -118,7 +142,7 @@ def _summary(setting: Mapping[str, Any], checks: Sequence[Bar]) -> list[str]:
         f"Here: {setting['cores']} cores, {versions}."
     )
     rows = [(bar.what, bar.asked, bar.measured, "met" if bar.met else "**not met**") for bar in checks]
-    return ["# Benchmark", text, _table(("", "asked", "measured", ""), rows)]
+    return ["# Benchmark", text, table(("", "asked", "measured", ""), rows)]
 
 
 def _about_visibility(findings: Findings, pictures: str) -> list[str]:
@@ -131,11 +155,11 @@ def _about_visibility(findings: Findings, pictures: str) -> list[str]:
         f"in truth. The placement is of {setting['count']} {setting['sensor']} sensors, chosen by the simplified grid "
         "and judged by the exact one."
     )
-    costs = _table(
+    costs = table(
         ("way", "times as quick as the plain loop", "s", "s on the clock", "rays", "rays per seen target"),
         [_cost_row(way, cost, plain) for way, cost in findings.costs.items()],
     )
-    degradation = _table(
+    degradation = table(
         ("simplification", "wrong pairs", "coverage claimed", "coverage in truth", "lost", "poses kept", ""),
         [_degradation_row(name, degradation, exact) for name, degradation in findings.degradations.items()],
     )
@@ -155,7 +179,7 @@ def _about_placement(findings: Findings, pictures: str) -> list[str]:
     )
     head = ("instance", "way", "ours is … times as quick", "s", "s on the clock", "MB", "covers", "gap", "own gap", "")
     picture = f"![processor time against gap of placement]({pictures}/placement.png)"
-    return ["## Placement", text, picture, _table(head, _run_rows(findings.runs))]
+    return ["## Placement", text, picture, table(head, _run_rows(findings.runs))]
 
 
 def _about_growth(findings: Findings, pictures: str) -> list[str]:
@@ -166,7 +190,7 @@ def _about_growth(findings: Findings, pictures: str) -> list[str]:
     )
     head = ("work", "what grows", "sizes", "s", "exponent", "MB", "exponent of memory")
     picture = f"![growth of time and memory]({pictures}/growth.png)"
-    return ["## Growth", text, picture, _table(head, [_growth_row(growth) for growth in findings.growths])]
+    return ["## Growth", text, picture, table(head, [_growth_row(growth) for growth in findings.growths])]
 
 
 def _about_scans(findings: Findings) -> list[str]:
@@ -190,7 +214,7 @@ def _about_scans(findings: Findings) -> list[str]:
         for way, cost in findings.scans.items()
     ]
     head = ("way", "frames per second", "times as many as anew with bvh", "on the clock", "rays that end elsewhere")
-    return ["## Scans of traffic", text, _table(head, rows)]
+    return ["## Scans of traffic", text, table(head, rows)]
 
 
 def _ratio(what: str, ratio: float, asked: float, *, holds: bool = True, note: str = "") -> Bar:
@@ -264,9 +288,61 @@ def _growth_row(growth: Growth) -> tuple[str, ...]:
     )
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+def _findings(record: Mapping[str, Any]) -> Findings:
+    runs = [
+        SolverRun(**_fields(SolverRun, run) | {"expense": Expense(**run["expense"]), "bound": _infinite(run["bound"])})
+        for run in record["placement"]
+    ]
+    growths = [Growth(**_fields(Growth, _with_tuples(one))) for one in record["growth"]]
+    return Findings(
+        record["setting"],
+        _costs(Cost, record["visibility"]),
+        {name: Degradation(**one) for name, one in record["harm"].items()},
+        record["times_the_limit"],
+        runs,
+        growths,
+        _costs(ScanCost, record["scans"]),
+        _sensor_models(record.get("sensor_models")),
+    )
+
+
+def _sensor_models(record: Mapping[str, Any] | None) -> SensorModelFindings | None:
+    if record is None:
+        return None
+    sites = tuple(SiteFront(**dict(one) | {"costs": _costs(Cost, one["costs"])}) for one in record["sites"])
+    own = record["precision"]
+    if own is not None:
+        estimates = {
+            name: {way: IntervalEstimate(one["value"], *_ends(one)) for way, one in part.items()}
+            for name, part in own.items()
+            if name in {"precision", "change"}
+        }
+        own = PrecisionFront(**own | {"costs": _costs(Cost, own["costs"])} | estimates)
+    return SensorModelFindings(**dict(record) | {"sites": sites, "precision": own})
+
+
+def _with_tuples(record: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: tuple(part) if isinstance(part, list) else part for name, part in record.items()}
+
+
+AnyCost = TypeVar("AnyCost", Cost, ScanCost)
+
+
+def _costs(kind: type[AnyCost], record: Mapping[str, Any]) -> dict[str, AnyCost]:
+    return {way: kind(**_fields(kind, cost) | {"expense": Expense(**cost["expense"])}) for way, cost in record.items()}
+
+
+def _fields(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return of a record what a dataclass is made of; the rest follows from it."""
+    return {field.name: record[field.name] for field in fields(kind)}
+
+
+def _ends(estimate: Mapping[str, Any]) -> Interval:
+    return (-math.inf if estimate["low"] is None else estimate["low"]), _infinite(estimate["high"])
+
+
+def _infinite(value: float | None) -> float:
+    return math.inf if value is None else value
 
 
 def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold

@@ -41,7 +41,7 @@ _CATALOGUE = "the catalogue's {} is what scans and trainings go by: give your se
 _CALIBRATION = "one cloud does not tell: calibrate each sensor to better than that, and again after work on its pole"
 _RAIN = (
     "nothing notices: drops near the sensors harm first, not the light lost, so have the sensors filter them; for the "
-    "light give attenuation_per_m the extinction there and back, and evaluate again"
+    "light evaluate again with --weather, which placements, scans and trainings then go by"
 )
 REMEDIES: Mapping[str, str] = {
     RangeNoise.name: _CATALOGUE.format("range_noise_std_m"),

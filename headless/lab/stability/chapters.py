@@ -20,6 +20,7 @@ from seip_addon.core.robustness.risk import Risk
 from seip_addon.core.robustness.robust_study import RobustnessSettings, robust_study
 from seip_addon.core.robustness.traffic_instants import spread_instants
 from seip_addon.core.robustness.traffic_study import traffic_scenarios, traffic_study
+from seip_addon.core.scans import MountedSensor
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.workflows.survey import Survey, surroundings
 from seip_addon.core.workflows.traffic import split_runs
@@ -30,12 +31,17 @@ from .criterion import criterion_rows, criterion_study
 from .page import Chapter, Chart
 from .robustness_rows import pose_rows, robust_rows, traffic_rows
 from .solver_limits import solver_rows, solver_study
+from .weather import untouched_types, weather_rows, weather_study
 
 RISKS = (Risk(failure="worst"), Risk(failure="mean"), Risk(seen_by=2))
 """Risks studied: the loss of a sensor, and targets that two sensors must see."""
 
 DETECTOR_RUNS = 3
 """With more runs of traffic than these a detector can learn and be tried."""
+
+
+CHAPTERS = ("criterion", "arithmetic", "solvers", "poses", "failures", "traffic", "detector", "weather")
+"""Names of the chapters, in the order of the page."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +132,7 @@ def chapters(scene: StudiedScene) -> Iterator[tuple[str, Work]]:
         yield "traffic", traffic
     if importlib.util.find_spec("torch") and len(scene.runs) > DETECTOR_RUNS:
         yield "detector", detector
+    yield "weather", weather
 
 
 def criterion(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
@@ -264,6 +271,19 @@ def detector(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
         limit_charts.save_transfer_chart(scene.charts / "detector_away.png", study)
         charts.append(Chart("detector_away.png", "What detectors are worth on what they have not learnt"))
     return Chapter("The detector", limit_rows.limit_rows(study), tuple(charts))
+
+
+def weather(scene: StudiedScene) -> Generator[Progress, None, Chapter]:
+    """Study a fleet in rain and fog, and what they change for the scene's own types."""
+    survey = scene.survey
+    study = yield from weather_study(survey.geometry, survey.settings)
+    best = yield from solve(scene.problem(scene.sensor), survey.settings.limits)
+    deployment = deploy(survey.site, survey.models, survey.grid.visible, best.chosen)
+    sensors = [MountedSensor(one.label, one.model, one.xyz, one.orientation) for one in deployment.sensors]
+    rows = weather_rows(study, untouched_types(survey, scene.placed, sensors))
+    limits_charts.save_weather_chart(scene.charts / "weather.png", study, f"{scene.name} in rain and fog")
+    caption = "Coverage by weather: placements for clear air and for the weather, and sensors that detect farther"
+    return Chapter(f"Weather: {study.count} × {study.sensor}", rows, (Chart("weather.png", caption),))
 
 
 def introduction(scene: StudiedScene) -> str:

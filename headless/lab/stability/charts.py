@@ -21,6 +21,7 @@ from seip_addon.core.visibility.float32_precision import FLOAT32_STEP, MAX_STEP
 from .arithmetic import ArithmeticStudy
 from .criterion import CriterionStudy
 from .solver_limits import SolverStudy
+from .weather import FAILS_BELOW, WeatherStudy, in_words
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Told apart by colour-blind people (Okabe and Ito 2008)."""
@@ -197,6 +198,33 @@ def save_near_optimal_chart(
         panel.set_xticks(range(len(top.in_common)))
         panel.set_title(f"{name}: {len(top):,}{'' if top.complete else ' and more'}", fontsize=10, color=INK)
         style_axes(panel, "positions in common with the best", f"placements within {top.share:.0%} of the best")
+    save_chart(path, figure, title)
+
+
+def save_weather_chart(path: str | os.PathLike[str], study: WeatherStudy, title: str) -> None:
+    """Draw coverage in each weather of placements for clear air and for the weather, and by a type of more range."""
+    figure, (panel,) = new_figure(9.5, 4.8, dpi=150)
+    at = range(1 + len(study.answers))
+    clear, longer = study.clear, study.longer_clear
+    for number, (name, values) in enumerate(
+        (
+            (f"{study.sensor} placed for clear air", [clear, *(one.kept for one in study.answers)]),
+            (f"{study.sensor} placed for the weather", [clear, *(one.placed for one in study.answers)]),
+            (f"{study.longer} placed for the weather", [longer, *(one.longer for one in study.answers)]),
+        )
+    ):
+        panel.plot(
+            at, values, color=COLOURS[number], marker=MARKERS[number], linestyle="none", markersize=8, label=name
+        )
+    panel.axhline(FAILS_BELOW, **LIMIT_LINE)
+    panel.set_xticks(
+        at,
+        ["clear", *(in_words(one.words).replace(" of ", "\n").replace(", visibility ", "\n") for one in study.answers)],
+    )
+    panel.set_ylim(0, 1.03)
+    _share_axis(panel)
+    style_axes(panel, "", f"coverage of {study.count} sensors; dashed: half", grid="y")
+    panel.legend(frameon=False, fontsize=8.5, loc="lower left")
     save_chart(path, figure, title)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from seip_addon.core.errors import SeipError
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .rows import Row
@@ -69,8 +71,44 @@ def save_page(path: Path, lead: str, chapters: Sequence[Chapter], charts: str) -
     """
     parts = ["# Stability", lead]
     for chapter in chapters:
-        parts += [f"## {chapter.title}", _table(chapter.rows)]
-        parts += [f"![{chart.caption}]({charts}/{chart.file})\n\n{chart.caption}" for chart in chapter.charts]
+        parts += _chapter_parts(chapter, charts)
+    _write(path, parts)
+
+
+def put_chapter(path: Path, chapter: Chapter, charts: str) -> None:
+    """Put a chapter into a page that is there: in place of the one of the same title, or at the end.
+
+    Parameters
+    ----------
+    charts : str
+        Folder of the charts, seen from the page.
+
+    Raises
+    ------
+    SeipError
+        The page cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise SeipError(f"there is no page {path} to put a chapter into: study all chapters first") from error
+    lead, *others = (part.strip() for part in re.split(r"^(?=## )", text, flags=re.MULTILINE))
+    heading, *rest = _chapter_parts(chapter, charts)
+    new = "\n\n".join((heading, *rest))
+    titles = [other.partition("\n")[0] for other in others]
+    if heading in titles:
+        others[titles.index(heading)] = new
+    else:
+        others.append(new)
+    _write(path, [lead, *others])
+
+
+def _chapter_parts(chapter: Chapter, charts: str) -> list[str]:
+    pictures = [f"![{chart.caption}]({charts}/{chart.file})\n\n{chart.caption}" for chart in chapter.charts]
+    return [f"## {chapter.title}", _table(chapter.rows), *pictures]
+
+
+def _write(path: Path, parts: Sequence[str]) -> None:
     with whole_file(path) as temporary:
         temporary.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 

@@ -265,6 +265,20 @@ def _linear(variables: list[Any], factors: Float) -> Expression:
     return pulp.LpAffineExpression(list(zip(variables, factors.tolist(), strict=True)))
 
 
+class _Highs(pulp.HiGHS):  # type: ignore[misc]
+    """PuLP's interface to HiGHS, with the status that PuLP does not know: the limit of branches was reached."""
+
+    def findSolutionValues(self, lp: pulp.LpProblem) -> tuple[int, int]:  # noqa: N802 -- PuLP's name
+        """Return PuLP's status of problem and solution, after setting the variables."""
+        try:
+            status: tuple[int, int] = super().findSolutionValues(lp)
+        except KeyError:  # raised last of all: the variables are set
+            if math.isfinite(lp.solverModel.getObjectiveValue()):
+                return pulp.LpStatusOptimal, pulp.LpSolutionIntegerFeasible
+            return pulp.LpStatusNotSolved, pulp.LpSolutionNoSolutionFound
+        return status
+
+
 @contextmanager
 def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event) -> Iterator[Any]:
     """Yield PuLP's interface to a solver, set to prove optimality within seconds and, where given, branches.
@@ -280,7 +294,7 @@ def _engine(solver: str, limits: tuple[float, int | None], stop: threading.Event
             answer.user_interrupt = stop.is_set()
 
         kinds = highspy.cb.HighsCallbackType
-        yield pulp.HiGHS(
+        yield _Highs(
             msg=False,
             timeLimit=limit,
             gapRel=0.0,

@@ -401,6 +401,20 @@ def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
     ]
 
 
+@pytest.mark.parametrize("goal", [0, 320])
+def test_a_search_that_ends_at_its_limit_of_branches_is_an_answer(goal: int) -> None:
+    visible = np.random.default_rng(7).random((150, 400)) < 0.12
+    problem = replace(street_problem(150, 400, heights=1), visible=visible, weights=np.ones(400), count=8)
+    program = integer_program.reaching(make_instance(problem)[0], goal)
+    outcome = finish(program.maximise_coverage("highs", SolverLimits("highs", math.inf, 1e-3).clock()))
+    assert not outcome.finished
+    if goal:  # eight of them see fewer
+        assert outcome.chosen is None
+    else:
+        assert outcome.chosen is not None
+        assert visible[outcome.chosen].any(axis=0).sum() <= outcome.bound < 400
+
+
 @pytest.mark.slow
 def test_more_effort_proves_no_less() -> None:
     little, more = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (0.1, 1.0))

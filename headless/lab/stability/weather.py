@@ -1,0 +1,235 @@
+"""Coverage in rain, fog and on wet roads: where a fleet that was placed for clear air fails, and what helps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seip_addon.core.arrays import Integer
+from seip_addon.core.lidar import beam_directions, return_chance
+from seip_addon.core.placement import solve
+from seip_addon.core.placement.objective import Objective, placement_problem
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.scans import MountedSensor, static_scene
+from seip_addon.core.scans.scanner import ReflectiveSurface
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.site.weather import Weather, weather_of
+from seip_addon.core.visibility.grid import compute_visibility
+from seip_addon.core.visibility.ray_casting import make_ray_caster
+from seip_addon.core.workflows.survey import Layout, Survey, SurveySettings, grid_key, lay_out, with_grid
+
+from .rows import Row
+
+WEATHERS = (
+    *("wet", "rain=5", "rain=20", "rain=50"),
+    *("visibility=500", "visibility=200", "visibility=100", "visibility=50"),
+)
+"""As the commands take them."""
+
+FLEET, LONGER = "os1_128", "os1_128_rev7"
+"""The type that is studied, and one that detects farther."""
+
+FLEET_COUNT = 8
+"""Sensors: as many as cover most of the shipped junction in clear air."""
+
+FAILS_BELOW = 0.5  # of the targets
+
+
+@dataclass(frozen=True)
+class WeatherAnswer:
+    """Coverage in one weather.
+
+    Parameters
+    ----------
+    words : str
+        The weather, as the commands take it.
+    kept : float
+        Of the best placement for clear air.
+    placed : float
+        Of the best placement for this weather.
+    longer : float
+        Of the best placement for this weather of sensors that detect farther.
+    gap : float
+        Of the placements for this weather, the larger one: how far below the best possible they may be.
+    """
+
+    words: str
+    kept: float
+    placed: float
+    longer: float
+    gap: float
+
+
+@dataclass(frozen=True)
+class WeatherStudy:
+    """Coverage of a fleet by weather.
+
+    Parameters
+    ----------
+    sensor, longer : str
+        Types.
+    clear, longer_clear : float
+        Coverage of the best placements in clear air.
+    """
+
+    sensor: str
+    longer: str
+    count: int
+    clear: float
+    longer_clear: float
+    answers: tuple[WeatherAnswer, ...]
+
+
+@dataclass(frozen=True)
+class UntouchedTypes:
+    """Types whose coverage no weather changes, and what it changes of their scans.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Whose visibility has the same inputs in all weathers.
+    placed : str
+        The sensors whose scans were looked at.
+    returned : mapping of str to float
+        By weather, ``clear`` first: of what rays meet within the range, the share that returns.
+    """
+
+    sensors: tuple[str, ...]
+    placed: str
+    returned: dict[str, float]
+
+
+def weather_study(
+    geometry: SceneGeometry,
+    settings: SurveySettings,
+    *,
+    types: tuple[str, str] = (FLEET, LONGER),
+    count: int = FLEET_COUNT,
+) -> Generator[Progress, None, WeatherStudy]:
+    """Place sensors for clear air and for each weather, and look at all placements in the weather.
+
+    Parameters
+    ----------
+    settings : SurveySettings
+        Of the surveys, but for weather and types.
+    types : two str
+        The one studied, and one that detects farther.
+    count : int
+        Sensors.
+
+    Yields
+    ------
+    Progress
+    """
+    clear: dict[str, tuple[Integer, float]] = {}
+    answers = []
+    for done, words in enumerate(("", *WEATHERS)):
+        found, gaps, kept = {}, [], 0.0
+        for number, key in enumerate(types):
+            progress = Progress(2 * done + number, 2 * (1 + len(WEATHERS)), f"{key}, {words or 'clear air'}")
+            yield progress
+            own = replace(settings.candidates, sensors=(key,))
+            weather = weather_of(words.split())
+            layout = lay_out(geometry, replace(settings, candidates=own, weather=weather))
+            steps = compute_visibility(layout.site, layout.models, layout.settings.visibility, settings.engine)
+            grid = yield from within(progress, steps)
+            chosen, gap = yield from within(progress, _placed(with_grid(layout, grid), count))
+            clear.setdefault(key, (chosen, grid.coverage(chosen)))
+            found[key] = grid.coverage(chosen)
+            gaps.append(gap)
+            if key == types[0]:
+                kept = grid.coverage(clear[key][0])
+        answers.append(WeatherAnswer(words, kept, found[types[0]], found[types[1]], max(gaps)))
+    return WeatherStudy(*types, count, clear[types[0]][1], clear[types[1]][1], tuple(answers[1:]))
+
+
+def untouched_types(survey: Survey, placed: str, sensors: Sequence[MountedSensor]) -> UntouchedTypes:
+    """Find the types of a survey whose visibility is the same in all weathers, and what their scans lose.
+
+    Parameters
+    ----------
+    survey : Survey
+        In clear air.
+    placed : str
+        The sensors, in words.
+    sensors : sequence of MountedSensor
+        Whose scans of what stands still are looked at.
+    """
+    types = tuple(
+        key for key in survey.models if len({grid_key(_one_type(survey, key, w)) for w in ("", *WEATHERS)}) == 1
+    )
+    returned = {
+        words or "clear": _returned(survey.geometry, sensors, weather_of(words.split())) for words in ("", *WEATHERS)
+    }
+    return UntouchedTypes(types, placed, returned)
+
+
+def weather_rows(study: WeatherStudy, untouched: UntouchedTypes) -> tuple[Row, ...]:
+    """Return the rows of the page: one for each weather, and one for the types that none changes."""
+    rows = [_row(study, answer) for answer in study.answers]
+    if untouched.sensors:
+        clear, *others = untouched.returned.values()
+        rows.append(
+            Row(
+                f"coverage, {', '.join(untouched.sensors)}",
+                "the same weathers",
+                "changes nowhere: every return within the range counts (CARLA's drop-off); scans of "
+                f"{untouched.placed} have returns from {clear:.1%} of what rays meet in clear air and from "
+                f"{min(others):.1%} in the worst of these weathers",
+                "the inputs of visibility are the same in all weathers; chances of return of all rays, without traffic",
+                "a warning that these types see through any weather; ask with types of the range equation",
+            )
+        )
+    return tuple(rows)
+
+
+def in_words(words: str) -> str:
+    """Return a weather as a person says it."""
+    weather = weather_of(words.split())
+    if math.isfinite(weather.visibility):
+        return f"fog, visibility {weather.visibility:g} m"
+    return f"rain of {weather.rain:g} mm/h" if weather.rain else "wet road"
+
+
+def _row(study: WeatherStudy, answer: WeatherAnswer) -> Row:
+    fails = answer.kept < FAILS_BELOW
+    remedy = f"`--weather {answer.words}` places for it: {answer.placed:.1%}"
+    return Row(
+        f"coverage, {study.count} × {study.sensor} placed for clear air",
+        in_words(answer.words),
+        f"{f'fails, below {FAILS_BELOW:.0%}' if fails else 'holds'}: {answer.kept:.1%}, "
+        f"{(study.clear - answer.kept) * 100:.1f} points less than in clear air",
+        f"best placements for clear air and for the weather, looked at in it; at most {answer.gap:.1%} below the best "
+        "possible",
+        f"{remedy}; {study.count} × {study.longer}, placed so, cover {answer.longer:.1%}",
+    )
+
+
+def _placed(survey: Survey, count: int) -> Generator[Progress, None, tuple[Integer, float]]:
+    problem = placement_problem(survey.site, survey.grid.visible, survey.models, Objective(count=count))
+    placement = yield from solve(problem, survey.settings.limits)
+    return placement.chosen, placement.gap
+
+
+def _one_type(layout: Layout, key: str, words: str) -> Layout:
+    settings = layout.settings
+    own = replace(settings.candidates, sensors=(key,))
+    return lay_out(layout.geometry, replace(settings, candidates=own, weather=weather_of(words.split())))
+
+
+def _returned(geometry: SceneGeometry, sensors: Sequence[MountedSensor], weather: Weather) -> float:
+    """Return the share of returns among what rays meet within the range."""
+    static = static_scene(weather.over(geometry))
+    surface = ReflectiveSurface(make_ray_caster(static.triangles), static.reflectivity)
+    chances = []
+    for sensor in sensors:
+        model = weather.through(sensor.model)
+        directions = beam_directions(model).reshape(-1, 3) @ sensor.orientation.T
+        distance, triangle = surface.caster.cast(sensor.xyz, directions, model.max_range)
+        met = (triangle >= 0) & (distance >= model.min_range)
+        reflected = surface.reflected(directions[met], triangle[met])
+        chances.append(return_chance(model, distance[met], reflected))
+    return float(np.mean(np.concatenate(chances)))
