@@ -1,4 +1,5 @@
 # make demo        set up, and place sensors at the shipped junction
+# make site        build a site from an OpenStreetMap extract, with sensors and a report (installs SUMO: 230 MB)
 # make test        set up, and run the tests (the slow ones: make test-slow)
 # make lint        set up, and check style and types
 # make scenes      rebuild the shipped scenes from their sources
@@ -22,7 +23,7 @@ SPREAD := -n auto --maxprocesses 4
 DEMO := scenes/junction.blend -o out/junction
 
 .DEFAULT_GOAL := help
-.PHONY: help environment demo test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings stability benchmark extension lock clean distclean
+.PHONY: help environment demo site test test-slow lint scenes sumo test-traffic traffic detection test-detection study settings stability benchmark extension lock clean distclean
 
 help:
 	@sed -n '/^# /s/^# //p' Makefile
@@ -33,6 +34,12 @@ environment:
 demo: environment
 	$(PY) -m headless.place $(DEMO)
 	@echo "pictures: out/junction/"; ls out/junction/*.png
+
+site: sumo
+	$(PY) -m headless.build_scene scenes/harbour.osm --junction "Harbour Road" "Rope Lane" -o out/harbour.blend
+	$(PY) -m headless.place out/harbour.blend --sensor type2 --count 4 -o out/harbour
+	$(PY) -m headless.report out/harbour
+	@echo "pictures and report: out/harbour/"; ls out/harbour/*.png out/harbour/report.*
 
 test: environment
 	$(PY) -m pytest $(SPREAD) -m "not slow"
@@ -53,7 +60,8 @@ sumo: environment
 	@$(PYTHON) -m headless.set_up "$(VENV)" traffic
 
 test-traffic: sumo
-	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py tests/core/openstreetmap/test_sites.py
+	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
+	  tests/core/openstreetmap/test_sites.py
 
 # Runs of one scene differ by their seed alone; dense ones have twice the vehicles.
 traffic: sumo

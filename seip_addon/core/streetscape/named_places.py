@@ -28,7 +28,7 @@ def named_places(
     lanes : sequence of LaneSurface
         In local axes.
     names : mapping of str to str
-        Names of roads by their ids; a road without one is called after its id.
+        Names of roads by their ids; a road without one is called after its id, a crossing after the nearest street.
     objects : iterable of PlacedObject
         In local axes.
     region : shapely geometry
@@ -38,16 +38,25 @@ def named_places(
     for lane in in_groups(lanes, CARRIAGEWAY):
         if lane.junction_id is None:
             streets.setdefault(names.get(lane.road_id) or f"Road {lane.road_id}", []).append(lane)
+    street_areas = {name: lane_outline(own) for name, own in streets.items()}
     crossings: dict[str, list[BaseGeometry]] = {}
     for one in objects:
         if one.kind == CROSSING:
-            crossings.setdefault(one.name or f"Crossing {one.id}", []).append(_area(one))
+            area = _area(one)
+            name = one.name or _crossed({name: street_areas[name] for name in names.values() if name in streets}, area)
+            crossings.setdefault(name or f"Crossing {one.id}", []).append(area)
     areas = [
-        *((name, lane_outline(own)) for name, own in streets.items()),
+        *street_areas.items(),
         *((name, shapely.union_all(parts)) for name, parts in crossings.items()),
     ]
     within = ((name, shapely.intersection(area, region, grid_size=GRID)) for name, area in areas)
     return tuple(NamedArea(name, area) for name, area in within if area.area >= LEAST_AREA)
+
+
+def _crossed(streets: Mapping[str, BaseGeometry], area: BaseGeometry) -> str:
+    """Return what a crossing is called after the street of a name that is nearest to it; nothing where none has one."""
+    nearest = min(streets, key=lambda name: streets[name].distance(area.centroid), default="")
+    return f"Crossing of {nearest}" if nearest else ""
 
 
 def _area(crossing: PlacedObject) -> BaseGeometry:
