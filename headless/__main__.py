@@ -7,7 +7,7 @@ import runpy
 import sys
 
 VERBS = {
-    "build-scene": "build a Blender scene from OpenStreetMap or an OpenDRIVE map",
+    "build-scene": "build a scene from OpenStreetMap or an OpenDRIVE map",
     "place": "choose the sensors of a scene",
     "report": "write a report on a placement, HTML and PDF",
     "study": "coverage of types × heights × numbers",

@@ -15,6 +15,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
+from headless.options import new_parser
 
 from seip_addon.core.progress import finish
 from seip_addon.core.site.sources import source_lines
@@ -64,9 +65,7 @@ def _asked_site(options: argparse.Namespace) -> AskedSite:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="build_scene", description="Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap."
-    )
+    parser = new_parser("build_scene", "Build a Blender scene from an OpenDRIVE map or an extract of OpenStreetMap.")
     parser.add_argument(
         "source",
         type=Path,

@@ -164,21 +164,32 @@ def surroundings_of_map(
     return description.with_objects_of(found), (*extract.notes, *dropped)
 
 
+def place_on_map(road_map: RoadMap, near: tuple[float, float]) -> tuple[float, float]:
+    """Return where a place of latitude and longitude (degrees) is on a map, x and y in metres.
+
+    Raises
+    ------
+    SeipError
+        The map names no projection that is known.
+    """
+    east, north = _projection(road_map)(math.radians(near[0]), math.radians(near[1]))
+    return east - float(road_map.header_offset[0]), north - float(road_map.header_offset[1])
+
+
 def _projection(road_map: RoadMap) -> TransverseMercator:
     to_map = projection(road_map.geo_reference)
     if to_map is None or road_map.header_offset[3]:
         raise SeipError(
-            f"map {road_map.name!r} names no projection that an extract can be laid on it with: its <geoReference> "
-            "must be a UTM zone or a transverse Mercator projection"
+            f"map {road_map.name!r} names no projection that latitudes and longitudes can be laid on it with: "
+            "its <geoReference> must be a UTM zone or a transverse Mercator projection"
         )
     return to_map
 
 
 def _shapes(extract: Extract, road_map: RoadMap, near: tuple[float, float]) -> tuple[PlanShapes, Float]:
     """Return the shapes of an extract on a map, and where the place is there, (2,) metres."""
-    to_map, offset = _projection(road_map), road_map.header_offset[:2]
-    middle = np.array(to_map(math.radians(near[0]), math.radians(near[1]))) - offset
-    return PlanShapes(extract, to_map, offset), middle
+    shapes = PlanShapes(extract, _projection(road_map), road_map.header_offset[:2])
+    return shapes, np.array(place_on_map(road_map, near))
 
 
 def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> BaseGeometry:

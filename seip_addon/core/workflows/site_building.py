@@ -9,7 +9,13 @@ from ..arrays import Float
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
 from ..opendrive.junctions import STREETS
-from ..openstreetmap.site import ExtractPlace, is_extract, site_of_extract, surroundings_of_map
+from ..openstreetmap.site import (
+    ExtractPlace,
+    is_extract,
+    place_on_map,
+    site_of_extract,
+    surroundings_of_map,
+)
 from ..progress import Progress
 from ..storage.files import whole_file
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
@@ -137,10 +143,10 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
 
 
 def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:
-    near = asked.near or asked.near_latlon
     junction = STREETS.join(asked.junction) or None
     map_path, described = describe_place(source, site=asked.site)
     road_map = read_map(map_path)
+    near = asked.near if asked.near_latlon is None else place_on_map(road_map, asked.near_latlon)
     placed = described.near is not None or described.junction is not None or described.region is not None
     if asked.anywhere and near is None and junction is None and not placed:
         near = road_map.middle()

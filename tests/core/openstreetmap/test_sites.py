@@ -1,6 +1,7 @@
 """Sites of extracts, with SUMO: ten kinds of junctions, and where things stand in them."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -208,3 +209,18 @@ def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
     elsewhere.house(0, 0, 10, 10)
     with pytest.raises(SeipError, match="nothing that stands at the place"):
         finish(build_site(map_path, dataclasses.replace(asked, osm=elsewhere.write(tmp_path / "no.osm"))))
+
+
+def test_latitude_and_longitude_are_places_of_a_map_with_a_projection_and_of_no_other(tmp_path):
+    site = built(crossing(), tmp_path)
+    assert site.map_text is not None
+    map_path = tmp_path / "street.xodr"
+    map_path.write_text(site.map_text, encoding="utf-8")
+    asked = AskedSite(near_latlon=(52.5, 13.4), radius=50.0)
+    middle = finish(build_site(map_path, asked)).model
+    assert middle.region.centroid.distance(shapely.Point(0, 0)) < 2.0
+    map_path.write_text(
+        re.sub(r"<geoReference>.*?</geoReference>", "", site.map_text, flags=re.DOTALL), encoding="utf-8"
+    )
+    with pytest.raises(SeipError, match="names no projection that latitudes and longitudes"):
+        finish(build_site(map_path, asked))
