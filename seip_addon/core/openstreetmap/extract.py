@@ -1,7 +1,7 @@
 """An extract of OpenStreetMap as it is read: nodes, ways and relations with their tags."""
 
 import math
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -245,11 +245,6 @@ def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
         else:
             left += used
     return found, left
-
-
-def named(elements: Mapping[int, Way], keep: Callable[[Tags], bool]) -> Iterator[tuple[int, Way]]:
-    """Yield the ways whose tags are to be kept."""
-    return ((number, way) for number, way in elements.items() if keep(way.tags))
 
 
 def _refuse_other_formats(path: Path) -> None:

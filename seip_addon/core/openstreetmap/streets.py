@@ -100,7 +100,7 @@ def write_streets(
     if left_hand is None:
         left_hand, reason = drives_on_the_left(extract)
         notes.append(f"traffic keeps to the {'left' if left_hand else 'right'}: {reason}")
-    heights = [metres_of_elevation(extract.nodes[number]) for number in used]
+    heights = [elevation(extract.nodes[number]) for number in used]
     elevated = bool(used) and sum(height is not None for height in heights) >= MIN_ELEVATED * len(used)
     medians = _Medians(extract, [way for _, way in pieces])
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
@@ -115,7 +115,7 @@ def write_streets(
     return StreetFile(len(pieces), elevated, left_hand, roundabouts, tuple(notes))
 
 
-def metres_of_elevation(node: Node) -> float | None:
+def elevation(node: Node) -> float | None:
     """Return the elevation that a node has, metres."""
     try:
         value = float(node.tags.get("ele", ""))
