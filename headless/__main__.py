@@ -17,6 +17,7 @@ VERBS = {
     "simulate": "scan traffic with the sensors of a scene",
     "evaluate": "average precision of types × numbers",
     "train": "train and test one detector",
+    "detect": "judge a placement by what a detector finds with its sensors",
     "compare-detectors": "average precision against time of other detector settings",
     "calibrate": "compare LiDAR models with measured sweeps",
     "stability": "drive every method to where it fails (laboratory)",

@@ -63,19 +63,38 @@ def sample_files(sample: Sample) -> dict[str, Callable[[], bytes]]:
 
 def _label_file(sample: Sample) -> bytes:
     boxes = sample.boxes
-    length, width, height = boxes.size.T
-    x, y, z = boxes.centre.T
-    camera = np.column_stack([-y, height / 2 - z, x])
-    rotation = _wrapped(-boxes.yaw - np.pi / 2)
-    # rounded: numpy's versions differ in the last digit of an arctangent
-    alpha = np.round(_wrapped(rotation - np.arctan2(camera[:, 0], camera[:, 2])), 6)
+    numbers, alpha = camera_boxes(boxes.centre, boxes.size, boxes.yaw)
     occluded = np.where(boxes.visibility >= FULLY_VISIBLE, 0, np.where(boxes.visibility >= PARTLY_VISIBLE, 1, 2))
-    numbers = np.column_stack([height, width, length, camera, rotation])
     lines = "".join(
         f"{name} 0 {hidden} {shortest(angle)} 0 0 {PIXELS} {PIXELS} {' '.join(shortest(number) for number in row)}\n"
         for name, hidden, angle, row in zip(sample.classes, occluded, alpha, numbers, strict=True)
     )
     return (lines or NO_LABEL).encode()
+
+
+def camera_boxes(centre: Float, size: Float, yaw: Float) -> tuple[Float, Float]:
+    """Return boxes in the camera's axes.
+
+    Parameters
+    ----------
+    centre, size : (k, 3) float64, metres
+        Middle, and length, width, height.
+    yaw : (k,) float64, radians
+
+    Returns
+    -------
+    numbers : (k, 7) float64
+        Height, width, length, the middle of the underside, and the rotation about y.
+    alpha : (k,) float64, radians
+        The angle at which the camera sees each.
+    """
+    length, width, height = size.T
+    x, y, z = centre.T
+    camera = np.column_stack([-y, height / 2 - z, x])
+    rotation = _wrapped(-yaw - np.pi / 2)
+    # rounded: numpy's versions differ in the last digit of an arctangent
+    alpha = np.round(_wrapped(rotation - np.arctan2(camera[:, 0], camera[:, 2])), 6)
+    return np.column_stack([height, width, length, camera, rotation]), alpha
 
 
 def _wrapped(angle: Float) -> Float:

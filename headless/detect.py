@@ -1,0 +1,147 @@
+"""Judge a placement by what a trained detector finds with its sensors on runs of traffic.
+
+python -m headless.detect out/placed.blend --traffic run-5.npz run-6.npz --detector detector.pt -o out/detection
+blender -b --python-exit-code 1 out/placed.blend -P headless/detect.py -- --traffic run-5.npz --detector detector.pt …
+
+Needs torch (make detection). The sensors are those of the scene, wherever they hang and of whatever types.
+"""
+
+import argparse
+import sys
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import runtime, survey
+from headless.charts.detection import PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
+from headless.charts.error_view import save_error_view
+from headless.detection.average_precision import precision_recall
+from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
+from headless.detection.case_study import MAIN_RULE, read_runs
+from headless.detection.chart_data import error_view, parts
+from headless.detection.detector import Detector, check_device, on_grid
+from headless.detection.judgement import Judgement, figures, judge
+from headless.detection.pillars import grid_of
+from headless.detection.suitability import suitability_warnings
+from headless.options import add_settings, new_parser, read_settings
+
+import bpy
+import numpy as np
+
+from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
+from seip_addon.core.errors import SeipError
+from seip_addon.core.lidar import load_catalogue
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.scans import MountedSensor, ScanSettings, static_scene
+from seip_addon.core.scans.static_scene import StaticScene
+from seip_addon.core.site.weather import weather_of
+from seip_addon.core.storage.files import digest, save_json, whole_file
+from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
+from seip_addon.core.workflows.survey import SurveySettings
+from seip_addon.scene.materials import set_reflectivity
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.sensors import changed_beams, read_sensors
+
+SCHEMA = "seip-detection/1"
+
+
+def main(argv: list[str]) -> None:
+    """Scan the runs, detect, and write figures, charts and detections to a folder."""
+    options = _parser().parse_args(argv)
+    check_device(options.device)
+    if options.every <= 0:
+        raise SeipError(f"the time between frames must be above 0 s, not {options.every:g} s")
+    detector = Detector.load(options.detector, options.device)
+    runtime.check_folder(options.output)
+    runtime.open_scene(options.scene)
+    weather = weather_of(options.weather)
+    set_reflectivity(options.reflectivity)
+    geometry = weather.over(read_scene(bpy.context.scene).geometry)
+    sensors = [
+        replace(one, model=weather.through(one.model))
+        for one in read_sensors(bpy.context.scene, load_catalogue(options.catalogue))
+    ]
+    runtime.warn(changed_beams(bpy.context.scene, sensors))
+    runs = read_runs(options.traffic, geometry.origin, options.every)
+    if len(runs) > 1:
+        moved = [vehicle_positions(run.name, run.trajectories) for run in runs]
+        runtime.LOG.info(require_independent(combinations(moved, 2)))
+    static = static_scene(geometry, sensors)
+    scans = read_settings(
+        ScanSettings, options, weather=tuple(options.weather), reflectivity=tuple(options.reflectivity)
+    )
+    here = on_grid(detector, grid_of(geometry, detector.grid.pillar))
+    steps = judge(here, static, sensors, runs, scans, threads=options.threads)
+    judgement = runtime.finish_with_bar(steps)
+    types = sorted({sensor.model.key for sensor in sensors})
+    doubts = suitability_warnings(detector, types, geometry.name, judgement.cloud)
+    runtime.warn(doubts)
+    with runtime.incomplete_if_interrupted(options.output):
+        _save(options.output, judgement, static, sensors, geometry.name)
+        record = {
+            "schema": SCHEMA,
+            "site": geometry.name,
+            "sensors": [{"id": one.label, "sensor": one.model.key, "local_m": one.xyz.tolist()} for one in sensors],
+            "traffic": [{"name": run.name, "key": run.key, "frames": len(run.times)} for run in runs],
+            "detector": detector.description() | {"digest": digest(options.detector.read_bytes())},
+            "scans": {"seed": scans.seed, "rolling_shutter": scans.rolling_shutter},
+            "average_precision": figures(judgement),
+            "score": judgement.score,
+            "warnings": list(doubts),
+            "versions": versions(blender=bpy.app.version_string),
+        }
+        save_json(options.output / "detection.json", record)
+    for name, value, interval, users in judgement.precisions():
+        between = "" if interval is None else f" ({interval[0]:.1%} to {interval[1]:.1%})"
+        runtime.print_line(f"{name}: AP {value:.1%}{between} of {users:,} road users")
+    runtime.print_line(f"written to {options.output}/")
+
+
+def _save(folder: Path, judgement: Judgement, static: StaticScene, sensors: list[MountedSensor], name: str) -> None:
+    """Write the charts, and the detections of each frame."""
+    evaluation, score = judgement.evaluation, judgement.score
+    far = "distance to the nearest sensor (m)"
+    panels = [
+        parts(far, "average precision", {name: average_precision_by(evaluation, "distance", DISTANCE_EDGES)}),
+        parts(far, "recall", {name: recall_by(evaluation, "distance", DISTANCE_EDGES, score)}),
+        parts("returns from the road user", "recall", {name: recall_by(evaluation, "points", POINT_EDGES, score)}),
+    ]
+    save_parts_chart(folder / "where.png", panels, name)
+    found = precision_recall(evaluation)
+    types = " + ".join(sorted({sensor.model.key for sensor in sensors}))
+    line = PrecisionRecallLine(types, len(sensors), found.recall, found.precision, evaluation.average_precision)
+    save_precision_recall_chart(folder / "precision_recall.png", [line], name)
+    frame = judgement.frames[judgement.fullest]
+    places = np.array([sensor.xyz for sensor in sensors])
+    title = f"{len(sensors)} × {types}: AP {evaluation.average_precision:.2f} over all frames"
+    view = error_view(title, frame, MAIN_RULE, score=score, cloud=judgement.cloud, region=static.region, sensors=places)
+    save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s")
+    for number, one in enumerate(judgement.frames):
+        boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score
+        for form, lines in (("kitti", kitti_results), ("openpcdet", openpcdet_results)):
+            with whole_file(folder / form / f"{number:06d}.txt") as temporary:
+                temporary.write_text(lines(boxes, categories, scores), encoding="utf-8")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("detect", "Judge a placement by what a trained detector finds with its sensors.")
+    parser.add_argument("scene", nargs="?", type=Path, help="the .blend with its sensors; in Blender the open scene")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the figures")
+    parser.add_argument("--traffic", nargs="+", type=Path, required=True, metavar="NPZ", help="runs to detect in")
+    parser.add_argument("--detector", type=Path, required=True, metavar="PT", help="the file that `seip train` wrote")
+    parser.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    parser.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
+    parser.add_argument("--threads", type=int, default=1, help="of torch")
+    add_settings(parser, SurveySettings, "catalogue")
+    how = parser.add_argument_group("measurement")
+    add_settings(how, ScanSettings, "seed", "rolling_shutter")
+    survey.add_optics(how)
+    add_settings(how, ScanSettings, "engine")
+    return parser
+
+
+if __name__ == "__main__":
+    runtime.run(main)

@@ -1,0 +1,130 @@
+"""What a trained detector finds with the sensors of any placement, on runs of traffic."""
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval
+from seip_addon.core.progress import Progress, finish
+from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
+from seip_addon.core.traffic.bodies import fitted_body
+
+from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
+from .case_study import MAIN_RULE, RULES
+from .cloud_in_plan import CloudInPlan
+from .detector import Detector
+from .frame_results import FrameResult, frame_result
+from .inference import detect
+from .matching import Rule
+from .recordings import SampledRun
+from .settings import CLASS_CATEGORIES
+from .training import deterministic
+
+SMALL_OVERLAP = 0.5  # at which classes of small road users are evaluated, as KITTI does
+SMALL_CLASSES = ("cycle", "pedestrian")
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The frames of some runs with what a detector finds in them.
+
+    Parameters
+    ----------
+    frames : tuple of FrameResult
+        Of all runs, one after the other.
+    fullest : int
+        The frame with the most road users in the region.
+    cloud : (n, 3) float32, metres
+        Of that frame.
+    score : float
+        The best balance of precision and recall on these frames.
+    """
+
+    frames: tuple[FrameResult, ...]
+    evaluation: Evaluation
+    fullest: int
+    cloud: NDArray[np.float32]
+    score: float
+
+    @property
+    def interval(self) -> Interval | None:
+        """95 % interval of the average precision over other traffic like this."""
+        return average_precision_interval(self.evaluation, seed=0)
+
+    def precisions(self) -> Iterator[tuple[str, float, Interval | None, int]]:
+        """Yield name, average precision, interval and number of road users by each rule and of each class."""
+        rules = dict(RULES)
+        for name, categories in CLASS_CATEGORIES.items():
+            overlap = SMALL_OVERLAP if name in SMALL_CLASSES else MAIN_RULE.iou
+            rules[f"{'_'.join(categories)}_{overlap:g}"] = Rule(iou=overlap, categories=categories)
+        for name, rule in rules.items():
+            try:
+                found = evaluate(self.frames, rule)
+            except SeipError:  # of this class there is none
+                continue
+            yield name, found.average_precision, average_precision_interval(found, seed=0), len(found.wanted)
+
+
+def judge(
+    detector: Detector,
+    static: StaticScene,
+    sensors: Sequence[MountedSensor],
+    runs: Sequence[SampledRun],
+    scans: ScanSettings,
+    *,
+    threads: int,
+) -> Generator[Progress, None, Judgement]:
+    """Detect road users in every frame of runs of traffic, as some sensors scan them.
+
+    Parameters
+    ----------
+    detector : Detector
+        On the grid of this site.
+    threads : int
+        Of torch.
+
+    Raises
+    ------
+    SeipError
+        There is no sensor, or no vehicle in the region in any frame.
+    """
+    if not sensors:
+        raise SeipError("the scene has no sensors: place some first, or open the placed.blend of a result")
+    known: dict[str, Any] = {"region": static.region, "sensors": np.array([sensor.xyz for sensor in sensors])}
+    known["classes"] = tuple(CLASS_CATEGORIES.values())
+    total = sum(len(run.times) for run in runs)
+    frames: list[FrameResult] = []
+    most, fullest = -1, 0
+    cloud: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
+    for run in runs:
+        yield Progress(len(frames), total, f"prepare {run.name}")
+        bodies = [fitted_body(user) for user in run.trajectories.users]
+        simulation: Simulation = finish(prepare(static, sensors, run.trajectories, bodies, scans))
+        for number, time in enumerate(run.times):
+            yield Progress(len(frames), total, f"detect in {run.name}")
+            frame: Frame = simulation.frame(number, float(time))
+            with deterministic(threads):
+                found = detect(detector, frame.points, frame.intensity)
+            result = frame_result(frame, CloudInPlan(frame.points), found, run=run.name, **known)
+            if result.truth.inside.sum() > most:
+                most, fullest, cloud = int(result.truth.inside.sum()), len(frames), frame.points
+            frames.append(result)
+    yield Progress(total, total, "detected")
+    evaluation = evaluate(frames, MAIN_RULE)
+    return Judgement(tuple(frames), evaluation, fullest, cloud, balanced_score(evaluation))
+
+
+def figures(judgement: Judgement) -> Mapping[str, Any]:
+    """Return what a record holds of a judgement."""
+    return {
+        name: {
+            "average_precision": value,
+            "interval": None if interval is None else list(interval),
+            "road_users": users,
+        }
+        for name, value, interval, users in judgement.precisions()
+    }
