@@ -174,7 +174,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     furniture = [*objects, *signals, *_described_parts(description, street)]
     beside = _side_way_parts(description, street, below)
     yield next(stages)
-    pavement, notes = _pavement_parts(street, below)
+    pavement, notes = _pavement_parts(street, below, fill=description.from_centre_lines)
     yield next(stages)
     carriageway = _surface_parts(street, fill=description.from_centre_lines)
     yield next(stages)
@@ -295,9 +295,9 @@ def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
     ]
 
 
-def _pavement_parts(street: _Surroundings, below: BaseGeometry) -> tuple[list[Part], tuple[str, ...]]:
+def _pavement_parts(street: _Surroundings, below: BaseGeometry, *, fill: bool) -> tuple[list[Part], tuple[str, ...]]:
     """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
-    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
+    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent, fill=fill)
     if len(own) == 0:
         verge = _verge_strip(street, street.roadside.sides(), below)
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)

@@ -36,6 +36,7 @@ CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junc
 MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
+MIN_OVERLAP = 0.5  # square metres of a lane on driving lanes from which on it gives way to them
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
@@ -197,10 +198,15 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
 
     Lanes that cross each other in a junction differ in height by some centimetres: there the group is laid anew as one
     layer at their mean height, and groups other than driving lanes give way to these. Elsewhere lanes meet edge to edge
-    and stay as they are. With ``fill`` holes between the driving lanes of a junction are filled.
+    and stay as they are. With ``fill`` holes between the driving lanes of a junction are filled, and lanes of other
+    groups give way to driving lanes of other roads, too.
     """
     lanes = in_groups(surfaces, [name])
-    pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
+    outside = [lane for lane in lanes if lane.junction_id is None]
+    given = [lane.triangles for lane in outside]
+    if fill and name != "driving":
+        given = _beside_driving(outside, _plan(in_groups(surfaces, ["driving"])))
+    pieces = [np.empty((0, 3, 3)), *given]
     for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
         own = [lane for lane in lanes if lane.junction_id == junction]
         area = lane_outline(own)
@@ -213,6 +219,20 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
         pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
     return cut(np.concatenate(pieces), beyond)
+
+
+def _beside_driving(lanes: Sequence[LaneSurface], driving: BaseGeometry) -> list[Float]:
+    """Return the triangles of lanes without what lies on driving lanes."""
+    shapely.prepare(driving)
+    pieces = []
+    for lane in lanes:
+        over = shapely.make_valid(lane.polygon)
+        if driving.intersects(over) and driving.intersection(over).area > MIN_OVERLAP:
+            rest = without_crumbs(without(over, driving.buffer(MAX_SEAM)))
+            pieces.append(Terrain(lane.triangles).drape(rest, spacing=MAX_STEP))
+        else:
+            pieces.append(lane.triangles)
+    return pieces
 
 
 def kerb_faces(pavement: Float) -> Float:

@@ -1,0 +1,130 @@
+"""The command that judges a placement by what a trained detector finds."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="torch is not installed: make detection")
+
+from headless import detect
+from headless.detection.detector import Detector, TrainingRecord
+from headless.detection.pillars import grid_of
+from headless.detection.settings import NetworkSettings
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from scene_by_hand import make_scene
+from small_junction import ORIGIN, make_example
+
+from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_results
+from seip_addon.core.errors import SeipError
+from seip_addon.core.traffic import RoadUser, Trajectories
+from seip_addon.scene.blend_file import save_blend
+from seip_addon.scene.write import write_result
+
+
+def make_traffic(y, seconds=8.0) -> Trajectories:
+    """Return a car that drives along +x, and one that stands."""
+    times = np.arange(int(seconds * 5)) / 5
+    count = len(times)
+    moving = np.column_stack([-30 + 6 * times, np.full(count, y), np.zeros(count)])
+    standing = np.tile([10.0 + y, -y, 0.0], (count, 1))
+    return Trajectories(
+        users=(RoadUser("moving", "car", 4.5, 1.8, 1.5), RoadUser("standing", "bus", 12.0, 2.5, 3.2)),
+        origin=np.zeros(3),
+        first=np.array([0, count, 2 * count]),
+        time=np.concatenate([times, times]),
+        position=np.concatenate([moving, standing]) + ORIGIN,
+        yaw=np.zeros(2 * count),
+        pitch=np.zeros(2 * count),
+        speed=np.concatenate([np.full(count, 6.0), np.zeros(count)]),
+        source=f"by hand, {y}",
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A placed scene, two runs of traffic and a detector that has learnt nothing."""
+    folder = tmp_path_factory.mktemp("detect")
+    example = make_example()
+    write_result(make_scene(example.geometry), example.site, example.deployment)
+    save_blend(folder / "placed.blend")
+    make_traffic(-3.5).save(folder / "first.npz")
+    make_traffic(3.5).save(folder / "second.npz")
+    settings = NetworkSettings(width=8, blocks=(1, 1, 1))
+    record = TrainingRecord(sensors=("vlp16",), sites=("Elsewhere",))
+    Detector(settings, grid_of(example.geometry, settings.pillar), training_record=record).save(folder / "detector.pt")
+    return folder
+
+
+def arguments(folder, output, *runs, **changed):
+    given = {"scene": folder / "placed.blend", "detector": folder / "detector.pt"} | changed
+    traffic = [str(folder / run) for run in runs or ("first.npz", "second.npz")]
+    named = ["--detector", str(given["detector"]), "--every", "2", "-o", str(folder / output)]
+    return [str(given["scene"]), "--traffic", *traffic, *named]
+
+
+def test_figures_charts_and_detections_are_written(folder, capsys):
+    detect.main(arguments(folder, "out"))
+    record = json.loads((folder / "out" / "detection.json").read_text(encoding="utf-8"))
+    assert [run["name"] for run in record["traffic"]] == ["first", "second"]
+    assert {"bev_0.7", "car_van_0.7", "truck_bus_0.7"} <= set(record["average_precision"])
+    assert "pedestrian_0.5" not in record["average_precision"]  # there is none
+    frames = sum(run["frames"] for run in record["traffic"])
+    for form in ("kitti", "openpcdet"):
+        assert len(list((folder / "out" / form).glob("*.txt"))) == frames
+    for chart in ("where.png", "errors.png", "precision_recall.png"):
+        assert (folder / "out" / chart).read_bytes().startswith(b"\x89PNG")
+    said = capsys.readouterr()
+    assert "bev_0.7: AP" in said.out
+    assert any("has learnt from clouds of vlp16" in sentence for sentence in record["warnings"])
+    assert any("has learnt at Elsewhere" in sentence for sentence in record["warnings"])
+
+
+def test_the_same_inputs_give_the_same_figures(folder):
+    for output in ("one", "other"):
+        detect.main(arguments(folder, output, "first.npz"))
+    one, other = ((folder / output / "detection.json").read_bytes() for output in ("one", "other"))
+    assert one == other
+
+
+def test_mistakes_are_named(folder, tmp_path):
+    broken = tmp_path / "broken.pt"
+    broken.write_bytes(b"no detector")
+    with pytest.raises(SeipError, match=r"broken\.pt"):
+        detect.main(arguments(folder, "x", detector=broken))
+    with pytest.raises(SeipError, match="must be above 0 s"):
+        detect.main([*arguments(folder, "x"), "--every", "0"])
+    example = make_example()
+    make_scene(example.geometry)
+    save_blend(tmp_path / "bare.blend")
+    with pytest.raises(SeipError, match="no sensors"):
+        detect.main(arguments(folder, "x", scene=tmp_path / "bare.blend"))
+    far = make_traffic(-3.5)
+    far.position[:] += [5000.0, 0.0, 0.0]
+    far.save(tmp_path / "far.npz")
+    with pytest.raises(SeipError, match="none of 3 frames has a car"):
+        detect.main(arguments(folder, "x", str(tmp_path / "far.npz")))
+    assert not (folder / "x" / "detection.json").exists()
+
+
+def test_the_same_run_twice_is_refused(folder):
+    with pytest.raises(SeipError):
+        detect.main(arguments(folder, "twice", "first.npz", "first.npz"))
+
+
+def test_results_read_back_as_the_boxes_that_they_are():
+    boxes = np.array([[10.0, -2.0, 0.8, 4.5, 1.8, 1.6, 0.3], [1.0, 2.0, 1.6, 12.0, 2.5, 3.2, -1.2]])
+    lines = openpcdet_results(boxes, ["car", "bus"], np.array([0.9, 0.25])).splitlines()
+    back = np.array([line.split()[:7] for line in lines], dtype=np.float64)
+    assert back.tolist() == boxes.tolist()
+    assert [line.split()[7:] for line in lines] == [["Car", "0.9"], ["Bus", "0.25"]]
+    kitti = [line.split() for line in kitti_results(boxes, ["car", "bus"], np.array([0.9, 0.25])).splitlines()]
+    assert [len(row) for row in kitti] == [16, 16]
+    height, width, length, right, down, ahead, turn = map(float, kitti[0][8:15])
+    assert (height, width, length) == (1.6, 1.8, 4.5)
+    assert (ahead, -right, height / 2 - down) == pytest.approx((10.0, -2.0, 0.8))
+    assert turn == pytest.approx(-0.3 - np.pi / 2)
