@@ -121,8 +121,11 @@ def read_extract(
     if collected.root not in ("osm", "osmChange"):
         raise SeipError(f"{path.name} is no extract of OpenStreetMap: its first element is <{collected.root[:40]}>")
     if not collected.nodes:
-        where = " near the place" if within is not None else ""
-        raise SeipError(f"{path.name} has no node{where}: take an extract that holds the place")
+        if within is None:
+            raise SeipError(f"{path.name} has no node: take an extract that holds the place")
+        raise SeipError(
+            f"{path.name} has no node near the place: take an extract that holds it, and give latitude before longitude"
+        )
     notes = []
     if collected.repeated:
         notes.append(f"{path.name} gives {collected.repeated:,} elements twice: the later one counts")
