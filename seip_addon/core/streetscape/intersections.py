@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..geometry.plan import closed
+from ..geometry.plan import closed, united
 from ..opendrive import LaneSurface, junction_area
 
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
@@ -90,7 +90,7 @@ def with_other_carriageways(
     names : mapping of str to str
         Of the streets, by the ids of their roads.
     """
-    area = shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes])
+    area = united(lane.polygon for lane in lanes)
     bands: dict[str, list[tuple[BaseGeometry, float]]] = {}
     for lane in lanes:
         middle = (lane.left[:, :2] + lane.right[:, :2]) / 2
@@ -103,7 +103,16 @@ def with_other_carriageways(
         for band, heading in bands.get(names.get(lane.road_id, ""), ())
         if abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL
     ]
-    return shapely.union_all([area, *others])
+    streets = united([area, *others])
+    beside = united(band for of_street in bands.values() for band, _ in of_street)
+    links = [lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)]
+    return united([streets, united(links).intersection(beside)])
+
+
+def _leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:
+    """Return whether a lane begins and ends at an area."""
+    ends = [shapely.Point((lane.left[row, :2] + lane.right[row, :2]) / 2) for row in (0, -1)]
+    return all(area.distance(end) < TOUCH for end in ends)
 
 
 def _heading(lane: LaneSurface) -> float:
@@ -114,8 +123,8 @@ def _heading(lane: LaneSurface) -> float:
 
 def filled(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
     """Return the area of a junction's lanes with the holes between them, and narrow gaps at its edge, filled."""
-    area = closed(shapely.union_all([shapely.make_valid(lane.polygon) for lane in surfaces]), 0.5)
-    return shapely.union_all([shapely.Polygon(part.exterior) for part in _polygons(area)])
+    area = closed(united(lane.polygon for lane in surfaces), 0.5)
+    return united(shapely.Polygon(part.exterior) for part in _polygons(area))
 
 
 def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
