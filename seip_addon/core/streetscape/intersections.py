@@ -97,16 +97,18 @@ def with_other_carriageways(
         if names.get(lane.road_id) and lane.junction_id is None and np.ptp(middle, axis=0).max() > 0:
             band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
             bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
+    sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
     others = [
-        shapely.make_valid(lane.polygon).intersection(band)
+        shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
         for lane in surfaces
-        for band, heading in bands.get(names.get(lane.road_id, ""), ())
-        if abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL
+        if any(
+            abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL and band.intersects(lane.polygon)
+            for band, heading in bands.get(names.get(lane.road_id, ""), ())
+        )
     ]
     streets = united([area, *others])
-    beside = united(band for of_street in bands.values() for band, _ in of_street)
     links = [lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)]
-    return united([streets, united(links).intersection(beside)])
+    return united([streets, united(links).intersection(united(sides.values()))])
 
 
 def _leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:
