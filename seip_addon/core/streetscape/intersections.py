@@ -107,7 +107,9 @@ def with_other_carriageways(
         )
     ]
     streets = united([area, *others])
-    links = [lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)]
+    links = [
+        lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)
+    ]
     return united([streets, united(links).intersection(united(sides.values()))])
 
 

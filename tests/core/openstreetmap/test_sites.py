@@ -208,3 +208,45 @@ def test_an_extract_adds_buildings_to_an_opendrive_map(tmp_path):
     elsewhere.house(0, 0, 10, 10)
     with pytest.raises(SeipError, match="nothing that stands at the place"):
         finish(build_site(map_path, dataclasses.replace(asked, osm=elsewhere.write(tmp_path / "no.osm"))))
+
+
+def test_what_stands_on_the_carriageway_is_moved_or_cut(tmp_path):
+    extract = crossing()
+    extract.house(30, -8, 16, 14)
+    for x, y in ((30, 1.5), (60, -2.5), (-30, 2)):
+        extract.node(x, y, natural="tree", height="9")
+    extract.way([(25, -9), (25, 9)], barrier="hedge")
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    for name in ("Building", "Hedge"):
+        assert plan(model, name).intersection(road).area < 0.5
+    for tree in [part for part in model.parts if part.name.startswith("Tree")]:
+        assert road.distance(shapely.Point(tree.foot[:2])) == pytest.approx(0.2, abs=0.05)
+    assert [note for note in model.notes if note.endswith((": 1", ": 3")) and "carriageway" in note]
+
+
+def test_a_street_leads_through_a_building_and_the_building_above_it(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="tertiary", name="Main Street")
+    extract.way([(0, 0), (0, 8)], highway="residential", name="Gate Lane")
+    extract.way([(0, 8), (0, 22)], highway="residential", name="Gate Lane", tunnel="building_passage", layer="-1")
+    extract.way([(0, 22), (0, 200)], highway="residential", name="Gate Lane")
+    extract.house(-30, 8, 60, 14)
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    pieces = [part for part in model.parts if part.name.startswith("Building")]
+    assert sum(plan(model, part.name).area for part in pieces) == pytest.approx(60 * 14, rel=0.01)
+    for part in pieces:
+        lowest = part.solid.vertices[:, 2].min()
+        assert lowest > 4 or plan(model, part.name).intersection(road).area < 0.1
+    assert not any("carriageway" in note for note in model.notes)
+
+
+def test_pavements_lie_beside_the_lanes(tmp_path):
+    extract = Extract()
+    usual = {"highway": "residential", "oneway": "yes", "name": "Street"}
+    extract.way([(-200, -3), (0, -3), (200, -3)], lanes=3, sidewalk="both", **usual)
+    extract.way([(200, 3), (0, 3), (-200, 3)], lanes=3, sidewalk="both", **usual)
+    extract.way([(0, -200), (0, -3), (0, 3), (0, 200)], highway="residential", name="Side Street")
+    model = built(extract, tmp_path).model
+    assert plan(model, "Pavements").intersection(plan(model, "Driving lanes")).area < 1.0
