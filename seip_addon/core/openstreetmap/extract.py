@@ -11,6 +11,7 @@ from ..progress import Progress
 from ..storage.xml_stream import Attributes, quoted, read_tags
 
 MAX_ELEMENTS = 3_000_000  # nodes, ways and relations that are kept at most: about a city
+EARTH_RADIUS = 6_350_000.0  # metres: the least there is, so that windows are no smaller than asked for
 MAX_LATITUDE = 85.0  # degrees: nearer to a pole no projection of streets holds
 _OTHER_FORMATS = {
     b"\x00\x00\x00": "is in the PBF format; convert it (osmium cat place.osm.pbf -o place.osm)",
@@ -213,7 +214,7 @@ class _Reader:
 
 def window(latitude: float, longitude: float, reach: float) -> tuple[float, float, float, float]:
     """Return south, west, north and east of a square around a place, degrees; ``reach`` is half its side in metres."""
-    north = math.degrees(reach / 6_350_000.0)
+    north = math.degrees(reach / EARTH_RADIUS)
     east = north / math.cos(math.radians(latitude))
     return latitude - north, longitude - east, latitude + north, longitude + east
 

@@ -44,7 +44,10 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     if streets.left_hand:
         options += ["--lefthand", "--opendrive-output.lefthand-left"]
     if streets.roundabouts:
-        options += ["--junctions.join-exclude", ",".join(map(str, streets.roundabouts))]
+        options += [
+            "--junctions.join-exclude",
+            ",".join(str(node) for one in streets.roundabouts for node in sorted(one)),
+        ]
     if streets.elevated:
         options += ["--osm.elevation"]
     yield from run(programs, programs.netconvert, options, "streets of the extract")

@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,15 +21,16 @@ from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..streetscape.intersections import intersection, without_plain_joints
 from ..streetscape.place import SCENE_MARGIN
-from .extract import Extract, Way, read_extract, window
+from .extract import EARTH_RADIUS, Extract, Way, read_extract, window
 from .netconvert import convert
 from .plan_shapes import PlanShapes
 from .street_objects import surroundings
-from .streets import is_street, write_streets
+from .streets import StreetFile, is_street, write_streets
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a place to the junction that is meant at most
+MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
 STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
 
 
@@ -60,7 +61,12 @@ class ExtractPlace:
     @property
     def reach(self) -> float:
         """How far the region may reach from the place, metres."""
-        return self.radius or (self.approaches or DEFAULT_RADIUS) + MAX_JUNCTION_DISTANCE
+        return self.radius or self.along + MAX_JUNCTION_DISTANCE
+
+    @property
+    def along(self) -> float:
+        """How far the region follows the approaches of a junction, metres."""
+        return self.approaches or DEFAULT_RADIUS
 
 
 def is_extract(path: Path) -> bool:
@@ -118,10 +124,13 @@ def site_of_extract(
             f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give --radius for a "
             "place between junctions"
         )
-    carriageway = _carriageway(lanes, middle, place.reach)
-    area = shapely.Point(middle).buffer(place.reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    roundabouts = _roundabouts(road_map, streets, extract)
+    together = intersection(lanes, junction[0][0].id, roundabouts) if junction else frozenset[str]()
+    reach = place.reach if place.radius else max(place.reach, _reach(lanes, together, middle) + place.along)
+    carriageway = _carriageway(lanes, middle, reach)
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     beside = surroundings(shapes, area, carriageway)
-    names = _street_names(road_map, lanes, junction[0][0].id) if junction else ()
+    names = _street_names(road_map, lanes, junction[0][0].id, together) if junction else ()
     description = replace(
         beside,
         name=STREETS.join(names[:2]),
@@ -130,6 +139,7 @@ def site_of_extract(
         radius=place.radius,
         approaches=place.approaches,
         from_centre_lines=True,
+        roundabouts=roundabouts,
         map_source=FROM_EXTRACT,
     )
     dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
@@ -187,10 +197,30 @@ def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> B
     return shapely.union_all([shapely.make_valid(lane.polygon) for lane in driving if road_surface.is_near(lane, near)])
 
 
-def _street_names(road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str) -> tuple[str, ...]:
+def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tuple[frozenset[str], ...]:
+    """Return the ids of the junctions of each roundabout; of one that is a whole quarter each stays its own."""
+    by_node = {junction.name: junction.id for junction in road_map.junctions}
+    found = []
+    for nodes in streets.roundabouts:
+        latitudes = [extract.nodes[number].latitude for number in nodes]
+        if max(latitudes) - min(latitudes) < math.degrees(MAX_ROUNDABOUT / EARTH_RADIUS):
+            found.append(frozenset(by_node[str(number)] for number in nodes if str(number) in by_node))
+    return tuple(found)
+
+
+def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Float) -> float:
+    """Return how far junctions reach from a place, metres."""
+    corners = [lane.left[:, :2] - middle for lane in lanes if lane.junction_id in junctions]
+    return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
+
+
+def _street_names(
+    road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str, together: Collection[str]
+) -> tuple[str, ...]:
+    """Return the names of the streets that meet at junctions that are one, first those of the one in the middle."""
     meeting = streets_of_junctions(road_map, lanes)
-    together = sorted(intersection(lanes, junction_id), key=lambda number: number != junction_id)
-    return tuple(dict.fromkeys(name for number in together for name in meeting.get(number, ())))
+    numbers = sorted(together, key=lambda number: (number != junction_id, number))
+    return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
 
 
 def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[float, float]:

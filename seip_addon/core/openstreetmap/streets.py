@@ -52,8 +52,8 @@ class StreetFile:
         Whether its nodes have elevations.
     left_hand : bool
         Whether traffic keeps to the left.
-    roundabouts : tuple of int
-        Nodes of roundabouts, each of which is a junction of its own.
+    roundabouts : tuple of frozenset of int
+        Nodes of each roundabout: where streets meet it is a junction of its own.
     notes : tuple of str
         What was assumed.
     """
@@ -61,7 +61,7 @@ class StreetFile:
     streets: int
     elevated: bool
     left_hand: bool
-    roundabouts: tuple[int, ...]
+    roundabouts: tuple[frozenset[int], ...]
     notes: tuple[str, ...]
 
 
@@ -110,9 +110,17 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    round_ways = [way for _, way in pieces if _is_roundabout(way.tags)]
-    roundabouts = tuple(dict.fromkeys(number for way in round_ways for number in way.nodes))
+    roundabouts = _joined(way.nodes for _, way in pieces if _is_roundabout(way.tags))
     return StreetFile(len(pieces), elevated, left_hand, roundabouts, tuple(notes))
+
+
+def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
+    """Return the nodes of ways, of those together that share one."""
+    found: list[frozenset[int]] = []
+    for nodes in ways:
+        met = [one for one in found if not one.isdisjoint(nodes)]
+        found = [*(one for one in found if one not in met), frozenset(nodes).union(*met)]
+    return tuple(found)
 
 
 def metres_of_elevation(node: Node) -> float | None:

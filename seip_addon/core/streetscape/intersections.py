@@ -29,10 +29,11 @@ MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthes
 def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
     """Return lanes of which those are in no junction that lie where no more than two arms meet."""
     areas = _areas(surfaces)
-    ends, outwards = [], []
+    ends, outwards, roads = [], [], []
     for lane in surfaces:
         if lane.junction_id is None:
             for row, next_row in ((0, 1), (-1, -2)):
+                roads.append((lane.road_id if lane.lane_type == "driving" else None, row))
                 ends.append(shapely.LineString([lane.left[row, :2], lane.right[row, :2]]))
                 outwards.append(lane.left[next_row, :2] - lane.left[row, :2])
     tree = shapely.STRtree(ends)
@@ -40,9 +41,20 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
     for number, area in areas.items():
         touching = tree.query(area, predicate="dwithin", distance=TOUCH)
         arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
-        if max(len(shapely.get_parts(arms)), _directions([outwards[index] for index in touching])) < MIN_ARMS:
+        meeting = (
+            len(shapely.get_parts(arms)),
+            _directions([outwards[index] for index in touching]),
+            _two_way_streets({roads[index] for index in touching}),
+        )
+        if max(meeting) < MIN_ARMS:
             joints.add(number)
     return tuple(replace(lane, junction_id=None) if lane.junction_id in joints else lane for lane in surfaces)
+
+
+def _two_way_streets(ends: Iterable[tuple[str | None, int]]) -> int:
+    """Return how many two-way streets at most have ends of their roads, which are of one way each, in one place."""
+    rows = [row for road, row in ends if road is not None]
+    return min(rows.count(0), rows.count(-1))
 
 
 def _directions(vectors: Sequence[Float]) -> int:
@@ -55,13 +67,24 @@ def _directions(vectors: Sequence[Float]) -> int:
     return len(found)
 
 
-def intersection(surfaces: Sequence[LaneSurface], junction_id: str) -> frozenset[str]:
-    """Return the ids of the junctions that are one intersection with a junction."""
+def intersection(
+    surfaces: Sequence[LaneSurface], junction_id: str, roundabouts: Iterable[frozenset[str]] = ()
+) -> frozenset[str]:
+    """Return the ids of the junctions that are one intersection with a junction.
+
+    Parameters
+    ----------
+    roundabouts : iterable of frozenset of str
+        Ids of junctions that are one roundabout each.
+    """
     areas = _areas(surfaces)
     if junction_id not in areas:
         return frozenset({junction_id})
-    middle = areas[junction_id].centroid
-    found, waiting = {junction_id}, [junction_id]
+    found = {junction_id}.union(*(one & areas.keys() for one in roundabouts if junction_id in one))
+    middle = shapely.union_all([areas[number] for number in found]).centroid
+    away = max(areas[number].centroid.distance(middle) for number in found)
+    most = max(MAX_INTERSECTION, away + JUNCTION_REACH)
+    waiting = sorted(found)
     while waiting:
         area = areas[waiting.pop()]
         near = {
@@ -69,7 +92,7 @@ def intersection(surfaces: Sequence[LaneSurface], junction_id: str) -> frozenset
             for number, other in areas.items()
             if number not in found
             and area.distance(other) <= JUNCTION_REACH
-            and other.centroid.distance(middle) <= MAX_INTERSECTION
+            and other.centroid.distance(middle) <= most
         }
         found |= near
         waiting += sorted(near)

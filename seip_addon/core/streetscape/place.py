@@ -141,7 +141,7 @@ class Place:
         if description.from_centre_lines and description.near is not None:
             nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
             if nearest and nearest[0][1] <= JUNCTION_REACH:
-                junctions = intersection(self.surfaces, nearest[0][0].id)
+                junctions = self._one_place(nearest[0][0])
                 return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS)
         return self.surfaces
 
@@ -155,8 +155,9 @@ class Place:
         return self._one_place(self._junction)
 
     def _one_place(self, junction: Junction) -> frozenset[str]:
-        joined = self.description.from_centre_lines
-        return intersection(self.surfaces, junction.id) if joined else frozenset({junction.id})
+        if not self.description.from_centre_lines:
+            return frozenset({junction.id})
+        return intersection(self.surfaces, junction.id, self.description.roundabouts)
 
     def _found(self, id_or_name: str) -> Junction:
         return find_junction(self.road_map, self.surfaces, id_or_name)
