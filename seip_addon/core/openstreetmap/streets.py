@@ -1,8 +1,9 @@
 """Streets of an extract, chosen and made explicit for SUMO's netconvert: what counts as a street, lanes, pavements."""
 
+import itertools
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -37,6 +38,7 @@ CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
 _SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
 _FIRST_OTHER = "\u0900"  # from here on (Devanagari, Thai, Chinese …) the font of the pictures has no letters
 MAX_MEDIAN = 35.0  # metres between the middles of two carriageways of one street
+JOIN_DISTANCE = 20.0  # metres between nodes that are one junction
 MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevation for it to be used
 
 
@@ -54,6 +56,8 @@ class StreetFile:
         Whether traffic keeps to the left.
     roundabouts : tuple of frozenset of int
         Nodes of each roundabout: where streets meet it is a junction of its own.
+    slip_ends : tuple of int
+        Nodes where a slip lane leaves or joins a street, apart from other nodes where streets meet.
     notes : tuple of str
         What was assumed.
     """
@@ -62,6 +66,7 @@ class StreetFile:
     elevated: bool
     left_hand: bool
     roundabouts: tuple[frozenset[int], ...]
+    slip_ends: tuple[int, ...]
     notes: tuple[str, ...]
 
 
@@ -111,7 +116,34 @@ def write_streets(
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
     roundabouts = _joined(way.nodes for _, way in pieces if _is_roundabout(way.tags))
-    return StreetFile(len(pieces), elevated, left_hand, roundabouts, tuple(notes))
+    slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
+    return StreetFile(len(pieces), elevated, left_hand, roundabouts, slip_ends, tuple(notes))
+
+
+def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
+    """Yield the ends of one-way links that lie farther than `JOIN_DISTANCE` from any other node where streets meet."""
+    beside: dict[int, set[int]] = {}
+    for way in ways:
+        for one, other in itertools.pairwise(way.nodes):
+            beside.setdefault(one, set()).add(other)
+            beside.setdefault(other, set()).add(one)
+    meeting = [number for number, others in beside.items() if len(others) > 2]
+    places = _in_metres(extract, [extract.nodes[number] for number in meeting])
+    links = {
+        end for way in ways if _is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])
+    }
+    for number, place in zip(meeting, places, strict=True):
+        if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
+            yield number
+
+
+def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
+    """Return where nodes are (n, 2), metres about the extract's first node."""
+    first = next(iter(extract.nodes.values()))
+    east = 111_320.0 * math.cos(math.radians(first.latitude))
+    return np.array(
+        [((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0) for node in nodes]
+    ).reshape(-1, 2)
 
 
 def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
@@ -353,15 +385,7 @@ class _Medians:
 
     def _line(self, way: Way) -> Float:
         """Return a way (n, 2) in metres about the extract's first node, in the direction of its traffic."""
-        nodes = self._extract.line(way)
-        first = next(iter(self._extract.nodes.values()))
-        east = 111_320.0 * math.cos(math.radians(first.latitude))
-        line = np.array(
-            [
-                ((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0)
-                for node in nodes
-            ]
-        )
+        line = _in_metres(self._extract, self._extract.line(way))
         return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
@@ -134,6 +135,20 @@ def with_other_carriageways(
         lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)
     ]
     return united([streets, united(links).intersection(united(sides.values()))])
+
+
+def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the smallest rectangle around a junction's area that lies along one of the roads that meet there."""
+    meeting = [
+        lane
+        for lane in lanes
+        if lane.junction_id is None and lane.polygon.distance(area) < TOUCH and not _leads_between(lane, area)
+    ]
+    boxes = [
+        rotate(shapely.envelope(rotate(area, -heading, (0, 0), use_radians=True)), heading, (0, 0), use_radians=True)
+        for heading in map(_heading, meeting)
+    ]
+    return min(boxes, key=lambda box: float(box.area), default=shapely.minimum_rotated_rectangle(area))
 
 
 def _leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:

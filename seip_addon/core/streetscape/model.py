@@ -284,18 +284,17 @@ def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGe
 
 
 def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
+    """Return the surfaces of lanes by group; with ``fill`` the driving lanes have no small holes."""
     groups = {road_surface.group(lane) for lane in street.lanes}
-    return [
-        Part(
-            name,
-            street_furniture.from_faces(
-                road_surface.group_triangles(street.lanes, group, street.extent, fill=fill), material
-            ),
-            (role,),
-        )
-        for group, (name, material, role) in SURFACES.items()
-        if group in groups
-    ]
+    parts = []
+    for group, (name, material, role) in SURFACES.items():
+        if group in groups:
+            triangles = road_surface.group_triangles(street.lanes, group, street.extent, fill=fill)
+            if fill and group == "driving":
+                holes = road_surface.small_holes(street.roadside.carriageway).intersection(street.extent)
+                triangles = np.concatenate([triangles, street.terrain.drape(holes, spacing=OVERLAY_SPACING)])
+            parts.append(Part(name, street_furniture.from_faces(triangles, material), (role,)))
+    return parts
 
 
 def _pavement_parts(

@@ -46,6 +46,7 @@ STOP_LINE_SETBACK = 1.0
 SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
 MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
 MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
+MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway that was made of middle lines are no islands
 MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
 MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
 MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
@@ -109,6 +110,11 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     is_bare = ~shapely.intersects(pavement, beside)
     bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
+
+
+def small_holes(area: BaseGeometry) -> BaseGeometry:
+    """Return the holes of an area that are too small for islands: between lanes where their number changes."""
+    return without(_without_holes(area, least=MIN_ISLAND_AREA), area)
 
 
 def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:

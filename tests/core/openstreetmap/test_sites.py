@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
-from osm_text import JUNCTIONS, Extract, crossing, dual_carriageway, left_hand, plaza, roundabout, slope
+from osm_text import JUNCTIONS, Extract, corner_houses, crossing, dual_carriageway, left_hand, plaza, roundabout, slope
 from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
@@ -250,3 +250,79 @@ def test_pavements_lie_beside_the_lanes(tmp_path):
     extract.way([(0, -200), (0, -3), (0, 3), (0, 200)], highway="residential", name="Side Street")
     model = built(extract, tmp_path).model
     assert plan(model, "Pavements").intersection(plan(model, "Driving lanes")).area < 1.0
+
+
+def test_slip_lanes_leave_islands_and_the_weighted_box_lies_along_the_roads(tmp_path):
+    extract = Extract()
+    middle = extract.node(0, 0, highway="traffic_signals")
+    usual = {"highway": "primary", "lanes": 6}
+    extract.way([(-200, 0), (-50, 0), middle, (50, 0), (200, 0)], name="East Road", **usual)
+    extract.way([(0, -200), (0, -50), middle, (0, 50), (0, 200)], name="North Road", **usual)
+    for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        ends = [(50 * x, 0), (26 * x, 12 * y), (12 * x, 26 * y), (0, 50 * y)]
+        extract.way(ends if x * y > 0 else ends[::-1], highway="primary_link", oneway="yes")
+    model = built(corner_houses(extract, near=34), tmp_path).model
+    holes = [shapely.Polygon(ring) for ring in model.region.interiors]
+    assert len(holes) == 4
+    assert all(100 < hole.area < 300 for hole in holes)
+    box = plan(model, "Junction")
+    low_x, low_y, high_x, high_y = box.bounds
+    assert box.area == pytest.approx((high_x - low_x) * (high_y - low_y), rel=0.1)
+
+
+def test_no_holes_are_left_where_the_number_of_lanes_changes(tmp_path):
+    extract = Extract()
+    usual = {"highway": "secondary", "name": "East Road"}
+    extract.way([(-200, 0), (-50, 0)], lanes=2, **usual)
+    extract.way([(-50, 0), (-40, 0)], lanes=3, **usual)
+    extract.way([(-40, 0), (0, 0), (200, 0)], lanes=2, **usual)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="North Road")
+    model = built(corner_houses(extract), tmp_path).model
+    road = plan(model, "Driving lanes")
+    assert sum(shapely.Polygon(ring).area for ring in road.interiors) < 1.0
+    assert not model.region.interiors
+
+
+@pytest.mark.parametrize("radius", [30, 60])
+def test_a_roundabout_is_one_place_with_all_its_approaches(radius, tmp_path):
+    extract = Extract()
+    ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
+    extract.way([*ring[:13]], highway="primary", junction="roundabout", name="Circus", lanes=2)
+    extract.way([*ring[12:], ring[0]], highway="primary", junction="roundabout", name="Circus", lanes=3)
+    for name, index, end in (
+        ("East", 0, (300, 0)),
+        ("North", 6, (0, 300)),
+        ("West", 12, (-300, 0)),
+        ("South", 18, (0, -300)),
+    ):
+        extract.way([ring[index], end], highway="primary", name=f"{name} Street")
+    extract.house(-150, 40, 30, 30)
+    model = built(extract, tmp_path).model
+    assert model.region.geom_type == "Polygon"
+    for x, y in ((radius + 75, 0), (-radius - 75, 0), (0, radius + 75), (0, -radius - 75)):
+        assert model.region.distance(shapely.Point(x, y)) < 4.0
+    assert plan(model, "Junction").area > (2 * radius) ** 2
+    assert any(part.name.startswith("Building") for part in model.parts)
+
+
+def test_streets_that_part_at_an_acute_angle_are_a_junction(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (217, 38)], highway="secondary", name="Left Fork")
+    extract.way([(0, 0), (215, -46)], highway="secondary", name="Right Fork")
+    extract.house(-40, 12, 20, 20)
+    model = built(extract, tmp_path).model
+    assert model.name == "Left Fork / Right Fork"
+    assert model.region.geom_type == "Polygon"
+
+
+def test_the_other_carriageway_is_whole_beside_a_junction_that_does_not_reach_it(tmp_path):
+    extract = Extract()
+    usual = {"highway": "primary", "oneway": "yes", "name": "Avenue"}
+    extract.way([(250, 9), (60, 9)], lanes=2, **usual)
+    extract.way([(60, 9), (-250, 9)], lanes=3, **usual)
+    extract.way([(-250, -9), (0, -9), (250, -9)], lanes=2, **usual)
+    extract.way([(0, -200), (0, -9)], highway="residential", name="Side Street")
+    model = built(corner_houses(extract, near=24), tmp_path).model
+    assert len(shapely.get_parts(model.region)) == 2
+    for x in range(-80, 81, 5):
+        assert model.region.distance(shapely.Point(x, 18)) < 5.0  # the middle is that of the other carriageway
