@@ -1,6 +1,7 @@
 """From an extract of OpenStreetMap to a map of its streets and a description of what stands beside them."""
 
 import difflib
+import itertools
 import math
 from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..streetscape.intersections import intersection, without_plain_joints
 from ..streetscape.place import SCENE_MARGIN
-from .extract import EARTH_RADIUS, Extract, Way, read_extract, window
+from .extract import EARTH_RADIUS, Extract, Node, Way, cropped, read_extract, window
 from .netconvert import convert
 from .plan_shapes import PlanShapes
 from .street_objects import surroundings
@@ -98,9 +99,10 @@ def site_of_extract(
     """
     if place.near is None and not place.streets:
         raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
-    around = None if place.near is None else window(*place.near, place.reach + STREET_REACH + 200.0)
-    extract = yield from read_extract(path, around)
-    near = place.near or _meeting_place(extract, place.streets)
+    most = place.reach + STREET_REACH + 200.0
+    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
+    near, place_notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
+    extract = cropped(extract, window(*near, most))
     streets_path = map_path.with_suffix(".streets.osm")
     streets = write_streets(
         extract,
@@ -122,7 +124,7 @@ def site_of_extract(
     if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
         raise SeipError(
             f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give --radius for a "
-            "place between junctions"
+            "place between junctions, or --service-roads where driveways or aisles are streets too"
         )
     roundabouts = _roundabouts(road_map, streets, extract)
     together = intersection(lanes, junction[0][0].id, roundabouts) if junction else frozenset[str]()
@@ -143,7 +145,7 @@ def site_of_extract(
         map_source=FROM_EXTRACT,
     )
     dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
-    return road_map, description, (*extract.notes, *streets.notes, *dropped)
+    return road_map, description, (*place_notes, *extract.notes, *streets.notes, *dropped)
 
 
 def surroundings_of_map(
@@ -223,8 +225,11 @@ def _street_names(
     return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
 
 
-def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[float, float]:
-    """Return latitude and longitude of where streets meet: the mean of the nodes that they share."""
+def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float, float], tuple[str, ...]]:
+    """Return latitude and longitude of where streets meet, and a note where they meet in several places.
+
+    It is the mean of the nodes that they share and that lie together; the most nodes count.
+    """
     named = {name: _streets_called(extract, name) for name in names}
     for name, ways in named.items():
         if not ways:
@@ -234,11 +239,29 @@ def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[float, flo
     if not shared:
         both = " and ".join(map(repr, names))
         raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
-    places = [extract.nodes[number] for number in shared]
-    return (
-        sum(node.latitude for node in places) / len(places),
-        sum(node.longitude for node in places) / len(places),
+    groups: list[list[Node]] = []
+    for node in (extract.nodes[number] for number in shared):
+        met = [group for group in groups if any(_distance(node, other) < MAX_JUNCTION_DISTANCE for other in group)]
+        groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
+    places = [
+        (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
+        for group in sorted(groups, key=len, reverse=True)
+    ]
+    if len(places) == 1:
+        return places[0], ()
+    first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
+    note = (
+        f"{' and '.join(names)} meet in {len(places)} places, of which the one at {first} counts: for another give "
+        f"--near-latlon {' or '.join(others)}"
     )
+    return places[0], (note,)
+
+
+def _distance(one: Node, other: Node) -> float:
+    """Return the distance between two nodes that are not far from each other, metres."""
+    north = math.radians(one.latitude - other.latitude)
+    east = math.radians(one.longitude - other.longitude) * math.cos(math.radians(one.latitude))
+    return EARTH_RADIUS * math.hypot(north, east)
 
 
 def _streets_called(extract: Extract, name: str) -> list[Way]:

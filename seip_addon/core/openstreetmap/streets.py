@@ -198,7 +198,8 @@ def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
 
 
 def _node(number: int, node: Node, height: float | None) -> list[str]:
-    place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{node.longitude:.9f}"'
+    longitude = math.remainder(node.longitude, 360.0)
+    place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{longitude:.9f}"'
     tags = {key: node.tags[key] for key in ("highway", "crossing", "railway") if key in node.tags}
     if height is not None:
         tags["ele"] = f"{height:.3f}"

@@ -1,6 +1,7 @@
 """Sites of extracts, with SUMO: ten kinds of junctions, and where things stand in them."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -326,3 +327,24 @@ def test_the_other_carriageway_is_whole_beside_a_junction_that_does_not_reach_it
     assert len(shapely.get_parts(model.region)) == 2
     for x in range(-80, 81, 5):
         assert model.region.distance(shapely.Point(x, 18)) < 5.0  # the middle is that of the other carriageway
+
+
+def test_a_crossing_at_the_date_line_and_one_whose_next_nodes_are_far(tmp_path):
+    for latitude, longitude, length in ((-16.8, 179.999, 300), (38.5, -99.0, 2400)):
+        extract = Extract(latitude, longitude)
+        extract.way([(-length, 0), (0, 0), (length, 0)], highway="secondary", name="East Road")
+        extract.way([(0, -length), (0, 0), (0, length)], highway="secondary", name="North Road")
+        path = corner_houses(extract).write(tmp_path / "place.osm")
+        text = re.sub(r'"180\.\d+"', lambda found: f'"{float(found[0][1:-1]) - 360}"', path.read_text(encoding="utf-8"))
+        path.write_text(text, encoding="utf-8")
+        model = finish(build_site(path, AskedSite(near_latlon=(latitude, longitude)))).model
+        assert model.region.bounds == pytest.approx((-87, -87, 87, 87), abs=3)
+
+
+def test_of_several_places_where_streets_meet_one_counts_and_the_others_are_named(tmp_path):
+    extract = Extract()
+    extract.way([(-300, 0), (-150, 0), (150, 0), (300, 0)], highway="secondary", name="East Road")
+    extract.way([(-150, 0), (-150, 80), (150, 80), (150, 0)], highway="residential", name="Crescent")
+    site = built(extract, tmp_path, near_latlon=None, junction=("East Road", "Crescent"))
+    assert "Crescent" in site.model.name
+    assert any("meet in 2 places" in note and "--near-latlon" in note for note in site.model.notes)
