@@ -94,6 +94,7 @@ def passages(shapes: PlanShapes, carriageway: BaseGeometry) -> BaseGeometry:
 def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
     extract = shapes.extract
     drawn: set[int] = set()  # ways that are the outlines of relations
+    known: set[tuple[str, bytes]] = set()
     everything: list[Mapping[int, Way | Relation]] = [extract.relations, extract.ways]
     for elements in everything:
         for number, element in elements.items():
@@ -107,6 +108,11 @@ def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
                 continue
             if isinstance(element, Relation):
                 drawn |= {ref for member, ref, role in element.members if member == "way" and role != "inner"}
+            same = (kind, area.normalize().wkb)
+            if same in known:
+                shapes.dropped["outlines that are drawn twice count once"] += 1
+                continue
+            known.add(same)
             yield _Footprint(area, element.tags, kind == "part")
 
 

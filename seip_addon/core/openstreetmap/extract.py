@@ -23,6 +23,9 @@ _OTHER_FORMATS = {
     b"{": "is JSON; download the place as OpenStreetMap XML (.osm)",
 }
 """How files begin that are given in place of an extract."""
+MAX_TAG = 255  # characters of a tag's value, as in the database of OpenStreetMap
+MAX_ID = 2**62
+_JOINERS = "\u200c\u200d"  # which writing of Persian and Hindi needs, and emoji
 _NO_TAGS: Mapping[str, str] = MappingProxyType({})
 
 NEXT_NODE = 3_000.0  # metres beyond a window within which the next node of a street that leaves it is looked for
@@ -124,7 +127,10 @@ def read_extract(path: Path, within: Window | None = None) -> Generator[Progress
     reader = _Reader(path.name, within, collected)
     yield from read_tags(path, reader.start, reader.end, cure="download the extract again")
     if collected.root not in ("osm", "osmChange"):
-        raise SeipError(f"{path.name} is no extract of OpenStreetMap: its first element is <{collected.root[:40]}>")
+        raise SeipError(
+            f"{path.name} is no extract of OpenStreetMap: its first element is <{collected.root[:40]}>; "
+            "download the place as OpenStreetMap XML (.osm)"
+        )
     if not collected.nodes or collected.near == 0:
         where = " near the place" if within is not None else ""
         raise SeipError(f"{path.name} has no node{where}: take an extract that holds the place")
@@ -180,7 +186,7 @@ class _Reader:
             self._attributes, self._tags, self._refs, self._members = attributes, {}, [], []
             self._deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
         elif tag == "tag":
-            self._tags[attributes.get("k", "")] = attributes.get("v", "").strip()
+            self._tags[attributes.get("k", "")] = _one_line(attributes.get("v", "")[:MAX_TAG])
         elif tag == "nd":
             self._refs.append(self._id(attributes, "ref"))
         elif tag == "member":
@@ -214,11 +220,15 @@ class _Reader:
     def _id(self, attributes: Attributes, name: str) -> int:
         text = attributes.get(name, "")
         try:
-            return int(text)
+            number = int(text)
         except ValueError:
-            raise SeipError(
-                f"{self._name}: {name}={quoted(text)} of an element is no whole number; download the extract again"
-            ) from None
+            number = MAX_ID
+        if abs(number) < MAX_ID:
+            return number
+        raise SeipError(
+            f"{self._name}: {name}={quoted(text)} of an element is no whole number below 2^62; "
+            "download the extract again"
+        )
 
     def _place(self) -> tuple[float, float] | None:
         """Return latitude and longitude, None where they are no place that streets can be projected from."""
@@ -293,6 +303,13 @@ def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
 def named(elements: Mapping[int, Way], keep: Callable[[Tags], bool]) -> Iterator[tuple[int, Way]]:
     """Yield the ways whose tags are to be kept."""
     return ((number, way) for number, way in elements.items() if keep(way.tags))
+
+
+def _one_line(text: str) -> str:
+    """Return a text without breaks, and without characters that change how others are shown."""
+    if not text.isprintable():
+        text = "".join(one if one.isprintable() or one in _JOINERS else " " for one in text)
+    return " ".join(text.split())
 
 
 def _refuse_other_formats(path: Path) -> None:

@@ -54,7 +54,11 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
 
 
 def _without_dates(text: str, streets: StreetFile) -> str:
-    """Return a map that is the same whenever it is made, and says on which side traffic keeps."""
+    """Return a map that is the same whenever it is made, and says on which side traffic keeps.
+
+    Names in it are escaped once: netconvert escapes them twice.
+    """
+    text = re.sub(r"&amp;(amp|apos|gt|lt|quot);", r"&\1;", text)
     text = re.sub(r"<!--.*?-->\s*", "", text, count=1, flags=re.DOTALL)
     text = re.sub(r'(<header [^>]*?)date="[^"]*"', r'\1date=""', text, count=1)
     return text.replace("<road ", '<road rule="LHT" ') if streets.left_hand else text

@@ -22,7 +22,7 @@ from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..streetscape.intersections import intersection, without_plain_joints
 from ..streetscape.place import SCENE_MARGIN
-from .extract import EARTH_RADIUS, Extract, Node, Way, cropped, read_extract, window
+from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
 from .netconvert import convert
 from .plan_shapes import PlanShapes
 from .street_objects import surroundings
@@ -99,6 +99,7 @@ def site_of_extract(
     """
     if place.near is None and not place.streets:
         raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
+    _check(place)
     most = place.reach + STREET_REACH + 200.0
     extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
     near, place_notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
@@ -146,6 +147,19 @@ def site_of_extract(
     )
     dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
     return road_map, description, (*place_notes, *extract.notes, *streets.notes, *dropped)
+
+
+def _check(place: ExtractPlace) -> None:
+    for name, length in (("radius", place.radius), ("approaches", place.approaches)):
+        if length is not None and not 0.0 < length < math.inf:
+            raise SeipError(f"--{name} {length:g} is no length: give metres above zero")
+    if place.near is not None and not (abs(place.near[0]) <= MAX_LATITUDE and abs(place.near[1]) <= 180.0):
+        raise SeipError(
+            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is no place with streets: give degrees, the latitude "
+            f"first, up to {MAX_LATITUDE:g}, then the longitude, up to 180"
+        )
+    if place.near is None and len({name.strip().casefold() for name in place.streets} - {""}) < len(place.streets):
+        raise SeipError('--junction takes the names of two different streets: --junction "One Street" "Other Street"')
 
 
 def surroundings_of_map(

@@ -59,6 +59,8 @@ def test_nodes_outside_a_window_are_passed_over(tmp_path):
         ('<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm>&a;</osm>', "declares a document type or entities"),
         (osm('<node id="x" lat="0" lon="0"/>'), "is no whole number"),
         (osm('<node lat="0" lon="0"/>'), "is no whole number"),
+        (osm(f'<node id="{10**20}" lat="0" lon="0"/>'), "is no whole number below"),
+        ("<html/>", "first element is <html>; download the place"),
         (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "is no whole number"),
     ],
 )
@@ -149,3 +151,12 @@ def test_many_ways_are_joined_at_once():
     ways = [Way((n, (n + 1) % count), {}) for n in range(count)]
     found, left = rings([*ways[::2], *ways[1::2]])
     assert (len(found), len(found[0]), left) == (1, count, 0)
+
+
+def test_tags_are_one_line_of_at_most_255_characters(tmp_path):
+    extract = Extract()
+    for name in ("Two&#10;Lines", "\u202eturned\u202c", "n" * 10**6, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"):
+        extract.way([(0, 0), (10, 0)], highway="residential", name=name)
+    path = written(tmp_path, extract.text().replace("&amp;#10;", "&#10;"))
+    names = [way.tags["name"] for way in read(path).ways.values()]
+    assert names == ["Two Lines", "turned", "n" * 255, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"]

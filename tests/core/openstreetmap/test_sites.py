@@ -138,6 +138,14 @@ def test_a_place_can_be_named_by_its_streets(tmp_path):
             "no street called 'Nowhere Lane'; the closest",
         ),
         ({"near_latlon": None, "junction": ("East Road", "East Road Far")}, "no street called"),
+        ({"near_latlon": None, "junction": ("East Road", "east road")}, "two different streets"),
+        ({"near_latlon": None, "junction": ("East Road", "")}, "two different streets"),
+        ({"near_latlon": (91.0, 0.0)}, "--near-latlon 91 0 is no place with streets"),
+        ({"near_latlon": (0.0, 1e308)}, "is no place with streets"),
+        ({"near_latlon": (float("nan"), 0.0)}, "is no place with streets"),
+        ({"radius": -5.0}, "--radius -5 is no length"),
+        ({"radius": float("nan")}, "--radius nan is no length"),
+        ({"approaches": 0.0}, "--approaches 0 is no length"),
     ],
 )
 def test_a_place_that_is_none_is_refused_in_a_sentence(asked, complaint, tmp_path):
@@ -348,3 +356,30 @@ def test_of_several_places_where_streets_meet_one_counts_and_the_others_are_name
     site = built(extract, tmp_path, near_latlon=None, junction=("East Road", "Crescent"))
     assert "Crescent" in site.model.name
     assert any("meet in 2 places" in note and "--near-latlon" in note for note in site.model.notes)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "St John's Road",
+        'The "Strand" & <Mall>',
+        "\u0634\u0627\u0631\u0639 \u0627\u0644\u0645\u0644\u0643",
+        "\U0001f600 Street",
+    ],
+)
+def test_names_of_streets_are_as_in_the_extract(name, tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="residential", name=name)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="Second")
+    model = built(extract, tmp_path, near_latlon=None, junction=(name, "Second")).model
+    assert set(model.name.split(" / ")) == {name, "Second"}
+    assert name in {place.name for place in model.places}
+
+
+def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
+    extract = crossing()
+    for _ in range(3):
+        extract.house(60, 60, 10, 10)
+    model = built(extract, tmp_path).model
+    assert {row.kind: row.count for row in model.sources()}["Building"] == 5
+    assert any(note.startswith("2 outlines that are drawn twice") for note in model.notes)
