@@ -17,6 +17,7 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 from headless.options import new_parser
 
+from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.sources import source_lines
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
@@ -28,11 +29,14 @@ def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
     asked = _parser().parse_args(argv)
     check_name(asked.output)
+    map_path = asked.output.with_suffix(".xodr")
+    for path in (asked.output, map_path):
+        if path.is_dir():
+            raise SeipError(f"{path} is a folder, and a file of that name would be written; choose another name")
     with runtime.progress_bar() as report:
         built = finish(build_site(asked.source, _asked_site(asked)), report)
         model = built.model
         finish(build_scene(new_file(), model, built.map_name), report)
-    map_path = asked.output.with_suffix(".xodr")
     save_map(built, map_path)
     save_blend(asked.output)
     for note in model.notes:

@@ -1,5 +1,7 @@
 """Triangles seen in plan: their areas, their outline, and heights on them."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -33,6 +35,11 @@ def without(area: BaseGeometry, away: BaseGeometry) -> BaseGeometry:
     except shapely.errors.GEOSException:
         sound = area.buffer(0) if shapely.get_dimensions(area) == 2 else area
         return shapely.difference(sound, away.buffer(0), grid_size=_OVERLAY_GRID)
+
+
+def united(areas: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Return the union of areas in plan that may cross themselves, corners rounded to a grid of 0.1 mm."""
+    return shapely.union_all([shapely.make_valid(area) for area in areas], grid_size=_OVERLAY_GRID)
 
 
 def closed(area: BaseGeometry, gap: float) -> BaseGeometry:

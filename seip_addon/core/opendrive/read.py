@@ -28,7 +28,7 @@ from .road_map import (
 )
 
 _OTHER_FORMATS = {
-    "osm": " as OpenStreetMap does",
+    "osm": " as extracts of OpenStreetMap do (let its name end in .osm)",
     "net": " as networks of SUMO do (netconvert --opendrive-output makes a map of them)",
     "CityModel": " as CityGML does",
     "OpenSCENARIO": " as OpenSCENARIO does",

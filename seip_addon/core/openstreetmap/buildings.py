@@ -13,7 +13,9 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from ..geometry.plan import without
 from ..site.scene_geometry import FROM_EXTRACT
+from ..streetscape.clearing import CLEARANCE
 from ..streetscape.description import Building
 from ..streetscape.roofs import FLAT, RIDGED, SLOPED, Roof
 from .extract import Relation, Tags, Way
@@ -35,7 +37,9 @@ NO_BUILDINGS = {"no", "none", "proposed", "construction", "ruins", "demolished",
 NO_PARTS = {"no", "balcony", "steps", "ramp", "base"}
 SLAB = 0.4  # metres: thickness of a roof that stands on posts
 USUAL_ROOF = 2.5  # metres: height of a roof without one, and at most half of the building's
+PASSAGE_REACH = 8.0  # metres from the middle of a street through a building to the edge of its carriageway at most
 FULLY_PARTED = 0.1  # share of an outline that may lie beside its parts before the rest is a building of its own
+_NOWHERE = shapely.Polygon()
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +49,13 @@ class _Footprint:
     is_part: bool
 
 
-def buildings(shapes: PlanShapes, area: BaseGeometry) -> list[Building]:
+def buildings(shapes: PlanShapes, area: BaseGeometry, passages: BaseGeometry = _NOWHERE) -> list[Building]:
     """Return the buildings that reach into an area.
 
     Parameters
     ----------
-    area : shapely geometry
-        In map coordinates.
+    area, passages : shapely geometry
+        In map coordinates; passages are roads over which buildings begin at `CLEARANCE`.
     """
     found = [one for one in _footprints(shapes) if one.area.intersects(area)]
     usual = _usual_height([one.tags for one in found])
@@ -70,13 +74,27 @@ def buildings(shapes: PlanShapes, area: BaseGeometry) -> list[Building]:
                 body = one.area.difference(shapely.union_all(within))
                 if body.area < FULLY_PARTED * one.area.area:
                     continue
-        solids += [_building(part, one.tags, usual, is_part=one.is_part) for part in polygons(body)]
+        above = body.intersection(passages)
+        for piece, least in ((body if above.is_empty else without(body, passages), 0.0), (above, CLEARANCE)):
+            solids += [_building(part, one.tags, usual, least, is_part=one.is_part) for part in polygons(piece)]
     return [solid for solid in solids if solid is not None]
+
+
+def passages(shapes: PlanShapes, carriageway: BaseGeometry) -> BaseGeometry:
+    """Return where the carriageway leads through buildings."""
+    lines = [
+        shapes.line(way)
+        for way in shapes.extract.ways.values()
+        if "highway" in way.tags and way.tags.get("tunnel") == "building_passage"
+    ]
+    bands = [shapely.LineString(line).buffer(PASSAGE_REACH, cap_style="square") for line in lines if len(line) > 1]
+    return carriageway.intersection(shapely.union_all(bands))
 
 
 def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
     extract = shapes.extract
     drawn: set[int] = set()  # ways that are the outlines of relations
+    known: set[tuple[str, bytes]] = set()
     everything: list[Mapping[int, Way | Relation]] = [extract.relations, extract.ways]
     for elements in everything:
         for number, element in elements.items():
@@ -90,6 +108,11 @@ def _footprints(shapes: PlanShapes) -> Iterator[_Footprint]:
                 continue
             if isinstance(element, Relation):
                 drawn |= {ref for member, ref, role in element.members if member == "way" and role != "inner"}
+            same = (kind, area.normalize().wkb)
+            if same in known:
+                shapes.dropped["outlines that are drawn twice count once"] += 1
+                continue
+            known.add(same)
             yield _Footprint(area, element.tags, kind == "part")
 
 
@@ -122,7 +145,8 @@ def _low(tags: Tags) -> float | None:
     return LOW_BUILDINGS.get(tags.get("building", tags.get("building:part", "")))
 
 
-def _building(outline: shapely.Polygon, tags: Tags, usual: float, *, is_part: bool) -> Building | None:
+def _building(outline: shapely.Polygon, tags: Tags, usual: float, least: float, *, is_part: bool) -> Building | None:
+    """Return a building, or a part of one, that begins at ``least`` metres; None where nothing of it is above."""
     height, is_known = known_height(tags), True
     base = metres(tags.get("min_height", tags.get("building:min_height")), MAX_HEIGHT)
     if base is None:
@@ -132,8 +156,9 @@ def _building(outline: shapely.Polygon, tags: Tags, usual: float, *, is_part: bo
     canopy = "roof" in (tags.get("building"), tags.get("building:part")) or tags.get("building") == "carport"
     if canopy and base == 0.0:
         base = max(height - SLAB, 0.0)
+    base = max(base, least)
     if base >= height:
-        if not is_part:
+        if not is_part or least:
             return None
         base, height = 0.0, max(base, height)
     roof = 0.0

@@ -1,8 +1,9 @@
 """An extract of OpenStreetMap as it is read: nodes, ways and relations with their tags."""
 
+import itertools
 import math
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,6 +12,7 @@ from ..progress import Progress
 from ..storage.xml_stream import Attributes, quoted, read_tags
 
 MAX_ELEMENTS = 3_000_000  # nodes, ways and relations that are kept at most: about a city
+EARTH_RADIUS = 6_350_000.0  # metres: the least there is, so that windows are no smaller than asked for
 MAX_LATITUDE = 85.0  # degrees: nearer to a pole no projection of streets holds
 _OTHER_FORMATS = {
     b"\x00\x00\x00": "is in the PBF format; convert it (osmium cat place.osm.pbf -o place.osm)",
@@ -21,9 +23,16 @@ _OTHER_FORMATS = {
     b"{": "is JSON; download the place as OpenStreetMap XML (.osm)",
 }
 """How files begin that are given in place of an extract."""
+MAX_TAG = 255  # characters of a tag's value, as in the database of OpenStreetMap
+MAX_ID = 2**62
+_JOINERS = "\u200c\u200d"  # which writing of Persian and Hindi needs, and emoji
 _NO_TAGS: Mapping[str, str] = MappingProxyType({})
 
+NEXT_NODE = 3_000.0  # metres beyond a window within which the next node of a street that leaves it is looked for
+
 Tags = Mapping[str, str]
+Window = tuple[float, float, float, float]
+"""South, west, north and east, degrees."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,19 +98,18 @@ class _Collected:
     ways: dict[int, Way] = field(default_factory=dict)
     relations: dict[int, Relation] = field(default_factory=dict)
     repeated: int = 0
+    near: int = 0
     misplaced: int = 0
     root: str = ""
 
 
-def read_extract(
-    path: Path, within: tuple[float, float, float, float] | None = None
-) -> Generator[Progress, None, Extract]:
+def read_extract(path: Path, within: Window | None = None) -> Generator[Progress, None, Extract]:
     """Read an extract in OpenStreetMap's XML, plain or packed with gzip.
 
     Parameters
     ----------
     within : (4,) float, degrees, optional
-        South, west, north, east: nodes outside are passed over.
+        South, west, north, east: what lies outside is passed over, but for the next node of a street that leaves it.
 
     Yields
     ------
@@ -119,8 +127,11 @@ def read_extract(
     reader = _Reader(path.name, within, collected)
     yield from read_tags(path, reader.start, reader.end, cure="download the extract again")
     if collected.root not in ("osm", "osmChange"):
-        raise SeipError(f"{path.name} is no extract of OpenStreetMap: its first element is <{collected.root[:40]}>")
-    if not collected.nodes:
+        raise SeipError(
+            f"{path.name} is no extract of OpenStreetMap: its first element is <{collected.root[:40]}>; "
+            "download the place as OpenStreetMap XML (.osm)"
+        )
+    if not collected.nodes or collected.near == 0:
         if within is None:
             raise SeipError(f"{path.name} has no node: take an extract that holds the place")
         raise SeipError(
@@ -134,19 +145,41 @@ def read_extract(
             f"{path.name} gives {collected.misplaced:,} nodes no place on Earth below {MAX_LATITUDE:g} degrees of "
             "latitude: they are left out"
         )
-    return Extract(path.name, collected.nodes, collected.ways, collected.relations, tuple(notes))
+    extract = Extract(path.name, collected.nodes, collected.ways, collected.relations, tuple(notes))
+    return extract if within is None else cropped(extract, within)
+
+
+def cropped(extract: Extract, within: Window) -> Extract:
+    """Return what of an extract lies within a window, and the next node of each street and track that leaves it."""
+    south, west, north, east = within
+    inside = {
+        number
+        for number, node in extract.nodes.items()
+        if south <= node.latitude <= north and west <= node.longitude <= east
+    }
+    ways = {number: way for number, way in extract.ways.items() if not inside.isdisjoint(way.nodes)}
+    kept = set(inside)
+    for way in ways.values():
+        if "highway" in way.tags or "railway" in way.tags:
+            for one, other in itertools.pairwise(way.nodes):
+                if one in inside or other in inside:
+                    kept |= {one, other}
+    nodes = {number: node for number, node in extract.nodes.items() if number in kept}
+    return replace(extract, nodes=nodes, ways=ways)
 
 
 class _Reader:
     """Handlers of a stream of XML that collect elements."""
 
-    def __init__(self, name: str, within: tuple[float, float, float, float] | None, into: _Collected) -> None:
+    def __init__(self, name: str, within: Window | None, into: _Collected) -> None:
         self._name, self._within, self._into = name, within, into
         self._attributes: Attributes = {}
         self._tags: dict[str, str] = {}
         self._refs: list[int] = []
         self._members: list[tuple[str, int, str]] = []
         self._deleted = False
+        self._middle = None if within is None else (within[1] + within[3]) / 2
+        """Longitude that others are counted from, so that places on both sides of the date line are neighbours."""
 
     def start(self, tag: str, attributes: Attributes) -> None:
         """Take the beginning of an element."""
@@ -156,7 +189,7 @@ class _Reader:
             self._attributes, self._tags, self._refs, self._members = attributes, {}, [], []
             self._deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
         elif tag == "tag":
-            self._tags[attributes.get("k", "")] = attributes.get("v", "").strip()
+            self._tags[attributes.get("k", "")] = _one_line(attributes.get("v", "")[:MAX_TAG])
         elif tag == "nd":
             self._refs.append(self._id(attributes, "ref"))
         elif tag == "member":
@@ -170,9 +203,10 @@ class _Reader:
         number = self._id(self._attributes, "id")
         if tag == "node":
             place = self._place()
-            if place is None or not self._is_within(*place):
+            if place is None or not self._is_within(*place, NEXT_NODE):
                 return
             into.repeated += number in into.nodes
+            into.near += self._is_within(*place)
             into.nodes[number] = Node(*place, tags)
         elif tag == "way":
             into.repeated += number in into.ways
@@ -189,11 +223,15 @@ class _Reader:
     def _id(self, attributes: Attributes, name: str) -> int:
         text = attributes.get(name, "")
         try:
-            return int(text)
+            number = int(text)
         except ValueError:
-            raise SeipError(
-                f"{self._name}: {name}={quoted(text)} of an element is no whole number; download the extract again"
-            ) from None
+            number = MAX_ID
+        if abs(number) < MAX_ID:
+            return number
+        raise SeipError(
+            f"{self._name}: {name}={quoted(text)} of an element is no whole number below 2^62; "
+            "download the extract again"
+        )
 
     def _place(self) -> tuple[float, float] | None:
         """Return latitude and longitude, None where they are no place that streets can be projected from."""
@@ -203,20 +241,25 @@ class _Reader:
             self._into.misplaced += 1
             return None
         if abs(latitude) <= MAX_LATITUDE and abs(longitude) <= 180.0:
-            return latitude, longitude
+            if self._middle is None:
+                self._middle = longitude
+            return latitude, self._middle + math.remainder(longitude - self._middle, 360.0)
         self._into.misplaced += 1
         return None
 
-    def _is_within(self, latitude: float, longitude: float) -> bool:
+    def _is_within(self, latitude: float, longitude: float, beyond: float = 0.0) -> bool:
+        """Return whether a place lies within the window, or so many metres beyond it."""
         if self._within is None:
             return True
         south, west, north, east = self._within
-        return south <= latitude <= north and west <= longitude <= east
+        more = math.degrees(beyond / EARTH_RADIUS)
+        east_more = more / math.cos(math.radians(latitude))
+        return south - more <= latitude <= north + more and west - east_more <= longitude <= east + east_more
 
 
-def window(latitude: float, longitude: float, reach: float) -> tuple[float, float, float, float]:
+def window(latitude: float, longitude: float, reach: float) -> Window:
     """Return south, west, north and east of a square around a place, degrees; ``reach`` is half its side in metres."""
-    north = math.degrees(reach / 6_350_000.0)
+    north = math.degrees(reach / EARTH_RADIUS)
     east = north / math.cos(math.radians(latitude))
     return latitude - north, longitude - east, latitude + north, longitude + east
 
@@ -231,23 +274,40 @@ def rings(ways: Sequence[Way]) -> tuple[list[list[int]], int]:
     open : int
         Number of ways that are part of no ring.
     """
-    waiting = [list(way.nodes) for way in ways if len(way.nodes) > 1]
+    lines = [way.nodes for way in ways if len(way.nodes) > 1]
+    at: dict[int, list[int]] = {}  # the ways that end at a node
+    for index, line in enumerate(lines):
+        for end in {line[0], line[-1]}:
+            at.setdefault(end, []).append(index)
+    used = [False] * len(lines)
     found, left = [], 0
-    while waiting:
-        ring = waiting.pop(0)
-        used = 1
+    for first, line in enumerate(lines):
+        if used[first]:
+            continue
+        ring, joined = list(line), 1
+        used[first] = True
         while ring[0] != ring[-1]:
-            following = next((i for i, way in enumerate(waiting) if ring[-1] in (way[0], way[-1])), None)
-            if following is None:
+            ends = at[ring[-1]]
+            while ends and used[ends[0]]:
+                ends.pop(0)
+            if not ends:
                 break
-            way = waiting.pop(following)
-            ring += (way if way[0] == ring[-1] else way[::-1])[1:]
-            used += 1
+            following = lines[ends[0]]
+            used[ends[0]] = True
+            ring += (following if following[0] == ring[-1] else following[::-1])[1:]
+            joined += 1
         if ring[0] == ring[-1] and len(ring) > 3:
             found.append(ring[:-1])
         else:
-            left += used
+            left += joined
     return found, left
+
+
+def _one_line(text: str) -> str:
+    """Return a text without breaks, and without characters that change how others are shown."""
+    if not text.isprintable():
+        text = "".join(one if one.isprintable() or one in _JOINERS else " " for one in text)
+    return " ".join(text.split())
 
 
 def _refuse_other_formats(path: Path) -> None:

@@ -7,10 +7,9 @@ from pathlib import Path
 from ..errors import SeipError
 from ..progress import Progress
 from ..traffic.sumo_programs import find_sumo, run
-from .streets import SIDEWALK_WIDTH, StreetFile
+from .streets import JOIN_DISTANCE, SIDEWALK_WIDTH, StreetFile
 
 LAYER_HEIGHT = 6.0  # metres between two layers of streets
-JOIN_DISTANCE = 20.0  # metres between nodes that are one junction
 TYPE_FILES = ("osmNetconvert.typ.xml", "osmNetconvertBicycle.typ.xml")
 
 
@@ -43,8 +42,11 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
     ]
     if streets.left_hand:
         options += ["--lefthand", "--opendrive-output.lefthand-left"]
-    if streets.roundabouts:
-        options += ["--junctions.join-exclude", ",".join(map(str, streets.roundabouts))]
+    apart = sorted(
+        frozenset(streets.slip_ends).union(*streets.roundabouts)
+    )  # netconvert joins slip lanes of any length
+    if apart:
+        options += ["--junctions.join-exclude", ",".join(map(str, apart))]
     if streets.elevated:
         options += ["--osm.elevation"]
     yield from run(programs, programs.netconvert, options, "streets of the extract")
@@ -52,7 +54,11 @@ def convert(streets: StreetFile, source: Path, target: Path) -> Generator[Progre
 
 
 def _without_dates(text: str, streets: StreetFile) -> str:
-    """Return a map that is the same whenever it is made, and says on which side traffic keeps."""
+    """Return a map that is the same whenever it is made, and says on which side traffic keeps.
+
+    Names in it are escaped once: netconvert escapes them twice.
+    """
+    text = re.sub(r"&amp;(amp|apos|gt|lt|quot);", r"&\1;", text)
     text = re.sub(r"<!--.*?-->\s*", "", text, count=1, flags=re.DOTALL)
     text = re.sub(r'(<header [^>]*?)date="[^"]*"', r'\1date=""', text, count=1)
     return text.replace("<road ", '<road rule="LHT" ') if streets.left_hand else text

@@ -109,7 +109,7 @@ def _is_nearly_whole(way: Way, line: Float) -> bool:
 
 def polygons(area: BaseGeometry) -> Iterator[shapely.Polygon]:
     """Yield the polygons of an area."""
-    return (part for part in shapely.get_parts(area) if part.geom_type == "Polygon")
+    return (part for part in shapely.get_parts(area) if part.geom_type == "Polygon" and not part.is_empty)
 
 
 def spaced(line: Float, spacing: float) -> Float:

@@ -1,8 +1,9 @@
 """From an extract of OpenStreetMap to a map of its streets and a description of what stands beside them."""
 
 import difflib
+import itertools
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,15 +22,16 @@ from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription
 from ..streetscape.intersections import intersection, without_plain_joints
 from ..streetscape.place import SCENE_MARGIN
-from .extract import Extract, Way, read_extract, window
+from .extract import EARTH_RADIUS, MAX_LATITUDE, Extract, Node, Way, cropped, read_extract, window
 from .netconvert import convert
 from .plan_shapes import PlanShapes
 from .street_objects import surroundings
-from .streets import is_street, write_streets
+from .streets import StreetFile, is_street, write_streets
 
 EXTRACT_SUFFIXES = (".osm", ".osm.gz", ".osm.xml")
 STREET_REACH = 450.0  # metres beyond the region within which streets are laid out: traffic comes from there
 MAX_JUNCTION_DISTANCE = 60.0  # metres from a place to the junction that is meant at most
+MAX_ROUNDABOUT = 200.0  # metres across which a roundabout is one place at most
 STANDS_AROUND = 20.0  # metres beyond the scene within which what stands there counts
 
 
@@ -60,7 +62,12 @@ class ExtractPlace:
     @property
     def reach(self) -> float:
         """How far the region may reach from the place, metres."""
-        return self.radius or (self.approaches or DEFAULT_RADIUS) + MAX_JUNCTION_DISTANCE
+        return self.radius or self.along + MAX_JUNCTION_DISTANCE
+
+    @property
+    def along(self) -> float:
+        """How far the region follows the approaches of a junction, metres."""
+        return self.approaches or DEFAULT_RADIUS
 
 
 def is_extract(path: Path) -> bool:
@@ -92,9 +99,11 @@ def site_of_extract(
     """
     if place.near is None and not place.streets:
         raise SeipError(f'{path.name} needs a place: --near-latlon LAT LON, or --junction "One Street" "Other Street"')
-    around = None if place.near is None else window(*place.near, place.reach + STREET_REACH + 200.0)
-    extract = yield from read_extract(path, around)
-    near = place.near or _meeting_place(extract, place.streets)
+    _check(place)
+    most = place.reach + STREET_REACH + 200.0
+    extract = yield from read_extract(path, None if place.near is None else window(*place.near, most))
+    near, place_notes = (place.near, ()) if place.near else _meeting_place(extract, place.streets)
+    extract = cropped(extract, window(*near, most))
     streets_path = map_path.with_suffix(".streets.osm")
     streets = write_streets(
         extract,
@@ -116,12 +125,15 @@ def site_of_extract(
     if (not junction or junction[0][1] > MAX_JUNCTION_DISTANCE) and place.radius is None:
         raise SeipError(
             f"no junction within {MAX_JUNCTION_DISTANCE:g} m of {near[0]:.5f}, {near[1]:.5f}: give --radius for a "
-            "place between junctions"
+            "place between junctions, or --service-roads where driveways or aisles are streets too"
         )
-    carriageway = _carriageway(lanes, middle, place.reach)
-    area = shapely.Point(middle).buffer(place.reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    roundabouts = _roundabouts(road_map, streets, extract)
+    together = intersection(lanes, junction[0][0].id, roundabouts) if junction else frozenset[str]()
+    reach = place.reach if place.radius else max(place.reach, _reach(lanes, together, middle) + place.along)
+    carriageway = _carriageway(lanes, middle, reach)
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     beside = surroundings(shapes, area, carriageway)
-    names = _street_names(road_map, lanes, junction[0][0].id) if junction else ()
+    names = _street_names(road_map, lanes, junction[0][0].id, together) if junction else ()
     description = replace(
         beside,
         name=STREETS.join(names[:2]),
@@ -130,10 +142,24 @@ def site_of_extract(
         radius=place.radius,
         approaches=place.approaches,
         from_centre_lines=True,
+        roundabouts=roundabouts,
         map_source=FROM_EXTRACT,
     )
     dropped = [f"{number} {reason}" for reason, number in shapes.dropped.items() if number]
-    return road_map, description, (*extract.notes, *streets.notes, *dropped)
+    return road_map, description, (*place_notes, *extract.notes, *streets.notes, *dropped)
+
+
+def _check(place: ExtractPlace) -> None:
+    for name, length in (("radius", place.radius), ("approaches", place.approaches)):
+        if length is not None and not 0.0 < length < math.inf:
+            raise SeipError(f"--{name} {length:g} is no length: give metres above zero")
+    if place.near is not None and not (abs(place.near[0]) <= MAX_LATITUDE and abs(place.near[1]) <= 180.0):
+        raise SeipError(
+            f"--near-latlon {place.near[0]:g} {place.near[1]:g} is no place with streets: give degrees, the latitude "
+            f"first, up to {MAX_LATITUDE:g}, then the longitude, up to 180"
+        )
+    if place.near is None and len({name.strip().casefold() for name in place.streets} - {""}) < len(place.streets):
+        raise SeipError('--junction takes the names of two different streets: --junction "One Street" "Other Street"')
 
 
 def surroundings_of_map(
@@ -198,14 +224,37 @@ def _carriageway(lanes: Sequence[LaneSurface], middle: Float, reach: float) -> B
     return shapely.union_all([shapely.make_valid(lane.polygon) for lane in driving if road_surface.is_near(lane, near)])
 
 
-def _street_names(road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str) -> tuple[str, ...]:
+def _roundabouts(road_map: RoadMap, streets: StreetFile, extract: Extract) -> tuple[frozenset[str], ...]:
+    """Return the ids of the junctions of each roundabout; of one that is a whole quarter each stays its own."""
+    by_node = {junction.name: junction.id for junction in road_map.junctions}
+    found = []
+    for nodes in streets.roundabouts:
+        latitudes = [extract.nodes[number].latitude for number in nodes]
+        if max(latitudes) - min(latitudes) < math.degrees(MAX_ROUNDABOUT / EARTH_RADIUS):
+            found.append(frozenset(by_node[str(number)] for number in nodes if str(number) in by_node))
+    return tuple(found)
+
+
+def _reach(lanes: Sequence[LaneSurface], junctions: Collection[str], middle: Float) -> float:
+    """Return how far junctions reach from a place, metres."""
+    corners = [lane.left[:, :2] - middle for lane in lanes if lane.junction_id in junctions]
+    return float(np.hypot(*np.concatenate([np.zeros((1, 2)), *corners]).T).max())
+
+
+def _street_names(
+    road_map: RoadMap, lanes: Sequence[LaneSurface], junction_id: str, together: Collection[str]
+) -> tuple[str, ...]:
+    """Return the names of the streets that meet at junctions that are one, first those of the one in the middle."""
     meeting = streets_of_junctions(road_map, lanes)
-    together = sorted(intersection(lanes, junction_id), key=lambda number: number != junction_id)
-    return tuple(dict.fromkeys(name for number in together for name in meeting.get(number, ())))
+    numbers = sorted(together, key=lambda number: (number != junction_id, number))
+    return tuple(dict.fromkeys(name for number in numbers for name in meeting.get(number, ())))
 
 
-def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[float, float]:
-    """Return latitude and longitude of where streets meet: the mean of the nodes that they share."""
+def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[tuple[float, float], tuple[str, ...]]:
+    """Return latitude and longitude of where streets meet, and a note where they meet in several places.
+
+    It is the mean of the nodes that they share and that lie together; the most nodes count.
+    """
     named = {name: _streets_called(extract, name) for name in names}
     for name, ways in named.items():
         if not ways:
@@ -215,11 +264,29 @@ def _meeting_place(extract: Extract, names: tuple[str, ...]) -> tuple[float, flo
     if not shared:
         both = " and ".join(map(repr, names))
         raise SeipError(f"{both} do not meet in {extract.name}: name streets that share a node")
-    places = [extract.nodes[number] for number in shared]
-    return (
-        sum(node.latitude for node in places) / len(places),
-        sum(node.longitude for node in places) / len(places),
+    groups: list[list[Node]] = []
+    for node in (extract.nodes[number] for number in shared):
+        met = [group for group in groups if any(_distance(node, other) < MAX_JUNCTION_DISTANCE for other in group)]
+        groups = [*(group for group in groups if group not in met), [node, *itertools.chain(*met)]]
+    places = [
+        (sum(node.latitude for node in group) / len(group), sum(node.longitude for node in group) / len(group))
+        for group in sorted(groups, key=len, reverse=True)
+    ]
+    if len(places) == 1:
+        return places[0], ()
+    first, *others = [f"{latitude:.5f} {longitude:.5f}" for latitude, longitude in places[:4]]
+    note = (
+        f"{' and '.join(names)} meet in {len(places)} places, of which the one at {first} counts: for another give "
+        f"--near-latlon {' or '.join(others)}"
     )
+    return places[0], (note,)
+
+
+def _distance(one: Node, other: Node) -> float:
+    """Return the distance between two nodes that are not far from each other, metres."""
+    north = math.radians(one.latitude - other.latitude)
+    east = math.radians(one.longitude - other.longitude) * math.cos(math.radians(one.latitude))
+    return EARTH_RADIUS * math.hypot(north, east)
 
 
 def _streets_called(extract: Extract, name: str) -> list[Way]:

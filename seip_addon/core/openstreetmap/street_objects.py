@@ -10,7 +10,7 @@ from ..arrays import Float
 from ..site.scene_geometry import ASSUMED, FROM_EXTRACT
 from ..streetscape.description import Poles, SideWay, SiteDescription, Slab, Trees, Wall
 from ..streetscape.map_furniture import CROWN_SHARE, LIGHT_ARM, LIGHT_HEIGHT, TREE_HEIGHT
-from .buildings import buildings
+from .buildings import buildings, passages
 from .extract import Node, Tags, Way
 from .plan_shapes import PlanShapes, polygons, spaced
 from .quantities import metres
@@ -69,7 +69,7 @@ def surroundings(shapes: PlanShapes, area: BaseGeometry, carriageway: BaseGeomet
         if node.tags and area.intersects(shapely.Point(place := shapes.point(node)))
     ]
     return SiteDescription(
-        buildings=tuple(buildings(shapes, area)),
+        buildings=tuple(buildings(shapes, area, passages(shapes, carriageway))),
         trees=(*_single_trees(nodes), *_tree_rows(shapes, area)),
         walls=tuple(_barriers(shapes, area)),
         street_lights=tuple(_lamps(nodes)),

@@ -1,8 +1,9 @@
 """Streets of an extract, chosen and made explicit for SUMO's netconvert: what counts as a street, lanes, pavements."""
 
+import itertools
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -37,6 +38,7 @@ CYCLE_LANE_WIDTH, SIDEWALK_WIDTH = 1.5, 2.5  # metres
 _SIDES = {(True, True): "both", (True, False): "left", (False, True): "right", (False, False): "none"}
 _FIRST_OTHER = "\u0900"  # from here on (Devanagari, Thai, Chinese …) the font of the pictures has no letters
 MAX_MEDIAN = 35.0  # metres between the middles of two carriageways of one street
+JOIN_DISTANCE = 20.0  # metres between nodes that are one junction
 MIN_ELEVATED = 0.8  # share of a street network's nodes that must have an elevation for it to be used
 
 
@@ -52,8 +54,10 @@ class StreetFile:
         Whether its nodes have elevations.
     left_hand : bool
         Whether traffic keeps to the left.
-    roundabouts : tuple of int
-        Nodes of roundabouts, each of which is a junction of its own.
+    roundabouts : tuple of frozenset of int
+        Nodes of each roundabout: where streets meet it is a junction of its own.
+    slip_ends : tuple of int
+        Nodes where a slip lane leaves or joins a street, apart from other nodes where streets meet.
     notes : tuple of str
         What was assumed.
     """
@@ -61,7 +65,8 @@ class StreetFile:
     streets: int
     elevated: bool
     left_hand: bool
-    roundabouts: tuple[int, ...]
+    roundabouts: tuple[frozenset[int], ...]
+    slip_ends: tuple[int, ...]
     notes: tuple[str, ...]
 
 
@@ -110,9 +115,44 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    round_ways = [way for _, way in pieces if _is_roundabout(way.tags)]
-    roundabouts = tuple(dict.fromkeys(number for way in round_ways for number in way.nodes))
-    return StreetFile(len(pieces), elevated, left_hand, roundabouts, tuple(notes))
+    roundabouts = _joined(way.nodes for _, way in pieces if _is_roundabout(way.tags))
+    slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
+    return StreetFile(len(pieces), elevated, left_hand, roundabouts, slip_ends, tuple(notes))
+
+
+def _slip_ends(extract: Extract, ways: Sequence[Way]) -> Iterator[int]:
+    """Yield the ends of one-way links that lie farther than `JOIN_DISTANCE` from any other node where streets meet."""
+    beside: dict[int, set[int]] = {}
+    for way in ways:
+        for one, other in itertools.pairwise(way.nodes):
+            beside.setdefault(one, set()).add(other)
+            beside.setdefault(other, set()).add(one)
+    meeting = [number for number, others in beside.items() if len(others) > 2]
+    places = _in_metres(extract, [extract.nodes[number] for number in meeting])
+    links = {
+        end for way in ways if _is_link(way.tags) and is_one_way(way.tags) for end in (way.nodes[0], way.nodes[-1])
+    }
+    for number, place in zip(meeting, places, strict=True):
+        if number in links and np.sort(np.hypot(*(places - place).T))[1:2].min(initial=math.inf) > JOIN_DISTANCE:
+            yield number
+
+
+def _in_metres(extract: Extract, nodes: Sequence[Node]) -> Float:
+    """Return where nodes are (n, 2), metres about the extract's first node."""
+    first = next(iter(extract.nodes.values()))
+    east = 111_320.0 * math.cos(math.radians(first.latitude))
+    return np.array(
+        [((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0) for node in nodes]
+    ).reshape(-1, 2)
+
+
+def _joined(ways: Iterable[tuple[int, ...]]) -> tuple[frozenset[int], ...]:
+    """Return the nodes of ways, of those together that share one."""
+    found: list[frozenset[int]] = []
+    for nodes in ways:
+        met = [one for one in found if not one.isdisjoint(nodes)]
+        found = [*(one for one in found if one not in met), frozenset(nodes).union(*met)]
+    return tuple(found)
 
 
 def elevation(node: Node) -> float | None:
@@ -158,7 +198,8 @@ def _runs(inside: list[bool]) -> Iterator[tuple[int, int]]:
 
 
 def _node(number: int, node: Node, height: float | None) -> list[str]:
-    place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{node.longitude:.9f}"'
+    longitude = math.remainder(node.longitude, 360.0)
+    place = f'<node id="{number}" lat="{node.latitude:.9f}" lon="{longitude:.9f}"'
     tags = {key: node.tags[key] for key in ("highway", "crossing", "railway") if key in node.tags}
     if height is not None:
         tags["ele"] = f"{height:.3f}"
@@ -345,15 +386,7 @@ class _Medians:
 
     def _line(self, way: Way) -> Float:
         """Return a way (n, 2) in metres about the extract's first node, in the direction of its traffic."""
-        nodes = self._extract.line(way)
-        first = next(iter(self._extract.nodes.values()))
-        east = 111_320.0 * math.cos(math.radians(first.latitude))
-        line = np.array(
-            [
-                ((node.longitude - first.longitude) * east, (node.latitude - first.latitude) * 110_574.0)
-                for node in nodes
-            ]
-        )
+        line = _in_metres(self._extract, self._extract.line(way))
         return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
 
 

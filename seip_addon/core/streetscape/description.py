@@ -171,6 +171,8 @@ class SiteDescription:
     from_centre_lines : bool
         Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
         other are one, and holes between their lanes no islands.
+    roundabouts : tuple of frozenset of str
+        Ids of junctions that are one roundabout each, in a map made of middle lines.
     map_source : str
         Who says where the roads are.
     """
@@ -195,6 +197,7 @@ class SiteDescription:
     posts: tuple[Poles, ...] = ()
     ways: tuple[SideWay, ...] = ()
     from_centre_lines: bool = False
+    roundabouts: tuple[frozenset[str], ...] = ()
     map_source: str = FROM_MAP
 
     @property

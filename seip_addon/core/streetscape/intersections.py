@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from shapely.affinity import rotate
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
-from ..geometry.plan import closed
+from ..geometry.plan import closed, united
 from ..opendrive import LaneSurface, junction_area
 
 MIN_ARMS = 3  # arms of a junction; where fewer meet, a street goes on
@@ -29,10 +30,11 @@ MAX_INTERSECTION = 45.0  # metres from the junction in the middle to the farthes
 def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, ...]:
     """Return lanes of which those are in no junction that lie where no more than two arms meet."""
     areas = _areas(surfaces)
-    ends, outwards = [], []
+    ends, outwards, roads = [], [], []
     for lane in surfaces:
         if lane.junction_id is None:
             for row, next_row in ((0, 1), (-1, -2)):
+                roads.append((lane.road_id if lane.lane_type == "driving" else None, row))
                 ends.append(shapely.LineString([lane.left[row, :2], lane.right[row, :2]]))
                 outwards.append(lane.left[next_row, :2] - lane.left[row, :2])
     tree = shapely.STRtree(ends)
@@ -40,9 +42,20 @@ def without_plain_joints(surfaces: Sequence[LaneSurface]) -> tuple[LaneSurface, 
     for number, area in areas.items():
         touching = tree.query(area, predicate="dwithin", distance=TOUCH)
         arms = shapely.union_all([ends[index].buffer(ARM_GAP / 2) for index in touching])
-        if max(len(shapely.get_parts(arms)), _directions([outwards[index] for index in touching])) < MIN_ARMS:
+        meeting = (
+            len(shapely.get_parts(arms)),
+            _directions([outwards[index] for index in touching]),
+            _two_way_streets({roads[index] for index in touching}),
+        )
+        if max(meeting) < MIN_ARMS:
             joints.add(number)
     return tuple(replace(lane, junction_id=None) if lane.junction_id in joints else lane for lane in surfaces)
+
+
+def _two_way_streets(ends: Iterable[tuple[str | None, int]]) -> int:
+    """Return how many two-way streets at most have ends of their roads, which are of one way each, in one place."""
+    rows = [row for road, row in ends if road is not None]
+    return min(rows.count(0), rows.count(-1))
 
 
 def _directions(vectors: Sequence[Float]) -> int:
@@ -55,13 +68,24 @@ def _directions(vectors: Sequence[Float]) -> int:
     return len(found)
 
 
-def intersection(surfaces: Sequence[LaneSurface], junction_id: str) -> frozenset[str]:
-    """Return the ids of the junctions that are one intersection with a junction."""
+def intersection(
+    surfaces: Sequence[LaneSurface], junction_id: str, roundabouts: Iterable[frozenset[str]] = ()
+) -> frozenset[str]:
+    """Return the ids of the junctions that are one intersection with a junction.
+
+    Parameters
+    ----------
+    roundabouts : iterable of frozenset of str
+        Ids of junctions that are one roundabout each.
+    """
     areas = _areas(surfaces)
     if junction_id not in areas:
         return frozenset({junction_id})
-    middle = areas[junction_id].centroid
-    found, waiting = {junction_id}, [junction_id]
+    found = {junction_id}.union(*(one & areas.keys() for one in roundabouts if junction_id in one))
+    middle = shapely.union_all([areas[number] for number in found]).centroid
+    away = max(areas[number].centroid.distance(middle) for number in found)
+    most = max(MAX_INTERSECTION, away + JUNCTION_REACH)
+    waiting = sorted(found)
     while waiting:
         area = areas[waiting.pop()]
         near = {
@@ -69,7 +93,7 @@ def intersection(surfaces: Sequence[LaneSurface], junction_id: str) -> frozenset
             for number, other in areas.items()
             if number not in found
             and area.distance(other) <= JUNCTION_REACH
-            and other.centroid.distance(middle) <= MAX_INTERSECTION
+            and other.centroid.distance(middle) <= most
         }
         found |= near
         waiting += sorted(near)
@@ -90,20 +114,47 @@ def with_other_carriageways(
     names : mapping of str to str
         Of the streets, by the ids of their roads.
     """
-    area = shapely.union_all([shapely.make_valid(lane.polygon) for lane in lanes])
+    area = united(lane.polygon for lane in lanes)
     bands: dict[str, list[tuple[BaseGeometry, float]]] = {}
     for lane in lanes:
         middle = (lane.left[:, :2] + lane.right[:, :2]) / 2
         if names.get(lane.road_id) and lane.junction_id is None and np.ptp(middle, axis=0).max() > 0:
             band = shapely.LineString(middle).buffer(MAX_MEDIAN, cap_style="flat")
             bands.setdefault(names[lane.road_id], []).append((band, _heading(lane)))
+    sides = {name: closed(united(band for band, _ in own), JUNCTION_REACH) for name, own in bands.items()}
     others = [
-        shapely.make_valid(lane.polygon).intersection(band)
+        shapely.make_valid(lane.polygon).intersection(sides[names[lane.road_id]])
         for lane in surfaces
-        for band, heading in bands.get(names.get(lane.road_id, ""), ())
-        if abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL
+        if any(
+            abs(math.remainder(_heading(lane) - heading, math.pi)) < PARALLEL and band.intersects(lane.polygon)
+            for band, heading in bands.get(names.get(lane.road_id, ""), ())
+        )
     ]
-    return shapely.union_all([area, *others])
+    streets = united([area, *others])
+    links = [
+        lane.polygon for lane in surfaces if names.get(lane.road_id) not in bands and _leads_between(lane, streets)
+    ]
+    return united([streets, united(links).intersection(united(sides.values()))])
+
+
+def box_along(area: BaseGeometry, lanes: Iterable[LaneSurface]) -> BaseGeometry:
+    """Return the smallest rectangle around a junction's area that lies along one of the roads that meet there."""
+    meeting = [
+        lane
+        for lane in lanes
+        if lane.junction_id is None and lane.polygon.distance(area) < TOUCH and not _leads_between(lane, area)
+    ]
+    boxes = [
+        rotate(shapely.envelope(rotate(area, -heading, (0, 0), use_radians=True)), heading, (0, 0), use_radians=True)
+        for heading in map(_heading, meeting)
+    ]
+    return min(boxes, key=lambda box: float(box.area), default=shapely.minimum_rotated_rectangle(area))
+
+
+def _leads_between(lane: LaneSurface, area: BaseGeometry) -> bool:
+    """Return whether a lane begins and ends at an area."""
+    ends = [shapely.Point((lane.left[row, :2] + lane.right[row, :2]) / 2) for row in (0, -1)]
+    return all(area.distance(end) < TOUCH for end in ends)
 
 
 def _heading(lane: LaneSurface) -> float:
@@ -114,8 +165,8 @@ def _heading(lane: LaneSurface) -> float:
 
 def filled(surfaces: Iterable[LaneSurface]) -> BaseGeometry:
     """Return the area of a junction's lanes with the holes between them, and narrow gaps at its edge, filled."""
-    area = closed(shapely.union_all([shapely.make_valid(lane.polygon) for lane in surfaces]), 0.5)
-    return shapely.union_all([shapely.Polygon(part.exterior) for part in _polygons(area)])
+    area = closed(united(lane.polygon for lane in surfaces), 0.5)
+    return united(shapely.Polygon(part.exterior) for part in _polygons(area))
 
 
 def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:

@@ -17,6 +17,7 @@ from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
 from ..site.sources import SourceCount, count_sources
 from . import road_surface, street_furniture
+from .clearing import clear
 from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
 from .intersections import without_plain_joints
@@ -40,7 +41,7 @@ from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
-from .terrain import Terrain
+from .terrain import Terrain, cut
 
 STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
@@ -159,6 +160,8 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     yield next(stages)
     street = _surroundings(place.surfaces, origin, shifted(region, -origin))
     yield next(stages)
+    on_map = (shifted(area, origin) for area in (street.roadside.carriageway, street.roadside.mouths))
+    description, clear_notes = clear(description, *on_map)
     around = shifted(street.extent, origin)
     placed = local_objects(placed_objects(road_map, area=around), origin)
     away = levels.other_roads()
@@ -174,7 +177,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     furniture = [*objects, *signals, *_described_parts(description, street)]
     beside = _side_way_parts(description, street, below)
     yield next(stages)
-    pavement, notes = _pavement_parts(street, below, fill=description.from_centre_lines)
+    pavement, notes = _pavement_parts(street, below, off_lanes=description.from_centre_lines)
     yield next(stages)
     carriageway = _surface_parts(street, fill=description.from_centre_lines)
     yield next(stages)
@@ -200,7 +203,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(_with_source(part, description.map_source) for part in parts if part.solid.faces),
         region=street.region,
-        notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
+        notes=(*place_notes, *_level_notes(levels), *clear_notes, *notes, *_furniture_notes(placed, signals)),
         warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
         places=named_places(street.lanes, {road.id: road.name for road in road_map.roads}, placed, street.region),
     )
@@ -281,23 +284,29 @@ def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGe
 
 
 def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
+    """Return the surfaces of lanes by group; with ``fill`` the driving lanes have no small holes."""
     groups = {road_surface.group(lane) for lane in street.lanes}
-    return [
-        Part(
-            name,
-            street_furniture.from_faces(
-                road_surface.group_triangles(street.lanes, group, street.extent, fill=fill), material
-            ),
-            (role,),
-        )
-        for group, (name, material, role) in SURFACES.items()
-        if group in groups
-    ]
+    parts = []
+    for group, (name, material, role) in SURFACES.items():
+        if group in groups:
+            triangles = road_surface.group_triangles(street.lanes, group, street.extent, fill=fill)
+            if fill and group == "driving":
+                holes = road_surface.small_holes(street.roadside.carriageway).intersection(street.extent)
+                triangles = np.concatenate([triangles, street.terrain.drape(holes, spacing=OVERLAY_SPACING)])
+            parts.append(Part(name, street_furniture.from_faces(triangles, material), (role,)))
+    return parts
 
 
-def _pavement_parts(street: _Surroundings, below: BaseGeometry, *, fill: bool) -> tuple[list[Part], tuple[str, ...]]:
-    """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes."""
-    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent, fill=fill)
+def _pavement_parts(
+    street: _Surroundings, below: BaseGeometry, *, off_lanes: bool
+) -> tuple[list[Part], tuple[str, ...]]:
+    """Return pavements near the region (where posts may stand), those beyond, their kerbs, verges, and notes.
+
+    With ``off_lanes`` they give way to the carriageway where both lie on each other.
+    """
+    own = road_surface.group_triangles(street.lanes, "sidewalk", street.extent)
+    if off_lanes:
+        own = cut(own, street.roadside.carriageway)
     if len(own) == 0:
         verge = _verge_strip(street, street.roadside.sides(), below)
         return [verge], ("the map has no pavements: new posts may stand on a strip of verge",)

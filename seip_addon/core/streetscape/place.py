@@ -17,11 +17,10 @@ from . import road_surface
 from .approaches import approach_lanes
 from .description import DEFAULT_RADIUS, SiteDescription
 from .geographic_position import looks_like_degrees
-from .intersections import JUNCTION_REACH, filled, intersection, with_other_carriageways
+from .intersections import JUNCTION_REACH, box_along, filled, intersection, with_other_carriageways
 from .levels import Levels, split_levels
 
 MIN_SHARE_OF_JUNCTION = 0.5  # of a junction's area that a region holds from which on it holds all of it
-MIN_PIECE = 6.0  # square metres: smaller pieces of other carriageways, and smaller holes, do not count
 SCENE_MARGIN = 40.0  # metres that the scene extends beyond the region of interest, for occluders at its edge
 MAX_ROAD_DISTANCE = 10.0  # roads this near to the middle of the place (metres) may each be the one that is meant
 
@@ -109,7 +108,7 @@ class Place:
         junctions = [filled([lane for lane in nearby if lane.junction_id == number]) for number in numbers]
         inside = [one for one in junctions if one.intersection(area).area > MIN_SHARE_OF_JUNCTION * one.area]
         whole = closed(shapely.union_all([area, *inside]), road_surface.MAX_SEAM)
-        return road_surface.without_crumbs(whole, least=MIN_PIECE)
+        return road_surface.without_crumbs(whole, least=road_surface.MIN_ISLAND_AREA)
 
     def weighted_areas(self) -> list[tuple[str, BaseGeometry, float]]:
         """Return name, area and weight of the weighted regions.
@@ -141,7 +140,7 @@ class Place:
         if description.from_centre_lines and description.near is not None:
             nearest = nearest_junctions(self.road_map, self.surfaces, float(self.centre[0]), float(self.centre[1]), 1)
             if nearest and nearest[0][1] <= JUNCTION_REACH:
-                junctions = intersection(self.surfaces, nearest[0][0].id)
+                junctions = self._one_place(nearest[0][0])
                 return approach_lanes(self.surfaces, junctions, description.radius or DEFAULT_RADIUS)
         return self.surfaces
 
@@ -155,8 +154,9 @@ class Place:
         return self._one_place(self._junction)
 
     def _one_place(self, junction: Junction) -> frozenset[str]:
-        joined = self.description.from_centre_lines
-        return intersection(self.surfaces, junction.id) if joined else frozenset({junction.id})
+        if not self.description.from_centre_lines:
+            return frozenset({junction.id})
+        return intersection(self.surfaces, junction.id, self.description.roundabouts)
 
     def _found(self, id_or_name: str) -> Junction:
         return find_junction(self.road_map, self.surfaces, id_or_name)
@@ -172,6 +172,8 @@ class Place:
 
     def _central_box(self, junction: Junction) -> BaseGeometry:
         """Return the smallest rectangle around a junction's driving lanes; it lies along the roads' axes."""
+        if self.description.from_centre_lines:
+            return box_along(self._driving_area(junction), road_surface.in_groups(self.surfaces, ["driving"]))
         return shapely.minimum_rotated_rectangle(self._driving_area(junction))
 
     def _no_driving_lane(self) -> SeipError:

@@ -36,7 +36,6 @@ CORNER_NOTCH = 3.0  # notches up to twice this (metres) at the corners of a junc
 MAX_CORNER, MAX_ENDS = 40.0, 20.0
 """A corner is no longer than this along the carriageway, and along the pavements at its two ends (metres)."""
 JUNCTION_SPACING = 4.0
-MIN_OVERLAP = 0.5  # square metres of a lane on driving lanes from which on it gives way to them
 KERB_HEIGHT = 0.12
 KERB_DEPTH = 0.35
 MARKING_WIDTH = 0.12
@@ -47,6 +46,7 @@ STOP_LINE_SETBACK = 1.0
 SNAP_GRID = 1e-4  # grid (metres) that plans snap to when they are joined
 MIN_MARKED_WIDTH = 1.0  # lanes that are narrower than this (metres) somewhere are tapers; nothing is painted along them
 MAX_SEAM = 0.05  # gaps up to twice this (metres) between the lanes of two roads are closed in outlines
+MIN_ISLAND_AREA = 15.0  # m²: smaller holes of a carriageway that was made of middle lines are no islands
 MAX_ISLAND_AREA = 400.0  # holes of the carriageway smaller than this (m²) are islands, on which no post is assumed
 MAX_MEDIAN_WIDTH = 12.0  # holes narrower than this (metres) are medians: likewise
 MAX_OPEN_MEDIAN_WIDTH = 6.0  # narrower gaps (metres) between carriageways are medians though no junction closes them
@@ -110,6 +110,11 @@ def bare_sides(roadside: Roadside, pavement: BaseGeometry) -> BaseGeometry:
     is_bare = ~shapely.intersects(pavement, beside)
     bare = shapely.line_merge(shapely.multilinestrings(np.stack([start, stop], axis=1)[is_bare]))
     return shapely.union_all([line for line in shapely.get_parts(bare) if line.length >= MIN_SIDE_LENGTH])
+
+
+def small_holes(area: BaseGeometry) -> BaseGeometry:
+    """Return the holes of an area that are too small for islands: between lanes where their number changes."""
+    return without(_without_holes(area, least=MIN_ISLAND_AREA), area)
 
 
 def _is_corner(notch: BaseGeometry, kerb: BaseGeometry, walked: BaseGeometry) -> bool:
@@ -202,11 +207,7 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
     groups give way to driving lanes of other roads, too.
     """
     lanes = in_groups(surfaces, [name])
-    outside = [lane for lane in lanes if lane.junction_id is None]
-    given = [lane.triangles for lane in outside]
-    if fill and name != "driving":
-        given = _beside_driving(outside, _plan(in_groups(surfaces, ["driving"])))
-    pieces = [np.empty((0, 3, 3)), *given]
+    pieces = [np.empty((0, 3, 3)), *(lane.triangles for lane in lanes if lane.junction_id is None)]
     for junction in sorted({lane.junction_id for lane in lanes if lane.junction_id is not None}):
         own = [lane for lane in lanes if lane.junction_id == junction]
         area = lane_outline(own)
@@ -218,21 +219,9 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
         terrain = Terrain(np.concatenate([lane.triangles for lane in own]))
         pieces.append(terrain.drape(area, spacing=JUNCTION_SPACING))
     beyond = shapely.box(*extent.buffer(10 * MAX_STEP).bounds).difference(extent)
+    if fill and name != "driving":
+        beyond = beyond.union(_plan(in_groups(surfaces, ["driving"])).buffer(-MAX_SEAM))
     return cut(np.concatenate(pieces), beyond)
-
-
-def _beside_driving(lanes: Sequence[LaneSurface], driving: BaseGeometry) -> list[Float]:
-    """Return the triangles of lanes without what lies on driving lanes."""
-    shapely.prepare(driving)
-    pieces = []
-    for lane in lanes:
-        over = shapely.make_valid(lane.polygon)
-        if driving.intersects(over) and driving.intersection(over).area > MIN_OVERLAP:
-            rest = without_crumbs(without(over, driving.buffer(MAX_SEAM)))
-            pieces.append(Terrain(lane.triangles).drape(rest, spacing=MAX_STEP))
-        else:
-            pieces.append(lane.triangles)
-    return pieces
 
 
 def kerb_faces(pavement: Float) -> Float:

@@ -7,7 +7,6 @@ import subprocess
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 
 from ..errors import SeipError
 from ..progress import Progress, in_thread
@@ -65,27 +64,20 @@ def run(programs: Sumo, program: Path, arguments: Sequence[object], what: str) -
     """
     environment = os.environ | ({} if programs.home is None else {"SUMO_HOME": str(programs.home)})
 
-    def work(stop: Event) -> tuple[int, str]:
-        command = [str(part) for part in (program, *arguments)]
-        with subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as process:
-            while True:
-                try:
-                    _, complaint = process.communicate(timeout=0.2)
-                except subprocess.TimeoutExpired:
-                    if stop.is_set():
-                        process.kill()
-                else:
-                    return process.returncode, complaint
-
-    status, complaint = yield from in_thread(work, what)
-    if status != 0:
+    process = subprocess.Popen(  # noqa: S603  # SUMO's program, found by its name, and our arguments
+        [str(part) for part in (program, *arguments)],
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        _, complaint = yield from in_thread(lambda _stop: process.communicate(), what)
+    finally:  # also where nobody waits for it any more
+        process.kill()
+        process.wait()
+    if process.returncode != 0:
         raise SeipError(f"{program.name} failed: {_last_error(complaint)}; check the map, or simulate in SUMO itself")
 
 

@@ -120,7 +120,7 @@ CITY = b'{"type": "CityJSON", "version": "1.1", "CityObjects": {}}'
         (b'{"type": "FeatureCollection"}', "town.xodr is JSON, not OpenDRIVE"),
         (b"PK\x03\x04....", "is a zip archive"),
         (b"BLENDER-v405", "is a .blend, no map"),
-        (b"<osm version='0.6'/>", "begins with <osm> as OpenStreetMap does"),
+        (b"<osm version='0.6'/>", "begins with <osm> as extracts of OpenStreetMap do"),
         (b"<net version='1.9'/>", "begins with <net> as networks of SUMO do"),
     ],
 )

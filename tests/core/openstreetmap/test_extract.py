@@ -59,6 +59,8 @@ def test_nodes_outside_a_window_are_passed_over(tmp_path):
         ('<!DOCTYPE osm [<!ENTITY a "aaaa">]><osm>&a;</osm>', "declares a document type or entities"),
         (osm('<node id="x" lat="0" lon="0"/>'), "is no whole number"),
         (osm('<node lat="0" lon="0"/>'), "is no whole number"),
+        (osm(f'<node id="{10**20}" lat="0" lon="0"/>'), "is no whole number below"),
+        ("<html/>", "first element is <html>; download the place"),
         (osm('<node id="1" lat="0" lon="0"/><way id="2"><nd ref=""/></way>'), "is no whole number"),
     ],
 )
@@ -126,3 +128,35 @@ def test_ids_and_tags_survive_odd_characters(tmp_path):
     extract.way([(0, 0), (10, 0)], highway="residential", name='"Quoted" & <angled> ä 南京')
     found = read(extract.write(tmp_path / "place.osm"))
     assert next(iter(found.ways.values())).tags["name"] == '"Quoted" & <angled> ä 南京'
+
+
+def test_the_next_node_of_a_street_that_leaves_the_window_is_kept(tmp_path):
+    extract = Extract()
+    extract.way([(-2500, 0), (0, 0), (2500, 0)], highway="unclassified")
+    extract.way([(0, 5), (2400, 5)], barrier="fence")
+    found = read(extract.write(tmp_path / "place.osm"), window(52.5, 13.4, 700.0))
+    assert len(found.nodes) == 4
+    assert sorted(len(found.line(way)) for way in found.ways.values()) == [1, 3]
+
+
+def test_places_on_both_sides_of_the_date_line_are_neighbours(tmp_path):
+    nodes = '<node id="1" lat="-16.8" lon="179.9999"/><node id="2" lat="-16.8" lon="-179.9998"/>'
+    path = written(tmp_path, osm(nodes))
+    for found in (read(path), read(path, window(-16.8, 179.9999, 500.0)), read(path, window(-16.8, -179.9999, 500.0))):
+        assert found.nodes[2].longitude - found.nodes[1].longitude == pytest.approx(0.0003)
+
+
+def test_many_ways_are_joined_at_once():
+    count = 50_000
+    ways = [Way((n, (n + 1) % count), {}) for n in range(count)]
+    found, left = rings([*ways[::2], *ways[1::2]])
+    assert (len(found), len(found[0]), left) == (1, count, 0)
+
+
+def test_tags_are_one_line_of_at_most_255_characters(tmp_path):
+    extract = Extract()
+    for name in ("Two&#10;Lines", "\u202eturned\u202c", "n" * 10**6, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"):
+        extract.way([(0, 0), (10, 0)], highway="residential", name=name)
+    path = written(tmp_path, extract.text().replace("&amp;#10;", "&#10;"))
+    names = [way.tags["name"] for way in read(path).ways.values()]
+    assert names == ["Two Lines", "turned", "n" * 255, "\u06a9\u0648\u0686\u0647\u200c\u0627\u06cc"]

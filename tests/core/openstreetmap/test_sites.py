@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import shapely
-from osm_text import JUNCTIONS, Extract, crossing, dual_carriageway, left_hand, plaza, roundabout, slope
+from osm_text import JUNCTIONS, Extract, corner_houses, crossing, dual_carriageway, left_hand, plaza, roundabout, slope
 from sumo_here import needs_sumo
 
 from seip_addon.core.errors import SeipError
@@ -138,6 +138,14 @@ def test_a_place_can_be_named_by_its_streets(tmp_path):
             "no street called 'Nowhere Lane'; the closest",
         ),
         ({"near_latlon": None, "junction": ("East Road", "East Road Far")}, "no street called"),
+        ({"near_latlon": None, "junction": ("East Road", "east road")}, "two different streets"),
+        ({"near_latlon": None, "junction": ("East Road", "")}, "two different streets"),
+        ({"near_latlon": (91.0, 0.0)}, "--near-latlon 91 0 is no place with streets"),
+        ({"near_latlon": (0.0, 1e308)}, "is no place with streets"),
+        ({"near_latlon": (float("nan"), 0.0)}, "is no place with streets"),
+        ({"radius": -5.0}, "--radius -5 is no length"),
+        ({"radius": float("nan")}, "--radius nan is no length"),
+        ({"approaches": 0.0}, "--approaches 0 is no length"),
     ],
 )
 def test_a_place_that_is_none_is_refused_in_a_sentence(asked, complaint, tmp_path):
@@ -224,3 +232,169 @@ def test_latitude_and_longitude_are_places_of_a_map_with_a_projection_and_of_no_
     )
     with pytest.raises(SeipError, match="names no projection that latitudes and longitudes"):
         finish(build_site(map_path, asked))
+
+
+def test_what_stands_on_the_carriageway_is_moved_or_cut(tmp_path):
+    extract = crossing()
+    extract.house(30, -8, 16, 14)
+    for x, y in ((30, 1.5), (60, -2.5), (-30, 2)):
+        extract.node(x, y, natural="tree", height="9")
+    extract.way([(25, -9), (25, 9)], barrier="hedge")
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    for name in ("Building", "Hedge"):
+        assert plan(model, name).intersection(road).area < 0.5
+    for tree in [part for part in model.parts if part.name.startswith("Tree")]:
+        assert road.distance(shapely.Point(tree.foot[:2])) == pytest.approx(0.2, abs=0.05)
+    assert [note for note in model.notes if note.endswith((": 1", ": 3")) and "carriageway" in note]
+
+
+def test_a_street_leads_through_a_building_and_the_building_above_it(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="tertiary", name="Main Street")
+    extract.way([(0, 0), (0, 8)], highway="residential", name="Gate Lane")
+    extract.way([(0, 8), (0, 22)], highway="residential", name="Gate Lane", tunnel="building_passage", layer="-1")
+    extract.way([(0, 22), (0, 200)], highway="residential", name="Gate Lane")
+    extract.house(-30, 8, 60, 14)
+    model = built(extract, tmp_path).model
+    road = plan(model, "Driving lanes")
+    pieces = [part for part in model.parts if part.name.startswith("Building")]
+    assert sum(plan(model, part.name).area for part in pieces) == pytest.approx(60 * 14, rel=0.01)
+    for part in pieces:
+        lowest = part.solid.vertices[:, 2].min()
+        assert lowest > 4 or plan(model, part.name).intersection(road).area < 0.1
+    assert not any("carriageway" in note for note in model.notes)
+
+
+def test_pavements_lie_beside_the_lanes(tmp_path):
+    extract = Extract()
+    usual = {"highway": "residential", "oneway": "yes", "name": "Street"}
+    extract.way([(-200, -3), (0, -3), (200, -3)], lanes=3, sidewalk="both", **usual)
+    extract.way([(200, 3), (0, 3), (-200, 3)], lanes=3, sidewalk="both", **usual)
+    extract.way([(0, -200), (0, -3), (0, 3), (0, 200)], highway="residential", name="Side Street")
+    model = built(extract, tmp_path).model
+    assert plan(model, "Pavements").intersection(plan(model, "Driving lanes")).area < 1.0
+
+
+def test_slip_lanes_leave_islands_and_the_weighted_box_lies_along_the_roads(tmp_path):
+    extract = Extract()
+    middle = extract.node(0, 0, highway="traffic_signals")
+    usual = {"highway": "primary", "lanes": 6}
+    extract.way([(-200, 0), (-50, 0), middle, (50, 0), (200, 0)], name="East Road", **usual)
+    extract.way([(0, -200), (0, -50), middle, (0, 50), (0, 200)], name="North Road", **usual)
+    for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        ends = [(50 * x, 0), (26 * x, 12 * y), (12 * x, 26 * y), (0, 50 * y)]
+        extract.way(ends if x * y > 0 else ends[::-1], highway="primary_link", oneway="yes")
+    model = built(corner_houses(extract, near=34), tmp_path).model
+    holes = [shapely.Polygon(ring) for ring in model.region.interiors]
+    assert len(holes) == 4
+    assert all(100 < hole.area < 300 for hole in holes)
+    box = plan(model, "Junction")
+    low_x, low_y, high_x, high_y = box.bounds
+    assert box.area == pytest.approx((high_x - low_x) * (high_y - low_y), rel=0.1)
+
+
+def test_no_holes_are_left_where_the_number_of_lanes_changes(tmp_path):
+    extract = Extract()
+    usual = {"highway": "secondary", "name": "East Road"}
+    extract.way([(-200, 0), (-50, 0)], lanes=2, **usual)
+    extract.way([(-50, 0), (-40, 0)], lanes=3, **usual)
+    extract.way([(-40, 0), (0, 0), (200, 0)], lanes=2, **usual)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="tertiary", name="North Road")
+    model = built(corner_houses(extract), tmp_path).model
+    road = plan(model, "Driving lanes")
+    assert sum(shapely.Polygon(ring).area for ring in road.interiors) < 1.0
+    assert not model.region.interiors
+
+
+@pytest.mark.parametrize("radius", [30, 60])
+def test_a_roundabout_is_one_place_with_all_its_approaches(radius, tmp_path):
+    extract = Extract()
+    ring = [extract.node(radius * np.cos(at), radius * np.sin(at)) for at in np.arange(24) * np.pi / 12]
+    extract.way([*ring[:13]], highway="primary", junction="roundabout", name="Circus", lanes=2)
+    extract.way([*ring[12:], ring[0]], highway="primary", junction="roundabout", name="Circus", lanes=3)
+    for name, index, end in (
+        ("East", 0, (300, 0)),
+        ("North", 6, (0, 300)),
+        ("West", 12, (-300, 0)),
+        ("South", 18, (0, -300)),
+    ):
+        extract.way([ring[index], end], highway="primary", name=f"{name} Street")
+    extract.house(-150, 40, 30, 30)
+    model = built(extract, tmp_path).model
+    assert model.region.geom_type == "Polygon"
+    for x, y in ((radius + 75, 0), (-radius - 75, 0), (0, radius + 75), (0, -radius - 75)):
+        assert model.region.distance(shapely.Point(x, y)) < 4.0
+    assert plan(model, "Junction").area > (2 * radius) ** 2
+    assert any(part.name.startswith("Building") for part in model.parts)
+
+
+def test_streets_that_part_at_an_acute_angle_are_a_junction(tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (217, 38)], highway="secondary", name="Left Fork")
+    extract.way([(0, 0), (215, -46)], highway="secondary", name="Right Fork")
+    extract.house(-40, 12, 20, 20)
+    model = built(extract, tmp_path).model
+    assert model.name == "Left Fork / Right Fork"
+    assert model.region.geom_type == "Polygon"
+
+
+def test_the_other_carriageway_is_whole_beside_a_junction_that_does_not_reach_it(tmp_path):
+    extract = Extract()
+    usual = {"highway": "primary", "oneway": "yes", "name": "Avenue"}
+    extract.way([(250, 9), (60, 9)], lanes=2, **usual)
+    extract.way([(60, 9), (-250, 9)], lanes=3, **usual)
+    extract.way([(-250, -9), (0, -9), (250, -9)], lanes=2, **usual)
+    extract.way([(0, -200), (0, -9)], highway="residential", name="Side Street")
+    model = built(corner_houses(extract, near=24), tmp_path).model
+    assert len(shapely.get_parts(model.region)) == 2
+    for x in range(-80, 81, 5):
+        assert model.region.distance(shapely.Point(x, 18)) < 5.0  # the middle is that of the other carriageway
+
+
+def test_a_crossing_at_the_date_line_and_one_whose_next_nodes_are_far(tmp_path):
+    for latitude, longitude, length in ((-16.8, 179.999, 300), (38.5, -99.0, 2400)):
+        extract = Extract(latitude, longitude)
+        extract.way([(-length, 0), (0, 0), (length, 0)], highway="secondary", name="East Road")
+        extract.way([(0, -length), (0, 0), (0, length)], highway="secondary", name="North Road")
+        path = corner_houses(extract).write(tmp_path / "place.osm")
+        text = re.sub(r'"180\.\d+"', lambda found: f'"{float(found[0][1:-1]) - 360}"', path.read_text(encoding="utf-8"))
+        path.write_text(text, encoding="utf-8")
+        model = finish(build_site(path, AskedSite(near_latlon=(latitude, longitude)))).model
+        assert model.region.bounds == pytest.approx((-87, -87, 87, 87), abs=3)
+
+
+def test_of_several_places_where_streets_meet_one_counts_and_the_others_are_named(tmp_path):
+    extract = Extract()
+    extract.way([(-300, 0), (-150, 0), (150, 0), (300, 0)], highway="secondary", name="East Road")
+    extract.way([(-150, 0), (-150, 80), (150, 80), (150, 0)], highway="residential", name="Crescent")
+    site = built(extract, tmp_path, near_latlon=None, junction=("East Road", "Crescent"))
+    assert "Crescent" in site.model.name
+    assert any("meet in 2 places" in note and "--near-latlon" in note for note in site.model.notes)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "St John's Road",
+        'The "Strand" & <Mall>',
+        "\u0634\u0627\u0631\u0639 \u0627\u0644\u0645\u0644\u0643",
+        "\U0001f600 Street",
+    ],
+)
+def test_names_of_streets_are_as_in_the_extract(name, tmp_path):
+    extract = Extract()
+    extract.way([(-200, 0), (0, 0), (200, 0)], highway="residential", name=name)
+    extract.way([(0, -200), (0, 0), (0, 200)], highway="residential", name="Second")
+    model = built(extract, tmp_path, near_latlon=None, junction=(name, "Second")).model
+    assert set(model.name.split(" / ")) == {name, "Second"}
+    assert name in {place.name for place in model.places}
+
+
+def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
+    extract = crossing()
+    for _ in range(3):
+        extract.house(60, 60, 10, 10)
+    model = built(extract, tmp_path).model
+    assert {row.kind: row.count for row in model.sources()}["Building"] == 5
+    assert any(note.startswith("2 outlines that are drawn twice") for note in model.notes)
