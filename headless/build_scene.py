@@ -16,6 +16,8 @@ if not __package__:  # run as a file by `blender -P`
 
 from headless import runtime
 
+from seip_addon.core.citymodel.at_place import AskedBuildings
+from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.provenance import provenance_lines
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
@@ -58,9 +60,19 @@ def _asked_site(options: argparse.Namespace) -> AskedSite:
         level=tuple(options.level),
         site=options.site,
         osm=options.osm,
+        buildings=_asked_buildings(options),
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
     )
+
+
+def _asked_buildings(options: argparse.Namespace) -> AskedBuildings | None:
+    if options.buildings is None:
+        if options.buildings_epsg is not None or options.buildings_origin is not None:
+            raise SeipError("--buildings-epsg and --buildings-origin say where a model lies: name it by --buildings")
+        return None
+    origin = None if options.buildings_origin is None else tuple(options.buildings_origin)
+    return AskedBuildings(options.buildings, options.buildings_epsg, origin)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -112,6 +124,20 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
     parser.add_argument(
         "--osm", type=Path, metavar="EXTRACT", help="OpenStreetMap extract: adds buildings, trees and posts to a map"
+    )
+    parser.add_argument(
+        "--buildings", type=Path, metavar="CITYJSON", help="city model (CityJSON 1.1, 2.0) whose buildings are added"
+    )
+    placed = parser.add_mutually_exclusive_group()
+    placed.add_argument(
+        "--buildings-epsg", type=int, metavar="CODE", help="reference system of the city model, where it names none"
+    )
+    placed.add_argument(
+        "--buildings-origin",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="map coordinates of the city model's zero in metres, where it has no reference system",
     )
     parser.add_argument(
         "--service-roads", action="store_true", help="of an extract: driveways, aisles and alleys are streets too"

@@ -20,6 +20,7 @@ from ..errors import SeipError
 from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
+from .street_furniture import Solid
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
@@ -27,6 +28,7 @@ DESCRIPTION_SUFFIX = ".toml"
 MAX_SIZE = 100_000.0  # metres (or degrees, or a weight) that nothing described may exceed
 MAX_HEIGHT = 1_000.0  # metres that nothing described is high
 MAX_RADIUS = 5_000.0  # metres from the middle of the place to the end of its region at most
+MAX_COVERED = 0.5  # share of a building's outline from which on another source's building stands for it
 MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
 
 
@@ -135,6 +137,31 @@ class Slab:
 
 
 @dataclass(frozen=True, eq=False)
+class PlacedSolid:
+    """A solid out of a file of its own.
+
+    Parameters
+    ----------
+    name : str
+        What it is, such as ``Building``.
+    solid : Solid
+        In plan map coordinates; its heights count from the ground under it, or are the map's.
+    outline : shapely geometry
+        In plan, map coordinates.
+    source : str
+        As of a `Building`.
+    on_ground : bool
+        Whether its heights count from the lowest ground under its outline.
+    """
+
+    name: str
+    solid: Solid
+    outline: BaseGeometry
+    source: str
+    on_ground: bool = True
+
+
+@dataclass(frozen=True, eq=False)
 class SideWay:
     """A footway, cycle track or driveway that is no part of the road: its area in plan and material."""
 
@@ -168,6 +195,8 @@ class SiteDescription:
         What the file lists.
     slabs, posts, ways : tuple
         What an extract adds: plates, plain posts, and ways beside the road.
+    solids : tuple of PlacedSolid
+        What a city model or a survey adds; where these are buildings the map's own give way to them.
     from_centre_lines : bool
         Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
         other are one, and holes between their lanes no islands.
@@ -194,6 +223,7 @@ class SiteDescription:
     slabs: tuple[Slab, ...] = ()
     posts: tuple[Poles, ...] = ()
     ways: tuple[SideWay, ...] = ()
+    solids: tuple[PlacedSolid, ...] = ()
     from_centre_lines: bool = False
     map_source: str = FROM_MAP
 
@@ -201,7 +231,7 @@ class SiteDescription:
     def has_objects(self) -> bool:
         """Whether anything stands there."""
         standing = (self.buildings, self.trees, self.walls, self.street_lights, self.signal_poles)
-        return any((*standing, self.slabs, self.posts))
+        return any((*standing, self.slabs, self.posts, self.solids))
 
     def with_objects_of(self, other: "SiteDescription") -> "SiteDescription":
         """Return this description with what stands there, and what ways lie there, by another one too."""
@@ -215,6 +245,7 @@ class SiteDescription:
             slabs=(*self.slabs, *other.slabs),
             posts=(*self.posts, *other.posts),
             ways=(*self.ways, *other.ways),
+            solids=(*self.solids, *other.solids),
         )
 
     @property

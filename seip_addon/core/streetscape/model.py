@@ -10,14 +10,14 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..geometry.plan import outline, signed_area, without
+from ..geometry.plan import covered_share, outline, signed_area, without
 from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.provenance import ProvenanceRow, provenance
-from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
+from ..site.scene_geometry import ASSUMED, DESCRIBED, FROM_CITY_MODEL, NamedArea
 from . import road_surface, street_furniture
-from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
+from .description import MAX_COVERED, Building, PlacedSolid, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
 from .intersections import without_plain_joints
 from .levels import MIN_LEVEL_HEIGHT, Levels
@@ -28,6 +28,7 @@ from .map_furniture import (
     arm_heading,
     building_parts,
     facade,
+    footprint,
     is_trunk,
     local_objects,
     object_parts,
@@ -35,6 +36,7 @@ from .map_furniture import (
     tree_part,
 )
 from .named_places import named_places
+from .object_kinds import Kind, kind_of
 from .parts import Part, Role
 from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
@@ -167,6 +169,7 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         for one in placed_signals(road_map, area=around)
         if one.road_id not in away
     ]
+    placed, covered_notes = _without_covered(placed, description, origin)
     others, lights = split_posts(placed, local_signals, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
     objects = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
@@ -200,10 +203,31 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(_with_source(part, description.map_source) for part in parts if part.solid.faces),
         region=street.region,
-        notes=(*place_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
+        notes=(*place_notes, *covered_notes, *_level_notes(levels), *notes, *_furniture_notes(placed, signals)),
         warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
         places=named_places(street.lanes, {road.id: road.name for road in road_map.roads}, placed, street.region),
     )
+
+
+def _without_covered(
+    placed: tuple[PlacedObject, ...], description: SiteDescription, origin: Float
+) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
+    """Return the objects of a map without the buildings that those of a city model stand for, and a note on them."""
+    modelled = [shifted(one.outline, -origin) for one in description.solids if one.source == FROM_CITY_MODEL]
+    if not modelled:
+        return placed, ()
+    tree = shapely.STRtree(modelled)
+    kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
+    count = len(placed) - len(kept)
+    note = f"{count} building{'s' * (count > 1)} of the map gave way to the city model's"
+    return kept, (note,) if count else ()
+
+
+def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
+    rings = [outline.base for outline in placed.outlines if len(outline.base) >= 3]
+    rings = rings or [footprint(placed) + placed.position]
+    area = shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])
+    return covered_share(area, modelled) > MAX_COVERED
 
 
 def _with_source(part: Part, source: str) -> Part:
@@ -388,6 +412,7 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
     for number, building in enumerate(description.buildings, start=1):
         parts += _building_parts(building, number, street)
     names = Counter[str]()
+    parts += _solid_parts(description, street, len(description.buildings))
     for wall in description.walls:
         names[wall.name] += 1
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
@@ -421,6 +446,19 @@ def _building_parts(building: Building, number: int, street: _Surroundings) -> l
     return [_told(part, building) for part in made]
 
 
+def _solid_parts(description: SiteDescription, street: _Surroundings, buildings: int) -> Iterator[Part]:
+    """Yield what files of their own give, numbered on from the buildings that the site has."""
+    numbers = Counter({"Building": buildings})
+    for one in description.solids:
+        numbers[one.name] += 1
+        moved = one.solid.vertices - street.origin
+        if one.on_ground:
+            ground = float(street.terrain.height(shapely.get_coordinates(shifted(one.outline, -street.origin))).min())
+            moved[:, 2] = one.solid.vertices[:, 2] + ground
+        solid = replace(one.solid, vertices=moved)
+        yield Part(f"{one.name} {numbers[one.name]}", solid, (Role.OCCLUDERS,), source=one.source)
+
+
 def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
     """Return a part with who says so."""
     return replace(part, source=item.source, height_assumed=item.height_assumed)
@@ -429,7 +467,8 @@ def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
 def _side_way_parts(description: SiteDescription, street: _Surroundings, below: BaseGeometry) -> Iterator[Part]:
     """Yield ways beside the road, by kind, where no lane, building or other road lies."""
     lanes = road_surface.lane_outline(street.lanes)
-    houses = shapely.union_all([shifted(building.outline, -street.origin) for building in description.buildings])
+    standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
+    houses = shapely.union_all([shifted(one.outline, -street.origin) for one in standing])
     taken = shapely.union_all([lanes, street.roadside.filled, houses, below]).buffer(road_surface.MAX_SEAM)
     for name, material in sorted({(way.name, way.material) for way in description.ways}):
         areas = [

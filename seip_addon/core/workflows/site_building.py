@@ -5,16 +5,22 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import shapely
+
 from ..arrays import Float
+from ..citymodel.at_place import AskedBuildings, with_city_model
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
+from ..opendrive.geo_reference import GeoReference
 from ..opendrive.junctions import STREETS
-from ..openstreetmap.site import ExtractPlace, is_extract, site_of_extract, surroundings_of_map
+from ..openstreetmap.site import STANDS_AROUND, ExtractPlace, is_extract, site_of_extract, surroundings_of_map
 from ..progress import Progress
 from ..storage.files import whole_file
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
+from ..streetscape.geographic_position import in_metres
+from ..streetscape.intersections import without_plain_joints
 from ..streetscape.model import SiteModel, site_model
-from ..streetscape.place import Place
+from ..streetscape.place import SCENE_MARGIN, Place
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,8 @@ class AskedSite:
         Site description that goes with a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
+    buildings : AskedBuildings or None
+        City model whose buildings are added.
     service : bool
         Whether driveways and aisles of an extract are streets.
     left_hand : bool or None
@@ -53,6 +61,7 @@ class AskedSite:
     level: tuple[str, ...] = ()
     site: Path | None = None
     osm: Path | None = None
+    buildings: AskedBuildings | None = None
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
@@ -88,8 +97,9 @@ def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, Buil
     if asked.osm is not None:
         middle, reach = _where(road_map, description)
         description, notes = yield from surroundings_of_map(asked.osm, road_map, description, middle, reach)
+    description, more = yield from _with_sources(road_map, description, asked)
     model = yield from site_model(road_map, description)
-    return BuiltSite(map_path.name, replace(model, notes=(*notes, *model.notes)))
+    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)))
 
 
 def save_map(built: BuiltSite, path: Path) -> None:
@@ -132,8 +142,22 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
         name=described.name or found.name,
         level=asked.level,
     )
+    description, more = yield from _with_sources(road_map, description, asked)
     model = yield from site_model(road_map, description)
-    return BuiltSite(source.name, replace(model, notes=(*notes, *model.notes)), map_text)
+    return BuiltSite(source.name, replace(model, notes=(*notes, *more, *model.notes)), map_text)
+
+
+def _with_sources(
+    road_map: RoadMap, description: SiteDescription, asked: AskedSite
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
+    """Add to a description what files beside the map say of its place."""
+    if asked.buildings is None:
+        return description, ()
+    middle, reach = _where(road_map, description)
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    x, y, z, heading = road_map.header_offset.tolist()
+    reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
+    return (yield from with_city_model(description, asked.buildings, reference, area))
 
 
 def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:
@@ -153,6 +177,9 @@ def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescript
 def _where(road_map: RoadMap, description: SiteDescription) -> tuple[Float, float]:
     """Return the middle of a place, (2,) metres, and how far its region may reach from there."""
     lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    description, _ = in_metres(description, road_map, lanes)
+    if description.from_centre_lines:
+        lanes = list(without_plain_joints(lanes))
     place = Place(road_map, lanes, description)
     x_low, y_low, x_high, y_high = place.within.bounds
     x, y = place.centre.tolist()
