@@ -61,6 +61,7 @@ def _asked_site(options: argparse.Namespace) -> AskedSite:
         site=options.site,
         osm=options.osm,
         buildings=_asked_buildings(options),
+        terrain=options.terrain,
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
     )
@@ -138,6 +139,9 @@ def _parser() -> argparse.ArgumentParser:
         nargs=3,
         metavar=("X", "Y", "Z"),
         help="map coordinates of the city model's zero in metres, where it has no reference system",
+    )
+    parser.add_argument(
+        "--terrain", type=Path, metavar="FILE", help="elevation model (GeoTIFF) that a flat map is laid on"
     )
     parser.add_argument(
         "--service-roads", action="store_true", help="of an extract: driveways, aisles and alleys are streets too"

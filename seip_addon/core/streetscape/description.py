@@ -21,6 +21,7 @@ from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
 from .street_furniture import Solid
+from .terrain import Relief
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
@@ -197,6 +198,8 @@ class SiteDescription:
         What an extract adds: plates, plain posts, and ways beside the road.
     solids : tuple of PlacedSolid
         What a city model or a survey adds; where these are buildings the map's own give way to them.
+    relief : Relief or None
+        Ground that the map, which is flat, is laid on.
     from_centre_lines : bool
         Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
         other are one, and holes between their lanes no islands.
@@ -224,6 +227,7 @@ class SiteDescription:
     posts: tuple[Poles, ...] = ()
     ways: tuple[SideWay, ...] = ()
     solids: tuple[PlacedSolid, ...] = ()
+    relief: Relief | None = None
     from_centre_lines: bool = False
     map_source: str = FROM_MAP
 

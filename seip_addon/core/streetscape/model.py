@@ -42,7 +42,7 @@ from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
-from .terrain import Terrain
+from .terrain import Relief, Terrain
 
 STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
@@ -52,6 +52,7 @@ VERGE_BELOW = 0.03
 GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
 MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
 VERGE_SPACING = 12.0
+RELIEF_SPACING = 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
 OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
@@ -125,6 +126,7 @@ class _Surroundings:
     extent: BaseGeometry
     roadside: Roadside
     terrain: Terrain
+    relief: Relief | None
 
 
 def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
@@ -157,15 +159,16 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     levels = place.levels()
     place = replace(place, surfaces=levels.studied)
     region = place.region()
-    origin = _origin(place)
+    origin = _origin(place, description.relief)
     yield next(stages)
-    street = _surroundings(place.surfaces, origin, shifted(region, -origin))
+    street = _surroundings(place.surfaces, origin, shifted(region, -origin), description.relief)
     yield next(stages)
     around = shifted(street.extent, origin)
-    placed = local_objects(placed_objects(road_map, area=around), origin)
+    placed = tuple(_risen(one, description.relief) for one in placed_objects(road_map, area=around))
+    placed = local_objects(placed, origin)
     away = levels.other_roads()
     local_signals = [
-        replace(one, position=one.position - origin)
+        replace(one, position=_risen_place(one.position, description.relief) - origin)
         for one in placed_signals(road_map, area=around)
         if one.road_id not in away
     ]
@@ -267,7 +270,7 @@ def _level_notes(levels: Levels) -> Iterator[str]:
 
 def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
     """Return the roads of other levels, above and below, and the area in plan of those below."""
-    lanes = road_surface.local_strips(others, street.origin, street.extent)
+    lanes = _strips(others, street.origin, street.extent, street.relief)
     if not lanes:
         return [], shapely.Polygon()
     triangles = np.concatenate([lane.triangles for lane in lanes])
@@ -288,20 +291,58 @@ def _on_level(part: Part, street: _Surroundings) -> Part:
     return part
 
 
-def _origin(place: Place) -> Float:
+def _origin(place: Place, relief: Relief | None) -> Float:
     """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
     points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
     nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
-    return np.round([*place.centre, nearest[2]])
+    return np.round([*place.centre, _risen_place(nearest, relief)[2]])
 
 
-def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
+def _risen_place(points: Float, relief: Relief | None) -> Float:
+    """Return places (3,) or (n, 3) of a map on the ground that it is laid on."""
+    if relief is None:
+        return points
+    risen = np.atleast_2d(points) + 0.0
+    risen[:, 2] += relief.rise(risen[:, :2])
+    return risen.reshape(points.shape)
+
+
+def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
+    """Return an object on the ground that the map is laid on, raised as a whole."""
+    if relief is None:
+        return placed
+    position = _risen_place(placed.position, relief)
+    rise = position - placed.position
+    outlines = tuple(replace(one, base=one.base + rise) for one in placed.outlines)
+    return replace(placed, position=position, outlines=outlines)
+
+
+def _strips(
+    surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None
+) -> tuple[LaneSurface, ...]:
+    """Return the lanes near an area in local axes, on the ground that the map is laid on."""
+    lanes = road_surface.local_strips(surfaces, origin * [1, 1, relief is None], area)
+    if relief is None:
+        return lanes
+    shift, height = origin * [1, 1, 0], origin * [0, 0, 1]
+
+    def risen(edge: Float) -> Float:
+        moved: Float = _risen_place(edge + shift, relief) - shift - height
+        return moved
+
+    return tuple(replace(lane, left=risen(lane.left), right=risen(lane.right)) for lane in lanes)
+
+
+def _surroundings(
+    surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry, relief: Relief | None
+) -> _Surroundings:
     extent = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
-    lanes = road_surface.local_strips(surfaces, origin, extent)
+    lanes = _strips(surfaces, origin, extent, relief)
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
-    return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles))
+    beyond = None if relief is None else lambda xy: relief.raster.at(xy + origin[:2]) - origin[2]
+    return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles, beyond), relief)
 
 
 def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
@@ -372,7 +413,8 @@ def _verge_part(street: _Surroundings, furniture: Sequence[Part], below: BaseGeo
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     lanes = covered.buffer(-road_surface.MAX_SEAM, join_style="mitre").union(below)
     beside = road_surface.without_crumbs(without(ground, lanes))
-    triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
+    spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
+    triangles = street.terrain.drape(beside, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 

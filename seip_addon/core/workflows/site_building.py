@@ -5,10 +5,12 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import shapely
 
 from ..arrays import Float
 from ..citymodel.at_place import AskedBuildings, with_city_model
+from ..elevation.at_place import with_terrain
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
 from ..opendrive.geo_reference import GeoReference
@@ -45,6 +47,8 @@ class AskedSite:
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
     buildings : AskedBuildings or None
         City model whose buildings are added.
+    terrain : Path or None
+        Elevation model or laser survey that gives the ground its heights.
     service : bool
         Whether driveways and aisles of an extract are streets.
     left_hand : bool or None
@@ -62,6 +66,7 @@ class AskedSite:
     site: Path | None = None
     osm: Path | None = None
     buildings: AskedBuildings | None = None
+    terrain: Path | None = None
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
@@ -151,13 +156,24 @@ def _with_sources(
     road_map: RoadMap, description: SiteDescription, asked: AskedSite
 ) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
     """Add to a description what files beside the map say of its place."""
-    if asked.buildings is None:
+    if asked.buildings is None and asked.terrain is None:
         return description, ()
     middle, reach = _where(road_map, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     x, y, z, heading = road_map.header_offset.tolist()
     reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
-    return (yield from with_city_model(description, asked.buildings, reference, area))
+    notes: list[str] = []
+    if asked.terrain is not None:
+        edges = [edge for road in road_map.roads for lane in lane_surfaces(road) for edge in (lane.left, lane.right)]
+        points = np.concatenate([np.empty((0, 3)), *edges])
+        near = points[shapely.intersects_xy(area, points[:, :2])]
+        lanes = near if len(near) else points
+        description, more = yield from with_terrain(description, asked.terrain, reference, area, lanes)
+        notes += more
+    if asked.buildings is not None:
+        description, more = yield from with_city_model(description, asked.buildings, reference, area)
+        notes += more
+    return description, tuple(notes)
 
 
 def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:
