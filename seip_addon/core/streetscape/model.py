@@ -52,7 +52,7 @@ VERGE_BELOW = 0.03
 GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
 MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
 VERGE_SPACING = 12.0
-RELIEF_SPACING = 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
+KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
 OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
@@ -370,7 +370,7 @@ def _pavement_parts(street: _Surroundings, below: BaseGeometry) -> tuple[list[Pa
     triangles = np.concatenate([own, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
-    kerbs = road_surface.kerb_faces(triangles)
+    kerbs = road_surface.kerb_faces(triangles, None if street.relief is None else KERB_STEP)
     parts = [
         Part("Pavements", _solid(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),

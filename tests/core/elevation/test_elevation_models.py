@@ -63,7 +63,7 @@ def test_a_plane_stays_the_plane_it_is(tmp_path):
     path = write_dem(tmp_path / "dem.tif", sampled(plane, X - 150, Y + 150, 300), X - 150, Y + 150)
     places = np.random.default_rng(1).uniform(-50, 50, (200, 2))
     found = relief(path).rise(places)
-    assert found == pytest.approx(plane(*(places + [X, Y]).T), abs=1e-4)
+    assert found == pytest.approx(plane(places[:, 0] + X, places[:, 1] + Y), abs=1e-4)
 
 
 def test_degrees_and_another_zone_are_the_same_ground(tmp_path):
@@ -116,7 +116,7 @@ def test_a_map_with_heights_keeps_them(tmp_path):
     hill = np.column_stack([np.zeros((50, 2)), np.linspace(0, 5, 50)])
     with pytest.raises(SeipError, match=r"heights of its own there \(0\.0 to 5\.0 m\)"):
         relief(path, lanes=hill)
-    bridge = np.concatenate([np.zeros((80, 3)) + [0, 0, 34], np.zeros((20, 3)) + [0, 0, 40]])
+    bridge = np.column_stack([np.zeros((100, 2)), np.repeat([34.0, 40.0], [80, 20])])
     assert relief(path, lanes=bridge).level == 34
 
 
@@ -126,50 +126,32 @@ def test_a_model_of_another_place_is_refused_with_both_places(tmp_path):
         relief(path)
 
 
-def broken(tmp_path, name):
-    path, heights = tmp_path / "dem.tif", np.ones((4, 4), np.float32)
-    if name == "not there":
-        return path
-    if name == "text":
-        path.write_text("ncols 4", encoding="utf-8")
-    elif name == "cut":
-        path.write_bytes(write_dem(path, np.ones((200, 200), np.float32), 0, 0).read_bytes()[:900])
-    elif name == "a picture":
-        Image.new("RGB", (8, 8)).save(path)
-    elif name == "no georeference":
-        Image.fromarray(heights).save(path)
-    elif name == "no scale":
-        write_dem(path, heights, 0, 0, leave_out=(SCALE,))
-    elif name == "no tie point":
-        write_dem(path, heights, 0, 0, leave_out=(TIE_POINT,))
-    elif name == "no keys":
-        write_dem(path, heights, 0, 0, leave_out=(KEYS,))
-    elif name == "its own system":
-        write_dem(path, heights, 0, 0, epsg=32767)
-    elif name == "steps of nothing":
-        write_dem(path, heights, 0, 0, step=0.0)
-    elif name == "not a number":
-        write_dem(path, heights, float("nan"), 0)
-    elif name == "feet":
-        write_dem(path, heights, 0, 0, keys=[3076, 0, 1, 9002])
-    elif name == "nothing":
-        write_dem(path, heights * np.nan, 0, 0)
-    elif name == "no data that is none":
-        write_dem(path, heights, 0, 0, no_data="none")
-    return path
+ONES = np.ones((4, 4), np.float32)
+BROKEN = {
+    "not there": (lambda path: None, "no such file"),
+    "text": (lambda path: path.write_text("ncols 4", encoding="utf-8"), "is no TIFF"),
+    "cut": (lambda path: path.write_bytes(write_dem(path, np.ones((99, 99)), 0, 0).read_bytes()[:900]), "no TIFF|read"),
+    "a picture": (lambda path: Image.new("RGB", (8, 8)).save(path), "one band of heights"),
+    "no georeference": (lambda path: Image.fromarray(ONES).save(path), "has no georeference"),
+    "no scale": (lambda path: write_dem(path, ONES, 0, 0, leave_out=(SCALE,)), "no georeference"),
+    "no tie point": (lambda path: write_dem(path, ONES, 0, 0, leave_out=(TIE_POINT,)), "no georeference"),
+    "no keys": (lambda path: write_dem(path, ONES, 0, 0, leave_out=(KEYS,)), "names no reference system"),
+    "its own system": (lambda path: write_dem(path, ONES, 0, 0, epsg=32767), "names no reference system"),
+    "steps of nothing": (lambda path: write_dem(path, ONES, 0, 0, step=0.0), "a georeference that is none"),
+    "not a number": (lambda path: write_dem(path, ONES, float("nan"), 0), "a georeference that is none"),
+    "feet": (lambda path: write_dem(path, ONES, 0, 0, keys=[3076, 0, 1, 9002]), "does not count in metres"),
+    "nothing": (lambda path: write_dem(path, ONES * np.nan, 0, 0), "holds no height between"),
+    "no data that is none": (lambda path: write_dem(path, ONES, 0, 0, no_data="none"), "damaged tags"),
+}
 
 
-@pytest.mark.parametrize(("name", "complaint"), [
-    ("not there", "no such file"), ("text", "is no TIFF"), ("cut", "TIFF that cannot be read|no TIFF"),
-    ("a picture", "one band of heights"), ("no georeference", "has no georeference"), ("no scale", "no georeference"),
-    ("no tie point", "no georeference"), ("no keys", "names no reference system"),
-    ("its own system", "names no reference system"), ("steps of nothing", "a georeference that is none"),
-    ("not a number", "a georeference that is none"), ("feet", "does not count in metres"),
-    ("nothing", "holds no height between"), ("no data that is none", "damaged tags"),
-])  # fmt: skip
-def test_a_file_that_is_no_elevation_model_is_refused_in_a_sentence(tmp_path, name, complaint):
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_file_that_is_no_elevation_model_is_refused_in_a_sentence(tmp_path, name):
+    spoil, complaint = BROKEN[name]
+    path = tmp_path / "dem.tif"
+    spoil(path)
     with pytest.raises(SeipError, match=complaint) as refusal:
-        read_geotiff(broken(tmp_path, name))
+        read_geotiff(path)
     assert "\n" not in str(refusal.value)
 
 

@@ -79,6 +79,8 @@ def test_roads_follow_hills_within_the_smoothing(tmp_path):
     model = finish(build_site(street(tmp_path), asked)).model
     assert np.abs(over(named(model, "Driving lanes"), model, hill)).max() < 6 * 0.005 * 3
     assert np.abs(over(named(model, "Verge"), model, hill)).max() < 0.25
+    kerbs = over(named(model, "Kerbs"), model, hill)
+    assert (kerbs.min(), kerbs.max()) == (pytest.approx(0.12 - 0.35, abs=0.1), pytest.approx(0.12, abs=0.1))
     assert any("smoothed by a Gaussian of 4 m" in note for note in model.notes)
 
 
