@@ -19,27 +19,39 @@ from headless import runtime
 from seip_addon.core.citymodel.at_place import AskedBuildings
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.site.provenance import provenance_lines
+from seip_addon.core.site.provenance import provenance, provenance_lines
+from seip_addon.core.streetscape.mesh_place import mesh_place
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
+from seip_addon.scene.imported import UP_AXES, check_mesh, import_mesh
 
 
 def main(argv: list[str]) -> None:
     """Read the source, model the site and save it."""
     asked = _parser().parse_args(argv)
     check_name(asked.output)
+    up, origins = asked.mesh_up, asked.mesh_origin
+    if len(asked.mesh) != len(origins):
+        raise SeipError("give each --mesh its own --mesh-origin LAT LON [HEADING], in their order")
+    for path in asked.mesh:
+        check_mesh(path, up)
     with runtime.progress_bar() as report:
         built = finish(build_site(asked.source, _asked_site(asked)), report)
         model = built.model
-        finish(build_scene(new_file(), model, built.map_name), report)
+        scene = new_file()
+        finish(build_scene(scene, model, built.map_name), report)
+        places = [mesh_place(model, given, path.name) for path, given in zip(asked.mesh, origins, strict=True)]
+        meshes = [
+            row for path, place in zip(asked.mesh, places, strict=True) for row in import_mesh(scene, path, place, up)
+        ]
     map_path = asked.output.with_suffix(".xodr")
     save_map(built, map_path)
     save_blend(asked.output)
     for note in model.notes:
         runtime.print_line(f"note: {note}")
-    runtime.warn(model.warnings)
-    for line in provenance_lines(model.provenance()):
+    runtime.warn(() if meshes else model.warnings)
+    for line in provenance_lines((*model.provenance(), *provenance(meshes))):
         runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(
@@ -142,6 +154,28 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--terrain", type=Path, metavar="FILE", help="elevation model (GeoTIFF) that a flat map is laid on"
+    )
+    parser.add_argument(
+        "--mesh",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="mesh that hides what is behind it (glTF, OBJ, PLY, STL, USD); may be given several times",
+    )
+    parser.add_argument(
+        "--mesh-origin",
+        type=float,
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="NUMBER",
+        help="where the zero of a mesh stands: LAT LON or map X Y, and the heading of its x in degrees from east",
+    )
+    parser.add_argument(
+        "--mesh-up",
+        choices=UP_AXES,
+        help="axis of OBJ, PLY and STL that points up (default: y of OBJ, z of the others)",
     )
     parser.add_argument(
         "--service-roads", action="store_true", help="of an extract: driveways, aisles and alleys are streets too"
