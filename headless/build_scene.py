@@ -17,6 +17,7 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 
 from seip_addon.core.citymodel.at_place import AskedBuildings
+from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
 from seip_addon.core.site.provenance import provenance, provenance_lines
@@ -73,7 +74,7 @@ def _asked_site(options: argparse.Namespace) -> AskedSite:
         site=options.site,
         osm=options.osm,
         buildings=_asked_buildings(options),
-        terrain=options.terrain,
+        terrain=None if options.terrain is None else AskedTerrain(options.terrain, options.terrain_epsg),
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
     )
@@ -153,7 +154,13 @@ def _parser() -> argparse.ArgumentParser:
         help="map coordinates of the city model's zero in metres, where it has no reference system",
     )
     parser.add_argument(
-        "--terrain", type=Path, metavar="FILE", help="elevation model (GeoTIFF) that a flat map is laid on"
+        "--terrain",
+        type=Path,
+        metavar="FILE",
+        help="ground that a flat map is laid on: GeoTIFF, or a survey (LAS, LAZ), of which what stands there is added",
+    )
+    parser.add_argument(
+        "--terrain-epsg", type=int, metavar="CODE", help="reference system of a survey, where it names none"
     )
     parser.add_argument(
         "--mesh",

@@ -98,14 +98,12 @@ def test_the_provenance_names_the_mesh(tmp_path, capsys):
 
 HUGE = [(x * 1e5, y, z) for x, y, z in CORNERS]
 FLAT = [(x, 0, 0) for x, _, _ in CORNERS]
-NAN = bytes(80) + struct.pack("<I", 1) + struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 9, 0, 0, 9, 9, math.nan, 0)
 
 
 @pytest.mark.parametrize(("name", "text", "origin", "complaint"), [
     ("box.obj", obj_text(FLAT), (90, 12), "only faces of zero area"),
     ("box.obj", obj_text(HUGE), (90, 12), "1,000,000 m from its zero"),
     ("box.obj", obj_text(faces=[]), (90, 12), "holds no face"),
-    ("box.stl", NAN, (90, 12), "no finite number"),
     ("box.ply", "ply\nnothing", (90, 12), "box.ply"),
     ("box.glb", "nothing", (90, 12), "cannot import box.glb"),
     ("box.dxf", "nothing", (90, 12), "of no kind that is imported"),
@@ -118,7 +116,7 @@ NAN = bytes(80) + struct.pack("<I", 1) + struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 
 def test_a_faulty_mesh_leaves_no_file(name, text, origin, complaint, tmp_path):
     path = tmp_path / name
     if text is not None:
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        path.write_text(text, encoding="utf-8")
     given = [] if origin is None else ["--mesh-origin", *origin]
     with pytest.raises(SeipError, match=complaint):
         built(tmp_path, "--mesh", path, *given)

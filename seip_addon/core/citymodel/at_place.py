@@ -11,12 +11,12 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..geometry.plan import covered_share, outline
+from ..geometry.plan import outline
 from ..opendrive.geo_reference import GeoReference
 from ..opendrive.reference_systems import Transform, reprojection
 from ..progress import Progress
-from ..site.scene_geometry import FROM_CITY_MODEL, FROM_EXTRACT
-from ..streetscape.description import MAX_COVERED, MAX_HEIGHT, PlacedSolid, SiteDescription
+from ..site.scene_geometry import FROM_CITY_MODEL
+from ..streetscape.description import MAX_HEIGHT, PlacedSolid, SiteDescription, without_covered_buildings
 from ..streetscape.map_furniture import facade
 from .cityjson import CityModel, read_city_model
 from .solids import building_solid
@@ -94,7 +94,7 @@ def with_city_model(
         solids.append(PlacedSolid("Building", solid, plan, FROM_CITY_MODEL, on_ground=asked.origin is None))
     if not solids:
         raise _elsewhere(asked.path, model, reference, area)
-    kept, dropped = _not_covered(description, solids)
+    kept, dropped = without_covered_buildings(description, solids)
     notes = [f"{number:,} {reason} are left out of {model.name}" for reason, number in left_out.items()]
     if dropped:
         notes.append(f"{dropped} building{'s' * (dropped > 1)} of the extract gave way to the city model's")
@@ -120,16 +120,6 @@ def _plan(vertices: Float, faces: Float) -> BaseGeometry:
     """Return the area of a solid in plan; of walls alone that which they surround at most."""
     area = outline(vertices[faces])
     return area if not area.is_empty else shapely.convex_hull(shapely.multipoints(vertices[:, :2]))
-
-
-def _not_covered(description: SiteDescription, solids: list[PlacedSolid]) -> tuple[SiteDescription, int]:
-    tree = shapely.STRtree([one.outline for one in solids])
-    kept = tuple(
-        one
-        for one in description.buildings
-        if one.source != FROM_EXTRACT or covered_share(one.outline, tree) <= MAX_COVERED
-    )
-    return replace(description, buildings=kept), len(description.buildings) - len(kept)
 
 
 def _elsewhere(path: Path, model: CityModel, reference: GeoReference, area: BaseGeometry) -> SeipError:

@@ -5,19 +5,21 @@ coordinates in metres; headings are degrees in the file and radians here.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_MAP
+from ..geometry.plan import covered_share
+from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
 from .street_furniture import Solid
@@ -153,6 +155,8 @@ class PlacedSolid:
         As of a `Building`.
     on_ground : bool
         Whether its heights count from the lowest ground under its outline.
+    is_building : bool
+        Whether the map's buildings, and an extract's, give way to it.
     """
 
     name: str
@@ -160,6 +164,7 @@ class PlacedSolid:
     outline: BaseGeometry
     source: str
     on_ground: bool = True
+    is_building: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,6 +263,19 @@ class SiteDescription:
         if self.junction is None or self.region is not None or self.radius is not None:
             return None
         return DEFAULT_RADIUS if self.approaches is None else self.approaches
+
+
+def without_covered_buildings(
+    description: SiteDescription, solids: Sequence[PlacedSolid]
+) -> tuple[SiteDescription, int]:
+    """Return a description without the buildings of an extract that others cover, and how many these are."""
+    tree = shapely.STRtree([one.outline for one in solids if one.is_building])
+    kept = tuple(
+        one
+        for one in description.buildings
+        if one.source != FROM_EXTRACT or covered_share(one.outline, tree) <= MAX_COVERED
+    )
+    return replace(description, buildings=kept), len(description.buildings) - len(kept)
 
 
 def read_site_description(path: Path) -> SiteDescription:

@@ -15,7 +15,7 @@ from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, place
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
 from ..site.provenance import ProvenanceRow, provenance
-from ..site.scene_geometry import ASSUMED, DESCRIBED, FROM_CITY_MODEL, NamedArea
+from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
 from . import road_surface, street_furniture
 from .description import MAX_COVERED, Building, PlacedSolid, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
@@ -215,14 +215,14 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
 def _without_covered(
     placed: tuple[PlacedObject, ...], description: SiteDescription, origin: Float
 ) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
-    """Return the objects of a map without the buildings that those of a city model stand for, and a note on them."""
-    modelled = [shifted(one.outline, -origin) for one in description.solids if one.source == FROM_CITY_MODEL]
+    """Return the objects of a map without the buildings that a city model or a survey has, and a note on them."""
+    modelled = [shifted(one.outline, -origin) for one in description.solids if one.is_building]
     if not modelled:
         return placed, ()
     tree = shapely.STRtree(modelled)
     kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
     count = len(placed) - len(kept)
-    note = f"{count} building{'s' * (count > 1)} of the map gave way to the city model's"
+    note = f"{count} building{'s' * (count > 1)} of the map gave way to the city model's or the survey's"
     return kept, (note,) if count else ()
 
 

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..citymodel.at_place import AskedBuildings, with_city_model
-from ..elevation.at_place import with_terrain
+from ..elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from ..elevation.obstacles import Merging
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
 from ..opendrive.geo_reference import GeoReference
@@ -18,6 +20,7 @@ from ..opendrive.junctions import STREETS
 from ..openstreetmap.site import STANDS_AROUND, ExtractPlace, is_extract, site_of_extract, surroundings_of_map
 from ..progress import Progress
 from ..storage.files import whole_file
+from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
 from ..streetscape.geographic_position import in_metres
 from ..streetscape.intersections import without_plain_joints
@@ -47,7 +50,7 @@ class AskedSite:
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
     buildings : AskedBuildings or None
         City model whose buildings are added.
-    terrain : Path or None
+    terrain : AskedTerrain or None
         Elevation model or laser survey that gives the ground its heights.
     service : bool
         Whether driveways and aisles of an extract are streets.
@@ -66,7 +69,7 @@ class AskedSite:
     site: Path | None = None
     osm: Path | None = None
     buildings: AskedBuildings | None = None
-    terrain: Path | None = None
+    terrain: AskedTerrain | None = None
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
@@ -74,11 +77,12 @@ class AskedSite:
 
 @dataclass(frozen=True, eq=False)
 class BuiltSite:
-    """A site's model, the name of its map, and the map itself where it was made of an extract."""
+    """A site's model, the name of its map, the map itself where it was made of an extract, and a survey's boxes."""
 
     map_name: str
     model: SiteModel
     map_text: str | None = None
+    merging: tuple[Merging, ...] = ()
 
 
 def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, BuiltSite]:
@@ -102,9 +106,9 @@ def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, Buil
     if asked.osm is not None:
         middle, reach = _where(road_map, description)
         description, notes = yield from surroundings_of_map(asked.osm, road_map, description, middle, reach)
-    description, more = yield from _with_sources(road_map, description, asked)
+    description, more, merging = yield from _with_sources(road_map, description, asked)
     model = yield from site_model(road_map, description)
-    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)))
+    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), merging=merging)
 
 
 def save_map(built: BuiltSite, path: Path) -> None:
@@ -147,33 +151,41 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
         name=described.name or found.name,
         level=asked.level,
     )
-    description, more = yield from _with_sources(road_map, description, asked)
+    description, more, merging = yield from _with_sources(road_map, description, asked)
     model = yield from site_model(road_map, description)
-    return BuiltSite(source.name, replace(model, notes=(*notes, *more, *model.notes)), map_text)
+    return BuiltSite(source.name, replace(model, notes=(*notes, *more, *model.notes)), map_text, merging)
 
 
 def _with_sources(
     road_map: RoadMap, description: SiteDescription, asked: AskedSite
-) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...]]]:
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
     """Add to a description what files beside the map say of its place."""
     if asked.buildings is None and asked.terrain is None:
-        return description, ()
+        return description, (), ()
     middle, reach = _where(road_map, description)
     area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
     x, y, z, heading = road_map.header_offset.tolist()
     reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
     notes: list[str] = []
-    if asked.terrain is not None:
-        edges = [edge for road in road_map.roads for lane in lane_surfaces(road) for edge in (lane.left, lane.right)]
-        points = np.concatenate([np.empty((0, 3)), *edges])
-        near = points[shapely.intersects_xy(area, points[:, :2])]
-        lanes = near if len(near) else points
-        description, more = yield from with_terrain(description, asked.terrain, reference, area, lanes)
-        notes += more
+    merging: tuple[Merging, ...] = ()
     if asked.buildings is not None:
         description, more = yield from with_city_model(description, asked.buildings, reference, area)
         notes += more
-    return description, tuple(notes)
+    if asked.terrain is not None:
+        surroundings = MapSurroundings(reference, area, *_roads(road_map, area))
+        description, more, merging = yield from with_terrain(description, asked.terrain, surroundings)
+        notes += more
+    return description, tuple(notes), merging
+
+
+def _roads(road_map: RoadMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
+    """Return points (n, 3) of the lanes near an area, of all where none is near, and the carriageway there."""
+    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    points = np.concatenate([np.empty((0, 3)), *(edge for lane in lanes for edge in (lane.left, lane.right))])
+    near = points[shapely.intersects_xy(area, points[:, :2])]
+    paved = road_surface.in_groups(lanes, road_surface.CARRIAGEWAY)
+    there = [shapely.make_valid(lane.polygon) for lane in paved if road_surface.is_near(lane, area)]
+    return near if len(near) else points, shapely.union_all(there)
 
 
 def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from seip_addon.core.elevation import geotiff
-from seip_addon.core.elevation.at_place import with_terrain
+from seip_addon.core.elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
 from seip_addon.core.elevation.geotiff import read_geotiff
 from seip_addon.core.errors import SeipError
 from seip_addon.core.geometry.height_raster import HeightRaster
@@ -30,7 +30,8 @@ def plane(x, y):
 
 
 def relief(path, reference=MAP, lanes=FLAT, area=AREA):
-    site, _ = finish(with_terrain(SiteDescription(), path, reference, area, lanes))
+    around = MapSurroundings(reference, area, lanes)
+    site, _, _ = finish(with_terrain(SiteDescription(), AskedTerrain(path), around))
     return site.relief
 
 
