@@ -15,6 +15,7 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
+from headless.charts.survey import save_merging_chart
 
 from seip_addon.core.citymodel.at_place import AskedBuildings
 from seip_addon.core.elevation.at_place import AskedTerrain
@@ -49,6 +50,10 @@ def main(argv: list[str]) -> None:
     map_path = asked.output.with_suffix(".xodr")
     save_map(built, map_path)
     save_blend(asked.output)
+    if any(one.boxes for one in built.merging):
+        chart = asked.output.with_suffix(".boxes.png")
+        save_merging_chart(chart, built.merging)
+        runtime.print_line(f"{chart}: boxes of the survey, and which share of lines of sight they change")
     for note in model.notes:
         runtime.print_line(f"note: {note}")
     runtime.warn(() if meshes else model.warnings)

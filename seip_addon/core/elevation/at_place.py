@@ -22,13 +22,25 @@ from ..streetscape.description import PlacedSolid, SiteDescription, without_cove
 from ..streetscape.street_furniture import Solid
 from ..streetscape.terrain import Relief
 from .geotiff import GeoTiff, read_geotiff
-from .obstacles import KINDS, MIN_ABOVE, RAYS, UNCLASSIFIED, VEGETATION, Merging, chosen_boxes, obstacle_raster, solids
+from .obstacles import (
+    KINDS,
+    MIN_ABOVE,
+    RAYS,
+    UNCLASSIFIED,
+    VEGETATION,
+    Merging,
+    chosen_boxes,
+    chosen_merging,
+    obstacle_raster,
+    solids,
+)
 from .point_cloud import is_survey, read_points, survey_system
 
 SMOOTHING = 4.0  # metres: standard deviation of the Gaussian that heights are smoothed by, about a lane's width
 CELL, MAX_CELLS = 1.0, 1500  # metres of a cell, and cells along a side at most: larger places have larger ones
 POINTS_PER_CELL, MAX_CELL = 2.0, 5.0  # of a survey, and metres
 GROUND = 2  # class of a survey's points
+TRAFFIC_MARGIN = 1.0  # metres beside the carriageway within which what is not classified is traffic
 MODEL_MARGIN = 1.0  # metres beside a building of a city model within which a survey's points are that building
 MIN_COVERED = 0.5  # share of the place of which heights are known, below which a model is that of another place
 FLAT, MIN_FLAT = 0.25, 0.6  # a map is flat where such a share of its lanes is within this (metres) of one height
@@ -116,7 +128,7 @@ def with_terrain(
         cells = int((raster.kind >= 0).sum())
         notes.append(
             f"{len(boxes):,} boxes stand for {cells:,} cells of {smooth.step:g} m that {path.name} has above "
-            f"{MIN_ABOVE:g} m: they change {tried[-1].changed:.2%} of {RAYS:,} random lines of sight"
+            f"{MIN_ABOVE:g} m: they change {chosen_merging(tried).changed:.2%} of {RAYS:,} random lines of sight"
         )
     if dropped:
         notes.append(f"{dropped} building{'s' * (dropped > 1)} of the extract gave way to the survey's")
@@ -174,11 +186,13 @@ def _surveyed_ground(points: Float, classes: Integer, area: BaseGeometry, name: 
 
 def _standing(points: Float, classes: Integer, around: MapSurroundings, description: SiteDescription) -> Boolean:
     """Return which points count as something that stands: no traffic, and no building that a city model has."""
-    shapely.prepare(around.carriageway)
-    traffic = np.isin(classes, UNCLASSIFIED) & shapely.contains_xy(around.carriageway, points[:, :2])
+    road = around.carriageway.buffer(TRAFFIC_MARGIN)
+    shapely.prepare(road)
+    traffic: Boolean = np.isin(classes, UNCLASSIFIED) & shapely.contains_xy(road, points[:, :2])
     modelled = shapely.union_all([one.outline for one in description.solids]).buffer(MODEL_MARGIN)
     shapely.prepare(modelled)
-    return ~traffic & ~(shapely.contains_xy(modelled, points[:, :2]) & ~np.isin(classes, VEGETATION))
+    known: Boolean = shapely.contains_xy(modelled, points[:, :2]) & ~np.isin(classes, VEGETATION)
+    return ~(traffic | known)
 
 
 def _placed(name: str, solid: Solid, raised: float) -> PlacedSolid:

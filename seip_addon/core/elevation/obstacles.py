@@ -17,9 +17,9 @@ from ..streetscape.street_furniture import Solid, join
 MIN_ABOVE = 2.0  # metres above the ground below which nothing counts: road users stand there
 UNCLASSIFIED, VEGETATION, BUILDING = (0, 1), (3, 4, 5), (6,)
 CROWN_BASE = 2.5  # metres above the ground from which on a crown stands free; lower ones reach the ground
-TOLERANCES = (4.0, 2.0, 1.0, 0.5, 0.25, 0.0)
+TOLERANCES = (2.0, 1.0, 0.5, 0.25, 0.0)
 """Metres that the cells of a box may lie above or below its top, coarsest first."""
-MAX_CHANGED = 0.01  # share of rays whose state may differ
+MAX_CHANGED = 0.005  # share of rays whose state may differ
 RAYS, RAY_LENGTH, RAY_STEP = 4000, 60.0, 0.25  # metres
 EYES, TARGETS = (3.0, 8.0), (0.3, 1.7)  # metres above the ground between which rays begin and end
 FOUNDATION = 0.5  # metres that boxes reach into the ground
@@ -143,18 +143,23 @@ def of_boxes(raster: ObstacleRaster, boxes: Sequence[Box]) -> ObstacleRaster:
 
 
 def chosen_boxes(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[tuple[Box, ...], tuple[Merging, ...]]:
-    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and what was tried."""
+    """Return the fewest boxes that change at most `MAX_CHANGED` of random lines of sight, and what tolerances do."""
     begin, end = random_rays(raster, rng)
     true = blocked(raster, begin, end)
-    tried: list[Merging] = []
-    boxes: tuple[Box, ...] = ()
-    for tolerance in TOLERANCES:
-        boxes = merged(raster, tolerance)
-        changed = float(np.mean(blocked(of_boxes(raster, boxes), begin, end) != true)) if len(begin) else 0.0
-        tried.append(Merging(tolerance, len(boxes), changed))
-        if changed <= MAX_CHANGED:
-            break
-    return boxes, tuple(tried)
+    choices = [merged(raster, tolerance) for tolerance in TOLERANCES]
+    changed = [
+        np.mean(blocked(of_boxes(raster, boxes), begin, end) != true) if len(begin) else 0.0 for boxes in choices
+    ]
+    tried = tuple(
+        Merging(tolerance, len(boxes), float(share))
+        for tolerance, boxes, share in zip(TOLERANCES, choices, changed, strict=True)
+    )
+    return choices[tried.index(chosen_merging(tried))], tried
+
+
+def chosen_merging(tried: Sequence[Merging]) -> Merging:
+    """Return the coarsest merging that changes few enough lines of sight; without tolerance none is changed."""
+    return next(one for one in tried if one.changed <= MAX_CHANGED)
 
 
 def random_rays(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[Float, Float]:
@@ -165,10 +170,9 @@ def random_rays(raster: ObstacleRaster, rng: np.random.Generator) -> tuple[Float
     places = raster.ground.places[rng.choice(empty, RAYS)]
     angle, length = rng.uniform(0, 2 * np.pi, RAYS), RAY_LENGTH * np.sqrt(rng.random(RAYS))
     ends = places + length[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = np.clip(ends, raster.ground.low, raster.ground.places[-1])
     heights = [raster.ground.at(xy) + rng.uniform(*span, RAYS) for xy, span in ((places, EYES), (ends, TARGETS))]
-    begin, end = (np.column_stack([xy, z]) for xy, z in zip((places, ends), heights, strict=True))
-    inside = ((ends >= raster.ground.low) & (ends <= raster.ground.places[-1])).all(axis=1)
-    return begin[inside], end[inside]
+    return np.column_stack([places, heights[0]]), np.column_stack([ends, heights[1]])
 
 
 def blocked(raster: ObstacleRaster, begin: Float, end: Float) -> Boolean:

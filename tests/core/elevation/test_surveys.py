@@ -77,8 +77,9 @@ def test_ground_and_what_stands_on_it(suffix, tmp_path):
     assert high[2] == pytest.approx(52, abs=0.01)
     assert low[2] < slope(10, 10)
     low, high = bounds(site, "Surveyed vegetation")
-    assert (44 < low[2] < 46.5, 49 < high[2] <= 50) == (True, True)  # a crown that light passes under
-    assert tried[-1].changed <= obstacles.MAX_CHANGED
+    tolerance = next(one.tolerance for one in tried if one.changed <= obstacles.MAX_CHANGED)
+    assert 44.5 <= low[2] <= 45.5 + tolerance  # a crown that light passes under
+    assert 49.5 - tolerance <= high[2] <= 50
     assert any("of 4,000 random lines of sight" in note for note in notes)
 
 
@@ -159,9 +160,9 @@ def test_fewer_boxes_change_more_rays(tmp_path):
     raster = raster_of(kind, 2 + 6 * rng.random(kind.shape))
     boxes, tried = obstacles.chosen_boxes(raster, np.random.default_rng(6))
     assert [one.boxes for one in tried] == sorted(one.boxes for one in tried)
-    assert len(boxes) == tried[-1].boxes
-    assert all(one.changed > obstacles.MAX_CHANGED for one in tried[:-1])
-    assert tried[-1].changed <= obstacles.MAX_CHANGED
+    chosen = next(one for one in tried if one.changed <= obstacles.MAX_CHANGED)
+    assert len(boxes) == chosen.boxes
+    assert (tried[-1].tolerance, tried[-1].changed) == (0.0, 0.0)
 
 
 def test_the_same_survey_makes_the_same_boxes(tmp_path):
