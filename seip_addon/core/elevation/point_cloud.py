@@ -1,7 +1,6 @@
 """Laser surveys (LAS, LAZ), read with laspy where that is installed."""
 
 import importlib
-import re
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,6 @@ SURVEY_SUFFIXES = (".las", ".laz")
 POINTS_PER_STEP = 2_000_000
 MAX_POINTS = 40_000_000  # at a place
 _PROJECTED_KEY = 3072
-_PROJECTED_WKT = re.compile(r"PROJ(?:CS|CRS|ECTEDCRS)\[", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,19 +116,9 @@ def _code(header: Any) -> int | None:  # noqa: ANN401  # laspy has no types
     """Return the code of the system in plan: of a compound one there is another for heights."""
     for record in header.vlrs:
         text = getattr(record, "string", None)
-        if isinstance(text, str) and (start := _PROJECTED_WKT.search(text)):
-            return epsg_code(_bracketed(text[start.start() :]))
+        if isinstance(text, str) and (code := epsg_code(text)) is not None:
+            return code
         for key in getattr(record, "geo_keys", []):
             if key.id == _PROJECTED_KEY and key.tiff_tag_location == 0:
                 return int(key.value_offset)
     return None
-
-
-def _bracketed(text: str) -> str:
-    """Return a text up to where its first bracket closes."""
-    depth = 0
-    for place, character in enumerate(text):
-        depth += (character == "[") - (character == "]")
-        if character == "]" and depth == 0:
-            return text[: place + 1]
-    return text

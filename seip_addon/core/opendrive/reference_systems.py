@@ -19,6 +19,9 @@ HORIZONTAL = {7415: 28992, 5554: 25831, 5555: 25832, 5556: 25833}
 """Codes of systems in plan that go with heights, and the code of the same without: heights are taken as they are."""
 GEOGRAPHIC = (4326, 4258)  # longitude and latitude in degrees on WGS 84, and on ETRS89
 _CODE = re.compile(r"EPSG[\"':,/\s]+(?:[\d.]+[:/])?(\d{4,6})\b", re.IGNORECASE)
+_OWN_CODE = re.compile(r"(?:AUTHORITY|ID)\[\"EPSG\",\"?(\d{4,6})", re.IGNORECASE)
+_PROJECTED = re.compile(r"PROJ(?:CS|CRS|ECTEDCRS)\[", re.IGNORECASE)
+_WELL_KNOWN = re.compile(r"\s*\w+\[")
 
 Transform = Callable[[Float], Float]
 
@@ -41,8 +44,21 @@ class Reprojection:
 
 
 def epsg_code(text: str) -> int | None:
-    """Return the EPSG code that a text names, such as ``EPSG:28992``, a URL or well-known text; None without one."""
-    found = _CODE.findall(text)
+    """Return the EPSG code that a text names, such as ``EPSG:28992`` or a URL; None without one.
+
+    Of well-known text it is that of the whole; of a compound system that of the one in plan.
+    """
+    start = _PROJECTED.search(text)
+    if start is None:
+        found = [] if _WELL_KNOWN.match(text) else _CODE.findall(text)
+        return int(found[-1]) if found else None
+    depth, own = 0, ""
+    for character in text[start.start() :]:
+        depth += (character == "[") - (character == "]")
+        own += character if depth < 3 else ""
+        if character == "]" and depth == 0:
+            break
+    found = _OWN_CODE.findall(own)
     return int(found[-1]) if found else None
 
 

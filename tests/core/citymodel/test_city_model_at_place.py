@@ -109,8 +109,13 @@ def test_pyproj_knows_rd_new_and_refuses_what_is_none():
 def test_codes_are_read_as_they_are_written():
     written = ("EPSG:7415", "urn:ogc:def:crs:EPSG::7415", "https://www.opengis.net/def/crs/EPSG/0/7415", "epsg:7415")
     assert {epsg_code(text) for text in written} == {7415}
-    wkt = 'PROJCS["x",GEOGCS["y",AUTHORITY["EPSG","4326"]],AUTHORITY["EPSG","28992"]]'
-    assert (epsg_code(wkt), epsg_code("RD New"), epsg_code("")) == (28992, None, None)
+    earth = 'GEOGCS["y",DATUM["z",AUTHORITY["EPSG","6326"]],AUTHORITY["EPSG","4326"]]'
+    unit = 'UNIT["metre",1,AUTHORITY["EPSG","9001"]]'
+    plan = f'PROJCS["x",{earth},{unit},AUTHORITY["EPSG","28992"]]'
+    both = f'COMPD_CS["both",{plan},VERT_CS["h",{unit},AUTHORITY["EPSG","5709"]],AUTHORITY["EPSG","7415"]]'
+    newer = 'PROJCRS["x",BASEGEOGCRS["y",ID["EPSG",4289]],CS[Cartesian,2],ID["EPSG",28992]]'
+    assert {epsg_code(text) for text in (plan, both, newer)} == {28992}
+    assert {epsg_code(text) for text in (f'PROJCS["x",{earth},{unit}]', earth, "RD New", "")} == {None}
 
 
 @pytest.mark.parametrize(("shift", "source", "left"), [

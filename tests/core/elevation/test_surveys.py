@@ -190,6 +190,15 @@ def test_the_system_in_plan_of_a_compound_one_counts(tmp_path):
     assert surveyed(tmp_path, town(np.random.default_rng(3)), wkt=compound)[0].solids
 
 
+def test_geokeys_of_older_files_name_the_system(tmp_path):
+    path = tmp_path / "survey.las"
+    header = laspy.LasHeader(version="1.2", point_format=1)
+    keys = np.array([1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 25833], dtype="<u2").tobytes()
+    header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", keys))
+    laspy.LasData(header).write(path)
+    assert point_cloud.survey_system(path)[0] == 25833
+
+
 def test_a_survey_of_another_place_is_refused_with_both(tmp_path):
     points = town(np.random.default_rng(3))
     points[:, 0] += 9000
