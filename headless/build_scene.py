@@ -15,14 +15,19 @@ if not __package__:  # run as a file by `blender -P`
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import runtime
+from headless.charts.survey import save_merging_chart
 from headless.options import new_parser
 
+from seip_addon.core.citymodel.at_place import AskedBuildings
+from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import finish
-from seip_addon.core.site.sources import source_lines
+from seip_addon.core.site.sources import count_sources, source_lines
+from seip_addon.core.streetscape.mesh_place import mesh_place
 from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
 from seip_addon.scene.blend_file import check_name, new_file, save_blend
 from seip_addon.scene.build import build_scene
+from seip_addon.scene.imported import UP_AXES, check_mesh, import_mesh
 
 
 def main(argv: list[str]) -> None:
@@ -33,16 +38,30 @@ def main(argv: list[str]) -> None:
     for path in (asked.output, map_path):
         if path.is_dir():
             raise SeipError(f"{path} is a folder, and a file of that name would be written; choose another name")
+    up, origins = asked.mesh_up, asked.mesh_origin
+    if len(asked.mesh) != len(origins):
+        raise SeipError("give each --mesh its own --mesh-origin LAT LON [HEADING], in their order")
+    for path in asked.mesh:
+        check_mesh(path, up)
     with runtime.progress_bar() as report:
         built = finish(build_site(asked.source, _asked_site(asked)), report)
         model = built.model
-        finish(build_scene(new_file(), model, built.map_name), report)
+        scene = new_file()
+        finish(build_scene(scene, model, built.map_name), report)
+        places = [mesh_place(model, given, path.name) for path, given in zip(asked.mesh, origins, strict=True)]
+        meshes = [
+            row for path, place in zip(asked.mesh, places, strict=True) for row in import_mesh(scene, path, place, up)
+        ]
     save_map(built, map_path)
     save_blend(asked.output)
+    if any(one.boxes for one in built.merging):
+        chart = asked.output.with_suffix(".boxes.png")
+        save_merging_chart(chart, built.merging)
+        runtime.print_line(f"{chart}: boxes of the survey, and which share of lines of sight they change")
     for note in model.notes:
         runtime.print_line(f"note: {note}")
-    runtime.warn(model.warnings)
-    for line in source_lines(model.sources()):
+    runtime.warn(() if meshes else model.warnings)
+    for line in source_lines((*model.sources(), *count_sources(meshes))):
         runtime.print_line(line)
     x, y, z = model.origin + 0.0  # no negative zero
     runtime.print_line(
@@ -63,9 +82,20 @@ def _asked_site(options: argparse.Namespace) -> AskedSite:
         level=tuple(options.level),
         site=options.site,
         osm=options.osm,
+        buildings=_asked_buildings(options),
+        terrain=None if options.terrain is None else AskedTerrain(options.terrain, options.terrain_epsg),
         service=options.service_roads,
         left_hand=None if options.traffic_keeps is None else options.traffic_keeps == "left",
     )
+
+
+def _asked_buildings(options: argparse.Namespace) -> AskedBuildings | None:
+    if options.buildings is None:
+        if options.buildings_epsg is not None or options.buildings_origin is not None:
+            raise SeipError("--buildings-epsg and --buildings-origin say where a model lies: name it by --buildings")
+        return None
+    origin = None if options.buildings_origin is None else tuple(options.buildings_origin)
+    return AskedBuildings(options.buildings, options.buildings_epsg, origin)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -115,6 +145,51 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--site", type=Path, metavar="TOML", help="site description: what the map does not have")
     parser.add_argument(
         "--osm", type=Path, metavar="EXTRACT", help="OpenStreetMap extract: adds buildings, trees and posts to a map"
+    )
+    parser.add_argument(
+        "--buildings", type=Path, metavar="CITYJSON", help="city model (CityJSON 1.1, 2.0) whose buildings are added"
+    )
+    placed = parser.add_mutually_exclusive_group()
+    placed.add_argument(
+        "--buildings-epsg", type=int, metavar="CODE", help="reference system of the city model, where it names none"
+    )
+    placed.add_argument(
+        "--buildings-origin",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="map coordinates of the city model's zero in metres, where it has no reference system",
+    )
+    parser.add_argument(
+        "--terrain",
+        type=Path,
+        metavar="FILE",
+        help="ground that a flat map is laid on: GeoTIFF, or a survey (LAS, LAZ), of which what stands there is added",
+    )
+    parser.add_argument(
+        "--terrain-epsg", type=int, metavar="CODE", help="reference system of a survey, where it names none"
+    )
+    parser.add_argument(
+        "--mesh",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="mesh that hides what is behind it (glTF, OBJ, PLY, STL, USD); may be given several times",
+    )
+    parser.add_argument(
+        "--mesh-origin",
+        type=float,
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="NUMBER",
+        help="where the zero of a mesh stands: LAT LON or map X Y, and the heading of its x in degrees from east",
+    )
+    parser.add_argument(
+        "--mesh-up",
+        choices=UP_AXES,
+        help="axis of OBJ, PLY and STL that points up (default: y of OBJ, z of the others)",
     )
     parser.add_argument(
         "--service-roads", action="store_true", help="of an extract: driveways, aisles and alleys are streets too"

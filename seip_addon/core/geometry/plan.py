@@ -47,6 +47,15 @@ def closed(area: BaseGeometry, gap: float) -> BaseGeometry:
     return area.buffer(gap, join_style="mitre").buffer(-gap, join_style="mitre")
 
 
+def covered_share(area: BaseGeometry, others: shapely.STRtree) -> float:
+    """Return which share of an area in plan others cover together."""
+    over = others.geometries.take(others.query(area, predicate="intersects"))
+    if not len(over) or area.area <= 0.0:
+        return 0.0
+    common = area.buffer(0).intersection(shapely.union_all(shapely.buffer(over, 0)))
+    return float(common.area / area.area)
+
+
 def plane_height(triangles: Float, plan: Float) -> Float:
     """Return the height (n,) of each triangle's plane (n, 3, 3) at its point in plan (n, 2)."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

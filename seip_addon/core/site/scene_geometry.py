@@ -21,7 +21,8 @@ DEFAULT_REFLECTIVITY = 0.3
 
 FROM_MAP, DESCRIBED, ASSUMED = "map", "site description", "assumed"
 FROM_EXTRACT, FROM_CITY_MODEL, FROM_SURVEY = "extract", "city model", "survey"
-"""Source of an object: the map, the site description, an assumption, OpenStreetMap, a city model, or a survey."""
+FROM_MESH = "mesh file"
+"""Source of an object: the map, the site description, an assumption, OpenStreetMap, a city model, a survey, a mesh."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,21 +5,25 @@ coordinates in metres; headings are degrees in the file and radians here.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_MAP
+from ..geometry.plan import covered_share
+from ..site.scene_geometry import DEFAULT_WEIGHT, DESCRIBED, FROM_EXTRACT, FROM_MAP
 from ..storage.toml_table import Key, Reader, is_number, number, parse_toml, read_table, text
 from .roofs import FLAT, Roof
+from .street_furniture import Solid
+from .terrain import Relief
 
 DEFAULT_RADIUS = 80.0
 DESCRIPTION_SUFFIX = ".toml"
@@ -27,6 +31,7 @@ DESCRIPTION_SUFFIX = ".toml"
 MAX_SIZE = 100_000.0  # metres (or degrees, or a weight) that nothing described may exceed
 MAX_HEIGHT = 1_000.0  # metres that nothing described is high
 MAX_RADIUS = 5_000.0  # metres from the middle of the place to the end of its region at most
+MAX_COVERED = 0.5  # share of a building's outline from which on another source's building stands for it
 MAX_ROW_LENGTH = 10_000  # limit on the trees or lights of a row
 
 
@@ -135,6 +140,34 @@ class Slab:
 
 
 @dataclass(frozen=True, eq=False)
+class PlacedSolid:
+    """A solid out of a file of its own.
+
+    Parameters
+    ----------
+    name : str
+        What it is, such as ``Building``.
+    solid : Solid
+        In plan map coordinates; its heights count from the ground under it, or are the map's.
+    outline : shapely geometry
+        In plan, map coordinates.
+    source : str
+        As of a `Building`.
+    on_ground : bool
+        Whether its heights count from the lowest ground under its outline.
+    is_building : bool
+        Whether the map's buildings, and an extract's, give way to it.
+    """
+
+    name: str
+    solid: Solid
+    outline: BaseGeometry
+    source: str
+    on_ground: bool = True
+    is_building: bool = True
+
+
+@dataclass(frozen=True, eq=False)
 class SideWay:
     """A footway, cycle track or driveway that is no part of the road: its area in plan and material."""
 
@@ -168,6 +201,10 @@ class SiteDescription:
         What the file lists.
     slabs, posts, ways : tuple
         What an extract adds: plates, plain posts, and ways beside the road.
+    solids : tuple of PlacedSolid
+        What a city model or a survey adds; where these are buildings the map's own give way to them.
+    relief : Relief or None
+        Ground that the map, which is flat, is laid on.
     from_centre_lines : bool
         Whether the map was made of the middle lines of streets: then junctions within `JUNCTION_REACH` metres of each
         other are one, and holes between their lanes no islands.
@@ -196,6 +233,8 @@ class SiteDescription:
     slabs: tuple[Slab, ...] = ()
     posts: tuple[Poles, ...] = ()
     ways: tuple[SideWay, ...] = ()
+    solids: tuple[PlacedSolid, ...] = ()
+    relief: Relief | None = None
     from_centre_lines: bool = False
     roundabouts: tuple[frozenset[str], ...] = ()
     map_source: str = FROM_MAP
@@ -204,7 +243,7 @@ class SiteDescription:
     def has_objects(self) -> bool:
         """Whether anything stands there."""
         standing = (self.buildings, self.trees, self.walls, self.street_lights, self.signal_poles)
-        return any((*standing, self.slabs, self.posts))
+        return any((*standing, self.slabs, self.posts, self.solids))
 
     def with_objects_of(self, other: "SiteDescription") -> "SiteDescription":
         """Return this description with what stands there, and what ways lie there, by another one too."""
@@ -218,6 +257,7 @@ class SiteDescription:
             slabs=(*self.slabs, *other.slabs),
             posts=(*self.posts, *other.posts),
             ways=(*self.ways, *other.ways),
+            solids=(*self.solids, *other.solids),
         )
 
     @property
@@ -226,6 +266,19 @@ class SiteDescription:
         if self.junction is None or self.region is not None or self.radius is not None:
             return None
         return DEFAULT_RADIUS if self.approaches is None else self.approaches
+
+
+def without_covered_buildings(
+    description: SiteDescription, solids: Sequence[PlacedSolid]
+) -> tuple[SiteDescription, int]:
+    """Return a description without the buildings of an extract that others cover, and how many these are."""
+    tree = shapely.STRtree([one.outline for one in solids if one.is_building])
+    kept = tuple(
+        one
+        for one in description.buildings
+        if one.source != FROM_EXTRACT or covered_share(one.outline, tree) <= MAX_COVERED
+    )
+    return replace(description, buildings=kept), len(description.buildings) - len(kept)
 
 
 def read_site_description(path: Path) -> SiteDescription:

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
 from ..errors import SeipError
-from ..geometry.plan import outline, signed_area, without
+from ..geometry.plan import covered_share, outline, signed_area, without
 from ..opendrive import LaneSurface, PlacedObject, RoadMap, lane_surfaces, placed_objects, placed_signals
 from ..progress import Progress
 from ..site.obstruction import NO_OBSTACLES_MESSAGE, can_hide
@@ -18,7 +18,7 @@ from ..site.scene_geometry import ASSUMED, DESCRIBED, NamedArea
 from ..site.sources import SourceCount, count_sources
 from . import road_surface, street_furniture
 from .clearing import clear
-from .description import Building, Poles, SiteDescription, Slab, Trees, Wall
+from .description import MAX_COVERED, Building, PlacedSolid, Poles, SiteDescription, Slab, Trees, Wall
 from .geographic_position import in_metres
 from .intersections import without_plain_joints
 from .levels import MIN_LEVEL_HEIGHT, Levels
@@ -29,6 +29,7 @@ from .map_furniture import (
     arm_heading,
     building_parts,
     facade,
+    footprint,
     is_trunk,
     local_objects,
     object_parts,
@@ -36,12 +37,13 @@ from .map_furniture import (
     tree_part,
 )
 from .named_places import named_places
+from .object_kinds import Kind, kind_of
 from .parts import Part, Role
 from .place import SCENE_MARGIN, Place, shifted
 from .road_surface import Roadside
 from .roofs import house
 from .signal_posts import signal_parts, split_posts
-from .terrain import Terrain, cut
+from .terrain import Relief, Terrain, cut
 
 STAGES = 6  # pieces of work that a model is made in once the map's lanes are known
 ROADS_PER_STEP = 20
@@ -51,6 +53,7 @@ VERGE_BELOW = 0.03
 GROUND_MARGIN = 5.0  # how far the ground goes on around what stands outside the extent (metres)
 MAX_GROUND_DISTANCE = 300.0  # how far from the extent (metres) it goes on at most: a wall may run along the whole map
 VERGE_SPACING = 12.0
+KERB_STEP, RELIEF_SPACING = 2.5, 6.0  # metres: as ground on which nothing is farther off than some centimetres needs
 OVERLAY_SPACING = 4.0  # as the surface of junctions: coarser veils would rise through the coverage on curved roads
 AREA_OVERLAYS = {
     Role.REGION: (0.03, "region veil"),
@@ -124,6 +127,7 @@ class _Surroundings:
     extent: BaseGeometry
     roadside: Roadside
     terrain: Terrain
+    relief: Relief | None
 
 
 def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Progress, None, SiteModel]:
@@ -156,20 +160,22 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
     levels = place.levels()
     place = replace(place, surfaces=levels.studied)
     region = place.region()
-    origin = _origin(place)
+    origin = _origin(place, description.relief)
     yield next(stages)
-    street = _surroundings(place.surfaces, origin, shifted(region, -origin))
+    street = _surroundings(place.surfaces, origin, shifted(region, -origin), description.relief)
     yield next(stages)
     on_map = (shifted(area, origin) for area in (street.roadside.carriageway, street.roadside.mouths))
     description, clear_notes = clear(description, *on_map)
     around = shifted(street.extent, origin)
-    placed = local_objects(placed_objects(road_map, area=around), origin)
+    placed = tuple(_risen(one, description.relief) for one in placed_objects(road_map, area=around))
+    placed = local_objects(placed, origin)
     away = levels.other_roads()
     local_signals = [
-        replace(one, position=one.position - origin)
+        replace(one, position=_risen_place(one.position, description.relief) - origin)
         for one in placed_signals(road_map, area=around)
         if one.road_id not in away
     ]
+    placed, covered_notes = _without_covered(placed, description, origin)
     others, lights = split_posts(placed, local_signals, street.roadside)
     signals = signal_parts(lights, street.roadside, street.terrain)
     objects = [_on_level(part, street) for part in object_parts(others, street.roadside.carriageway)]
@@ -203,10 +209,38 @@ def site_model(road_map: RoadMap, description: SiteDescription) -> Generator[Pro
         header_offset=road_map.header_offset,
         parts=tuple(_with_source(part, description.map_source) for part in parts if part.solid.faces),
         region=street.region,
-        notes=(*place_notes, *_level_notes(levels), *clear_notes, *notes, *_furniture_notes(placed, signals)),
+        notes=(
+            *place_notes,
+            *covered_notes,
+            *_level_notes(levels),
+            *clear_notes,
+            *notes,
+            *_furniture_notes(placed, signals),
+        ),
         warnings=() if any(can_hide(part.solid.vertices) for part in occluders) else (NO_OBSTACLES_MESSAGE,),
         places=named_places(street.lanes, {road.id: road.name for road in road_map.roads}, placed, street.region),
     )
+
+
+def _without_covered(
+    placed: tuple[PlacedObject, ...], description: SiteDescription, origin: Float
+) -> tuple[tuple[PlacedObject, ...], tuple[str, ...]]:
+    """Return the objects of a map without the buildings that a city model or a survey has, and a note on them."""
+    modelled = [shifted(one.outline, -origin) for one in description.solids if one.is_building]
+    if not modelled:
+        return placed, ()
+    tree = shapely.STRtree(modelled)
+    kept = tuple(one for one in placed if kind_of(one) is not Kind.BUILDING or not _is_covered(one, tree))
+    count = len(placed) - len(kept)
+    note = f"{count} building{'s' * (count > 1)} of the map gave way to the city model's or the survey's"
+    return kept, (note,) if count else ()
+
+
+def _is_covered(placed: PlacedObject, modelled: shapely.STRtree) -> bool:
+    rings = [outline.base for outline in placed.outlines if len(outline.base) >= 3]
+    rings = rings or [footprint(placed) + placed.position]
+    area = shapely.union_all([shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings])
+    return covered_share(area, modelled) > MAX_COVERED
 
 
 def _with_source(part: Part, source: str) -> Part:
@@ -246,7 +280,7 @@ def _level_notes(levels: Levels) -> Iterator[str]:
 
 def _other_level_parts(others: Sequence[LaneSurface], street: _Surroundings) -> tuple[list[Part], BaseGeometry]:
     """Return the roads of other levels, above and below, and the area in plan of those below."""
-    lanes = road_surface.local_strips(others, street.origin, street.extent)
+    lanes = _strips(others, street.origin, street.extent, street.relief)
     if not lanes:
         return [], shapely.Polygon()
     triangles = np.concatenate([lane.triangles for lane in lanes])
@@ -267,20 +301,58 @@ def _on_level(part: Part, street: _Surroundings) -> Part:
     return part
 
 
-def _origin(place: Place) -> Float:
+def _origin(place: Place, relief: Relief | None) -> Float:
     """Return the local origin: the middle and the road's height nearest to it, in whole metres."""
     points = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in place.surfaces])
     nearest = points[np.argmin(np.hypot(*(points[:, :2] - place.centre).T))]
-    return np.round([*place.centre, nearest[2]])
+    return np.round([*place.centre, _risen_place(nearest, relief)[2]])
 
 
-def _surroundings(surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry) -> _Surroundings:
+def _risen_place(points: Float, relief: Relief | None) -> Float:
+    """Return places (3,) or (n, 3) of a map on the ground that it is laid on."""
+    if relief is None:
+        return points
+    risen = np.atleast_2d(points) + 0.0
+    risen[:, 2] += relief.rise(risen[:, :2])
+    return risen.reshape(points.shape)
+
+
+def _risen(placed: PlacedObject, relief: Relief | None) -> PlacedObject:
+    """Return an object on the ground that the map is laid on, raised as a whole."""
+    if relief is None:
+        return placed
+    position = _risen_place(placed.position, relief)
+    rise = position - placed.position
+    outlines = tuple(replace(one, base=one.base + rise) for one in placed.outlines)
+    return replace(placed, position=position, outlines=outlines)
+
+
+def _strips(
+    surfaces: Sequence[LaneSurface], origin: Float, area: BaseGeometry, relief: Relief | None
+) -> tuple[LaneSurface, ...]:
+    """Return the lanes near an area in local axes, on the ground that the map is laid on."""
+    lanes = road_surface.local_strips(surfaces, origin * [1, 1, relief is None], area)
+    if relief is None:
+        return lanes
+    shift, height = origin * [1, 1, 0], origin * [0, 0, 1]
+
+    def risen(edge: Float) -> Float:
+        moved: Float = _risen_place(edge + shift, relief) - shift - height
+        return moved
+
+    return tuple(replace(lane, left=risen(lane.left), right=risen(lane.right)) for lane in lanes)
+
+
+def _surroundings(
+    surfaces: Sequence[LaneSurface], origin: Float, region: BaseGeometry, relief: Relief | None
+) -> _Surroundings:
     extent = region.convex_hull.buffer(SCENE_MARGIN, quad_segs=16)
-    lanes = road_surface.local_strips(surfaces, origin, extent)
+    lanes = _strips(surfaces, origin, extent, relief)
     triangles = np.concatenate([lane.triangles for lane in lanes])
     roadside = road_surface.roadside(lanes)
     shapely.prepare(roadside.carriageway)
-    return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles))
+    beyond = None if relief is None else lambda xy: relief.raster.at(xy + origin[:2]) - origin[2]
+    return _Surroundings(origin, lanes, region, extent, roadside, Terrain(triangles, beyond), relief)
 
 
 def _surface_parts(street: _Surroundings, *, fill: bool) -> list[Part]:
@@ -314,7 +386,7 @@ def _pavement_parts(
     triangles = np.concatenate([own, corners])
     plan = shapely.polygons(triangles[:, :, :2])
     near = shapely.distance(street.region, plan) <= CANDIDATE_MARGIN
-    kerbs = road_surface.kerb_faces(triangles)
+    kerbs = road_surface.kerb_faces(triangles, None if street.relief is None else KERB_STEP)
     parts = [
         Part("Pavements", _solid(triangles[near], "pavement"), (Role.GROUND, Role.CANDIDATE_AREAS)),
         Part("Pavements beyond", _solid(triangles[~near], "pavement"), (Role.GROUND,)),
@@ -357,7 +429,8 @@ def _verge_part(street: _Surroundings, furniture: Sequence[Part], below: BaseGeo
     covered = road_surface.lane_outline(street.lanes).intersection(street.extent)
     lanes = covered.buffer(-road_surface.MAX_SEAM, join_style="mitre").union(below)
     beside = road_surface.without_crumbs(without(ground, lanes))
-    triangles = street.terrain.drape(beside, spacing=VERGE_SPACING, above=-VERGE_BELOW)
+    spacing = VERGE_SPACING if street.relief is None else RELIEF_SPACING
+    triangles = street.terrain.drape(beside, spacing=spacing, above=-VERGE_BELOW)
     return Part("Verge", _solid(triangles, "verge"), (Role.GROUND,))
 
 
@@ -397,6 +470,7 @@ def _described_parts(description: SiteDescription, street: _Surroundings) -> lis
     for number, building in enumerate(description.buildings, start=1):
         parts += _building_parts(building, number, street)
     names = Counter[str]()
+    parts += _solid_parts(description, street, len(description.buildings))
     for wall in description.walls:
         names[wall.name] += 1
         foot = _on_ground(wall.line, street) + np.array([0.0, 0.0, wall.base])
@@ -430,6 +504,19 @@ def _building_parts(building: Building, number: int, street: _Surroundings) -> l
     return [_told(part, building) for part in made]
 
 
+def _solid_parts(description: SiteDescription, street: _Surroundings, buildings: int) -> Iterator[Part]:
+    """Yield what files of their own give, numbered on from the buildings that the site has."""
+    numbers = Counter({"Building": buildings})
+    for one in description.solids:
+        numbers[one.name] += 1
+        moved = one.solid.vertices - street.origin
+        if one.on_ground:
+            ground = float(street.terrain.height(shapely.get_coordinates(shifted(one.outline, -street.origin))).min())
+            moved[:, 2] = one.solid.vertices[:, 2] + ground
+        solid = replace(one.solid, vertices=moved)
+        yield Part(f"{one.name} {numbers[one.name]}", solid, (Role.OCCLUDERS,), source=one.source)
+
+
 def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
     """Return a part with who says so."""
     return replace(part, source=item.source, height_assumed=item.height_assumed)
@@ -438,7 +525,8 @@ def _told(part: Part, item: Building | Wall | Slab | Trees | Poles) -> Part:
 def _side_way_parts(description: SiteDescription, street: _Surroundings, below: BaseGeometry) -> Iterator[Part]:
     """Yield ways beside the road, by kind, where no lane, building or other road lies."""
     lanes = road_surface.lane_outline(street.lanes)
-    houses = shapely.union_all([shifted(building.outline, -street.origin) for building in description.buildings])
+    standing: list[Building | PlacedSolid] = [*description.buildings, *description.solids]
+    houses = shapely.union_all([shifted(one.outline, -street.origin) for one in standing])
     taken = shapely.union_all([lanes, street.roadside.filled, houses, below]).buffer(road_surface.MAX_SEAM)
     for name, material in sorted({(way.name, way.material) for way in description.ways}):
         areas = [

@@ -224,11 +224,15 @@ def group_triangles(surfaces: Sequence[LaneSurface], name: str, extent: BaseGeom
     return cut(np.concatenate(pieces), beyond)
 
 
-def kerb_faces(pavement: Float) -> Float:
-    """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3)."""
+def kerb_faces(pavement: Float, step: float | None = None) -> Float:
+    """Return (n, 3, 3) upright triangles below the edge of a pavement's triangles (m, 3, 3).
+
+    With a ``step`` the edge follows their height at least each so many metres, without one at its corners in plan.
+    """
     if len(pavement) == 0:
         return pavement
     plan = without_crumbs(closed(outline(pavement, SNAP_GRID), MAX_SEAM).simplify(0.01))
+    plan = plan if step is None else shapely.segmentize(plan, step)
     terrain = Terrain(pavement)
     parts = map(orient, shapely.get_parts(plan))
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]

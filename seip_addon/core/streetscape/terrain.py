@@ -1,15 +1,40 @@
 """The height of the ground: looked up on triangles, and areas in plan laid on them."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ..arrays import Float
+from ..geometry.height_raster import HeightRaster
 from ..geometry.plan import plane_height, signed_area
 
 MIN_AREA = 1e-6  # triangles smaller than this in plan (m²) carry nothing and are left out
 SNAP_GRID = 1e-6  # grid (metres) that cut outlines snap to; without one slivers arise that cannot be triangulated
+ROADSIDE = 5.0  # metres beside the lanes over which their heights go over into those of the ground beyond
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """Heights of the ground that a flat map is laid on.
+
+    Parameters
+    ----------
+    raster : HeightRaster
+        Map coordinates.
+    level : float, metres
+        Height that the map gives the ground.
+    """
+
+    raster: HeightRaster
+    level: float
+
+    def rise(self, xy: Float) -> Float:
+        """Return how far the ground lies above the map's own (n,) at places (n, 2), metres."""
+        return self.raster.at(xy) - self.level
 
 
 class Terrain:
@@ -19,9 +44,12 @@ class Terrain:
     ----------
     triangles : (n, 3, 3) float64, metres
         None of them upright.
+    beyond : callable, optional
+        Heights (n,) of the ground at places (n, 2), `ROADSIDE` metres and more beside the triangles.
     """
 
-    def __init__(self, triangles: Float) -> None:
+    def __init__(self, triangles: Float, beyond: Callable[[Float], Float] | None = None) -> None:
+        self._beyond = beyond
         self._triangles = triangles[np.abs(signed_area(triangles)) > MIN_AREA]
         self._plan = shapely.polygons(self._triangles[:, :, :2])
         self._tree = shapely.STRtree(self._plan)
@@ -36,12 +64,15 @@ class Terrain:
         Returns
         -------
         (n,) float64, metres
-            The mean of the triangles there; beside all, the height at the nearest point of one.
+            The mean of the triangles there; beside all, the height at the nearest point of one, or the ground beyond.
         """
         points = shapely.points(xy)
         nearest = self._tree.nearest(points)
         on_triangle = shapely.get_coordinates(shapely.shortest_line(self._plan[nearest], points))[::2]
         height = plane_height(self._triangles[nearest], on_triangle)
+        if self._beyond is not None:
+            share = np.minimum(np.hypot(*(xy - on_triangle).T) / ROADSIDE, 1.0)
+            height = (1 - share) * height + share * self._beyond(xy)
         point, triangle = self._tree.query(points, predicate="intersects")
         found = np.bincount(point, minlength=len(xy))
         total = np.bincount(point, plane_height(self._triangles[triangle], xy[point]), minlength=len(xy))

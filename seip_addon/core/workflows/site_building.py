@@ -5,11 +5,20 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
 from ..arrays import Float
+from ..citymodel.at_place import AskedBuildings, with_city_model
+from ..elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
+from ..elevation.obstacles import Merging
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
+from ..opendrive.geo_reference import GeoReference
 from ..opendrive.junctions import STREETS
 from ..openstreetmap.site import (
+    STANDS_AROUND,
     ExtractPlace,
     is_extract,
     place_on_map,
@@ -18,9 +27,12 @@ from ..openstreetmap.site import (
 )
 from ..progress import Progress
 from ..storage.files import whole_file
+from ..streetscape import road_surface
 from ..streetscape.description import DEFAULT_RADIUS, SiteDescription, describe_place
+from ..streetscape.geographic_position import in_metres
+from ..streetscape.intersections import without_plain_joints
 from ..streetscape.model import SiteModel, site_model
-from ..streetscape.place import Place
+from ..streetscape.place import SCENE_MARGIN, Place
 
 
 @dataclass(frozen=True)
@@ -43,6 +55,10 @@ class AskedSite:
         Site description that goes with a map.
     osm : Path or None
         Extract whose buildings, trees and posts are added to an OpenDRIVE map.
+    buildings : AskedBuildings or None
+        City model whose buildings are added.
+    terrain : AskedTerrain or None
+        Elevation model or laser survey that gives the ground its heights.
     service : bool
         Whether driveways and aisles of an extract are streets.
     left_hand : bool or None
@@ -59,6 +75,8 @@ class AskedSite:
     level: tuple[str, ...] = ()
     site: Path | None = None
     osm: Path | None = None
+    buildings: AskedBuildings | None = None
+    terrain: AskedTerrain | None = None
     service: bool = False
     left_hand: bool | None = None
     anywhere: bool = False
@@ -66,11 +84,12 @@ class AskedSite:
 
 @dataclass(frozen=True, eq=False)
 class BuiltSite:
-    """A site's model, the name of its map, and the map itself where it was made of an extract."""
+    """A site's model, the name of its map, the map itself where it was made of an extract, and a survey's boxes."""
 
     map_name: str
     model: SiteModel
     map_text: str | None = None
+    merging: tuple[Merging, ...] = ()
 
 
 def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, BuiltSite]:
@@ -94,8 +113,9 @@ def build_site(source: Path, asked: AskedSite) -> Generator[Progress, None, Buil
     if asked.osm is not None:
         middle, reach = _where(road_map, description)
         description, notes = yield from surroundings_of_map(asked.osm, road_map, description, middle, reach)
+    description, more, merging = yield from _with_sources(road_map, description, asked)
     model = yield from site_model(road_map, description)
-    return BuiltSite(map_path.name, replace(model, notes=(*notes, *model.notes)))
+    return BuiltSite(map_path.name, replace(model, notes=(*notes, *more, *model.notes)), merging=merging)
 
 
 def save_map(built: BuiltSite, path: Path) -> None:
@@ -138,8 +158,41 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
         name=described.name or found.name,
         level=asked.level,
     )
+    description, more, merging = yield from _with_sources(road_map, description, asked)
     model = yield from site_model(road_map, description)
-    return BuiltSite(source.name, replace(model, notes=(*notes, *model.notes)), map_text)
+    return BuiltSite(source.name, replace(model, notes=(*notes, *more, *model.notes)), map_text, merging)
+
+
+def _with_sources(
+    road_map: RoadMap, description: SiteDescription, asked: AskedSite
+) -> Generator[Progress, None, tuple[SiteDescription, tuple[str, ...], tuple[Merging, ...]]]:
+    """Add to a description what files beside the map say of its place."""
+    if asked.buildings is None and asked.terrain is None:
+        return description, (), ()
+    middle, reach = _where(road_map, description)
+    area = shapely.Point(middle).buffer(reach + SCENE_MARGIN + STANDS_AROUND, quad_segs=16)
+    x, y, z, heading = road_map.header_offset.tolist()
+    reference = GeoReference(road_map.geo_reference or "", (x, y, z, heading))
+    notes: list[str] = []
+    merging: tuple[Merging, ...] = ()
+    if asked.buildings is not None:
+        description, more = yield from with_city_model(description, asked.buildings, reference, area)
+        notes += more
+    if asked.terrain is not None:
+        surroundings = MapSurroundings(reference, area, *_roads(road_map, area))
+        description, more, merging = yield from with_terrain(description, asked.terrain, surroundings)
+        notes += more
+    return description, tuple(notes), merging
+
+
+def _roads(road_map: RoadMap, area: BaseGeometry) -> tuple[Float, BaseGeometry]:
+    """Return points (n, 3) of the lanes near an area, of all where none is near, and the carriageway there."""
+    lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    points = np.concatenate([np.empty((0, 3)), *(edge for lane in lanes for edge in (lane.left, lane.right))])
+    near = points[shapely.intersects_xy(area, points[:, :2])]
+    paved = road_surface.in_groups(lanes, road_surface.CARRIAGEWAY)
+    there = [shapely.make_valid(lane.polygon) for lane in paved if road_surface.is_near(lane, area)]
+    return near if len(near) else points, shapely.union_all(there)
 
 
 def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescription]:
@@ -159,6 +212,9 @@ def _of_map(source: Path, asked: AskedSite) -> tuple[Path, RoadMap, SiteDescript
 def _where(road_map: RoadMap, description: SiteDescription) -> tuple[Float, float]:
     """Return the middle of a place, (2,) metres, and how far its region may reach from there."""
     lanes = [lane for road in road_map.roads for lane in lane_surfaces(road)]
+    description, _ = in_metres(description, road_map, lanes)
+    if description.from_centre_lines:
+        lanes = list(without_plain_joints(lanes))
     place = Place(road_map, lanes, description)
     x_low, y_low, x_high, y_high = place.within.bounds
     x, y = place.centre.tolist()

@@ -1,0 +1,1 @@
+"""City models in CityJSON: buildings as solids that stand at a place of a map."""

@@ -1,0 +1,89 @@
+"""The command with other sources: each is in the scene, and a mistake leaves nothing half-written."""
+
+from headless import build_scene
+
+import bpy
+import numpy as np
+import pytest
+from city_text import CityModel, origin_at
+from dem_files import sampled, write_dem
+from opendrive_text import document, geometry, lane, road, section
+
+from seip_addon.core.errors import SeipError
+from seip_addon.scene import contract
+from seip_addon.scene.read import read_scene
+
+X, Y, _ = origin_at(52.5, 13.4)
+UTM33 = "+proj=utm +zone=33 +ellps=WGS84 +datum=WGS84 +units=m +no_defs"
+
+
+@pytest.fixture
+def street(tmp_path):
+    head = f'<header><offset x="{X}" y="{Y}" z="0" hdg="0"/><geoReference><![CDATA[{UTM33}]]></geoReference></header>'
+    path = tmp_path / "street.xodr"
+    body = road(geometry(length=200.0, x=-100.0), section(lane(1), lane(-1)))
+    path.write_text(document(body, header=head), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def town(tmp_path):
+    model = CityModel((X, Y, 3.0), 25833)
+    return model.add("a", model.gabled(5, 12, 10, 8, 6, 9)).write(tmp_path / "town.city.json")
+
+
+def build(street, tmp_path, *more):
+    output = tmp_path / "site.blend"
+    build_scene.main(
+        [str(street), "--near-latlon", "52.5", "13.4", "--radius", "40", "-o", str(output), *map(str, more)]
+    )
+    bpy.ops.wm.open_mainfile(filepath=str(output))
+    return bpy.context.scene
+
+
+def test_buildings_and_ground_are_in_the_scene(street, town, tmp_path, capsys):
+    heights = sampled(lambda x, y: 40 + 0.04 * (x - X) + 0 * y, X - 200, Y + 200, 400)
+    dem = write_dem(tmp_path / "dem.tif", heights, X - 200, Y + 200)
+    scene = build(street, tmp_path, "--buildings", town, "--terrain", dem)
+    (house,) = [obj for obj in scene.objects if obj.get(contract.SOURCE) == "city model"]
+    assert house.name == "Building 1"
+    geometry_read = read_scene(scene).geometry
+    (mesh,) = [one for one in geometry_read.occluders if one.name == house.name]
+    corners = mesh.triangles.reshape(-1, 3) + geometry_read.origin
+    assert corners.min(axis=0) == pytest.approx([5, 12, 40 + 0.04 * 5], abs=1e-3)
+    assert np.ptp(corners, axis=0) == pytest.approx([10, 8, 9], abs=1e-3)
+    printed = capsys.readouterr().out
+    assert "city model" in printed
+    assert "smoothed by a Gaussian of 4 m" in printed
+
+
+@pytest.mark.parametrize(("more", "complaint"), [
+    (["--buildings-epsg", "25833"], "name it by --buildings"),
+    (["--buildings", "none.json"], "no such file"),
+    (["--terrain", "none.tif"], "no such file"),
+    (["--terrain", "none.laz"], "no such file"),
+    (["--terrain", "street.xodr"], "is no TIFF"),
+    (["--buildings", "street.xodr"], "no JSON"),
+    (["--mesh", "none.obj", "--mesh-origin", "0", "0"], "no such file"),
+])  # fmt: skip
+def test_a_mistake_leaves_nothing_behind(more, complaint, street, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = set(tmp_path.iterdir())
+    with pytest.raises(SeipError, match=complaint):
+        build(street, tmp_path, *more)
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_a_chart_shows_what_boxes_cost(street, tmp_path):
+    pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    from survey_files import block_points, ground_points, write_survey  # noqa: PLC0415
+
+    from seip_addon.core.opendrive.geo_reference import projection  # noqa: PLC0415
+
+    rng = np.random.default_rng(7)
+    points = np.concatenate([ground_points(rng, lambda x, y: 0 * x, 130), block_points(rng, 5, 12, 10, 8, 9.0)])
+    survey = write_survey(tmp_path / "survey.laz", points, (X, Y), projection("EPSG:25833").wkt)
+    scene = build(street, tmp_path, "--terrain", survey)
+    assert [obj.name for obj in scene.objects if obj.get(contract.SOURCE) == "survey"] == ["Surveyed building 1"]
+    assert (tmp_path / "site.boxes.png").stat().st_size > 1000
