@@ -44,6 +44,18 @@ def obstacle(scene: bpy.types.Scene) -> str:
     return ""
 
 
+def next_step(scene: bpy.types.Scene) -> str:
+    """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
+    site, state = scene.seip.site, session.state_of(scene)
+    if is_linked(scene) or is_newer(scene) or scene.seip.result.record:
+        return ""
+    if obstacle(scene):
+        return "seip.build_site" if site.has_place() else "seip.choose_map"
+    if not site.checked:
+        return "seip.check_site"
+    return "seip.compute_visibility" if state is None or state.survey is None else "seip.solve_placement"
+
+
 def stale_survey(scene: bpy.types.Scene) -> str:
     """Return why the survey of a scene is not of the scene as it is, in a sentence; empty if it is."""
     state = session.state_of(scene)

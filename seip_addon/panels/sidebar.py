@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import bpy
 
+from ..viewport.overlays import TAB
+
 
 class Sidebar:
     """A mixin: a panel in the tab SEIP of the 3D viewport's sidebar."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
-    bl_category = "SEIP"
+    bl_category = TAB
 
 
 class RowList:

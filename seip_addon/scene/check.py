@@ -15,6 +15,7 @@ from . import contract
 from .read import (
     Shown,
     area_of,
+    check_units,
     foot_sentences,
     geometry_of,
     hidden_members,
@@ -111,17 +112,11 @@ def _finite(parts: list[Shown]) -> list[Shown]:
 
 
 def _odd_scene(scene: bpy.types.Scene) -> Iterator[Problem]:
-    scale = scene.unit_settings.scale_length
-    if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6:
-        yield Problem(
-            "WARNING",
-            f"The scene's unit scale is {scale:g}, but one unit of Blender is taken for one metre: "
-            "set the unit scale to 1 and scale the objects.",
-        )
-    try:
-        origin_of(scene)
-    except SeipError as error:
-        yield Problem("ERROR", _sentence(str(error)))
+    for read in (check_units, origin_of):
+        try:
+            read(scene)
+        except SeipError as error:
+            yield Problem("ERROR", _sentence(str(error)))
 
 
 def _without_role(

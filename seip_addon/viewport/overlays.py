@@ -3,6 +3,7 @@
 Blender's draw handlers are registered only while there is an overlay.
 """
 
+from contextlib import suppress
 from typing import Any
 
 import bpy
@@ -12,6 +13,9 @@ from ..overlay import Block, Overlay
 from ..session import session
 from .legend import draw_legend
 
+TAB = "SEIP"
+DRAWN = 0.5
+"""Seconds after which a sidebar that was opened has been drawn."""
 _handles: list[Any] = []
 
 
@@ -62,6 +66,26 @@ def redraw() -> None:
                 area.tag_redraw()
 
 
+def open_sidebar(window: bpy.types.Window) -> None:
+    """Open the sidebar of a window's 3D views, with this add-on's tab in front."""
+    for area in window.screen.areas:
+        if area.type == "VIEW_3D":
+            area.spaces.active.show_region_ui = True
+    if not bpy.app.background and not bpy.app.timers.is_registered(_bring_forward):
+        bpy.app.timers.register(_bring_forward, first_interval=DRAWN)
+
+
+def _bring_forward() -> None:
+    """Put the tab in front: it is there once the sidebar has been drawn."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI" and region.width > 1:
+                    with suppress(TypeError):  # the tab has not been drawn
+                        region.active_panel_category = TAB
+                        region.tag_redraw()
+
+
 def _update_handlers() -> None:
     """Forget scenes without overlays and deleted ones, and register or remove the draw handlers as needed."""
     existing = {scene.session_uid for scene in bpy.data.scenes}
@@ -91,6 +115,8 @@ def _draw_pixels() -> None:
 
 
 def forget() -> None:
-    """Remove the overlays of all scenes."""
+    """Remove the overlays of all scenes, and wait for no sidebar."""
     session.overlays.clear()
     _update_handlers()
+    if bpy.app.timers.is_registered(_bring_forward):
+        bpy.app.timers.unregister(_bring_forward)
