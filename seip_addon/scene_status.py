@@ -19,6 +19,7 @@ NEWER = "This file was saved by a newer version of SEIP: install that version to
 LINKED = "This scene is linked from another file: open that file to work on it."
 NOT_COMPARED = "Not compared with the scene since the file was opened."
 ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
+NO_SITE = "There is no site yet."
 OLD_CHECK = "Checked before the file was opened: check again."
 
 
@@ -42,6 +43,11 @@ def obstacle(scene: bpy.types.Scene) -> str:
         if not contract.has_members(scene, name):
             return f"There is no {what}: put a mesh into the collection {name!r}."
     return ""
+
+
+def has_nothing(scene: bpy.types.Scene) -> bool:
+    """Return whether there is neither a region nor a road: nobody has begun with a site."""
+    return not any(contract.has_members(scene, name) for name in (contract.REGION, contract.ROADS))
 
 
 def next_step(scene: bpy.types.Scene) -> str:

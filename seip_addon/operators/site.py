@@ -19,7 +19,7 @@ from ..core.streetscape.parts import Role
 from ..core.workflows.site_building import AskedSite, BuiltSite, build_site
 from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import SurveySettings, lay_out
-from ..properties.site import ROLE_ITEMS
+from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene
 from ..scene.changes import watch
@@ -95,19 +95,16 @@ def _is_own(operator: type[bpy.types.Operator], scene: bpy.types.Scene) -> bool:
 class _BuildsSite(LongWork[BuiltSite]):
     """A mixin for operators that build a site."""
 
+    is_chosen = True
+
     def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
         """Build the scene."""
         report = self.report  # type: ignore[attr-defined]  # of Blender's operators
-        chosen = scene.seip.site
         built = scene
         if has_site(scene):
             built = bpy.data.scenes.new(result.model.name)
-            for name in ("source", "position", "region_shape", "radius"):
-                setattr(built.seip.site, name, getattr(chosen, name))
-            for junction in chosen.junctions:
-                one = built.seip.site.junctions.add()
-                one.name, one.id = junction.name, junction.id
-            built.seip.site.junction = chosen.junction
+            if self.is_chosen:
+                _copy_choice(scene.seip.site, built.seip.site)
             sensor_types.list_types(built)
         elif remove_startup_objects(scene):
             report({"INFO"}, "Blender's cube, light and camera were removed")
@@ -146,6 +143,7 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
 
     bl_idname = "seip.load_example"
     bl_label = "Load Example"
+    is_chosen = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -155,6 +153,15 @@ class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
     def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take the example's description, which says all."""
         return build_site(EXAMPLE, AskedSite())
+
+
+def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
+    for name in ("source", "position", "region_shape", "radius"):
+        setattr(site, name, getattr(chosen, name))
+    for junction in chosen.junctions:
+        one = site.junctions.add()
+        one.name, one.id = junction.name, junction.id
+    site.junction = chosen.junction
 
 
 def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:

@@ -1,4 +1,4 @@
-"""Where people look for the add-on: File ▸ Import, files dropped into a view, and menus, which the search (F3) goes by."""
+"""Where people look for the add-on: File ▸ Import, files dropped into a view, and menus, which the search goes by."""
 
 from __future__ import annotations
 
@@ -111,22 +111,25 @@ STEPS = (
 """Operators of the menu, by step of the work."""
 
 
-def _draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw what File ▸ Import gets."""
     for text, pattern in (("OpenDRIVE (.xodr)", OPENDRIVE), ("OpenStreetMap (.osm)", OPENSTREETMAP)):
         menu.layout.operator(SEIP_OT_choose_map.bl_idname, text=text).filter_glob = pattern
 
 
-def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw what the menu Add gets."""
     menu.layout.operator_context = "INVOKE_DEFAULT"
     menu.layout.operator(SEIP_OT_load_example.bl_idname, text="SEIP Example")
     menu.layout.operator_menu_enum(SEIP_OT_add_area.bl_idname, "role", text="SEIP Area")
 
 
-def _draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def draw_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw what the menu Object gets."""
     menu.layout.menu(SEIP_MT_main.bl_idname)
 
 
-MENUS = (("TOPBAR_MT_file_import", _draw_import), ("VIEW3D_MT_add", _draw_add), ("VIEW3D_MT_object", _draw_object))
+MENUS = (("TOPBAR_MT_file_import", draw_import), ("VIEW3D_MT_add", draw_add), ("VIEW3D_MT_object", draw_object))
 CLASSES = (SEIP_OT_choose_place, SEIP_FH_opendrive, SEIP_FH_openstreetmap, SEIP_MT_main)
 
 

@@ -14,7 +14,7 @@ from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar, settings_column
+from .sidebar import OfSite, RowList, Sidebar, settings_column
 from .wrapped_text import draw_sentence
 
 _ERRING = ("position_error", "tilt_error", "seen_by", "failure")
@@ -42,6 +42,9 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the goal and the button."""
         scene = context.scene
+        if scene_status.has_nothing(scene):
+            draw_sentence(self.layout, scene_status.NO_SITE, icon="INFO")
+            return
         goal = scene.seip.goal
         layout = settings_column(self.layout)
         row = layout.row()
@@ -53,15 +56,15 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         if goal.weighting == "VALUE":
             column.prop(goal, "central_weight")
         column.prop(goal, "min_distance")
+        draw_run(layout, SEIP_OT_solve_placement.bl_idname)
         obstacle = scene_status.obstacle(scene)
         if obstacle:
             draw_sentence(layout, obstacle, icon="ERROR")
-        draw_run(layout, SEIP_OT_solve_placement.bl_idname)
         if not no_placement(scene):
             _draw_answer(layout, scene)
 
 
-class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
+class SEIP_PT_placement_precaution(OfSite, bpy.types.Panel):
     """What the placement is to stand."""
 
     bl_idname = "SEIP_PT_placement_precaution"
@@ -86,7 +89,7 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
         draw_sentence(layout, f"This looks from every candidate {looks} and takes minutes.", icon="INFO")
 
 
-class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
+class SEIP_PT_placement_rules(OfSite, bpy.types.Panel):
     """Positions that must, and must not, carry a sensor."""
 
     bl_idname = "SEIP_PT_placement_rules"
@@ -107,7 +110,7 @@ class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
         row.operator("seip.add_rule", text="No Sensor", icon="CANCEL").rule = "FORBIDDEN"
 
 
-class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
+class SEIP_PT_placement_solver(OfSite, bpy.types.Panel):
     """How a placement is searched."""
 
     bl_idname = "SEIP_PT_placement_solver"

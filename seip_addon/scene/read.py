@@ -371,8 +371,8 @@ def check_units(scene: bpy.types.Scene) -> None:
     units = scene.unit_settings
     if units.system != "NONE" and not math.isclose(units.scale_length, 1.0, rel_tol=1e-6):
         raise SeipError(
-            f"one unit of scene {scene.name!r} is {units.scale_length:g} m, but is read as one metre: set Unit Scale to "
-            "1 under Scene ▸ Units, and scale all objects by what it was"
+            f"one unit of scene {scene.name!r} is {units.scale_length:g} m, but is read as one metre: set Unit Scale "
+            "to 1 under Scene ▸ Units, and scale all objects by what it was"
         )
 
 

@@ -22,7 +22,7 @@ def set_up_view(view: bpy.types.SpaceView3D) -> None:
     view.clip_start, view.clip_end = CLIP_START, CLIP_END
     shading = view.shading
     shading.type, shading.light, shading.color_type = "SOLID", "STUDIO", "MATERIAL"
-    shading.show_cavity, shading.cavity_type = True, "WORLD"
+    shading.show_cavity, shading.cavity_type = True, "SCREEN"
     shading.show_shadows, shading.shadow_intensity = True, 0.25
 
 

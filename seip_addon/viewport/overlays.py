@@ -9,8 +9,9 @@ from typing import Any
 import bpy
 import gpu
 
-from ..overlay import Block, Overlay
+from ..overlay import Block, Label, Overlay
 from ..session import session
+from .labels import draw_labels
 from .legend import draw_legend
 
 TAB = "SEIP"
@@ -105,13 +106,20 @@ def legend_blocks(scene: bpy.types.Scene) -> list[Block]:
     return [block for overlay in overlays_of(scene) if (block := overlay.legend(scene)) is not None]
 
 
+def labels_of(scene: bpy.types.Scene) -> list[Label]:
+    """Return the labels of all overlays of a scene."""
+    return [label for overlay in overlays_of(scene) for label in overlay.labels(scene)]
+
+
 def _draw_view() -> None:
     draw_overlays(bpy.context.scene)
 
 
 def _draw_pixels() -> None:
     context = bpy.context
-    draw_legend(legend_blocks(context.scene), context.region, context.area, context.preferences.system.ui_scale)
+    region, scale = context.region, context.preferences.system.ui_scale
+    draw_labels(labels_of(context.scene), context.region_data.perspective_matrix, (region.width, region.height), scale)
+    draw_legend(legend_blocks(context.scene), region, context.area, scale)
 
 
 def forget() -> None:

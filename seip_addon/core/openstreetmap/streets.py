@@ -358,6 +358,7 @@ class _Medians:
 
 
 def is_roundabout(tags: Tags) -> bool:
+    """Return whether a way is a piece of a roundabout."""
     return tags.get("junction") in ("roundabout", "circular")
 
 
