@@ -46,7 +46,7 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
         description="What the colours of the road mean",
         items=(
             ("seen", "Seen", "Whether some sensor sees the target"),
-            ("times", "By How Many", "How many sensors see the target"),
+            ("times", "Sensors", "How many sensors see the target"),
             ("weights", "Weights", "How much the target counts"),
         ),
         default="times",

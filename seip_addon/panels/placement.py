@@ -14,7 +14,7 @@ from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sidebar import OfSite, RowList, Sidebar, settings_column
+from .sidebar import OfSite, RowList, Sidebar, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 _ERRING = ("position_error", "tilt_error", "seen_by", "failure")
@@ -49,10 +49,12 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
         layout = settings_column(self.layout)
         row = layout.row()
         row.use_property_split = False  # else there is no room for three words
-        row.prop(goal, "limit", expand=True)
+        row.prop(goal, "limit", text="", expand=not is_narrow(context))
         column = layout.column()
         column.prop(goal, goal.limit.lower())
-        column.prop(goal, "weighting")
+        row = column.row()
+        row.use_property_split = True  # a list has no room for its name within
+        row.prop(goal, "weighting")
         if goal.weighting == "VALUE":
             column.prop(goal, "central_weight")
         column.prop(goal, "min_distance")
@@ -94,7 +96,7 @@ class SEIP_PT_placement_rules(OfSite, bpy.types.Panel):
 
     bl_idname = "SEIP_PT_placement_rules"
     bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Required and Forbidden Positions"
+    bl_label = "Position Rules"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -161,9 +163,9 @@ def figures(record: PlacementRecord) -> list[tuple[str, str]]:
     coverage, objective = record.coverage, record.objective
     lines = [("Coverage", f"{coverage.whole:.2%}")]
     if coverage.central is not None:
-        lines.append(("Central coverage", f"{coverage.central:.2%}"))
+        lines.append(("Central", f"{coverage.central:.2%}"))
     if objective.kind == "weighted":
-        lines.append(("Weighted coverage", f"{coverage.weighted:.2%}"))
+        lines.append(("Weighted", f"{coverage.weighted:.2%}"))
     lines += [("Price", f"${record.price_usd:,.0f}"), ("Sensors", str(len(record.sensors)))]
     if objective.bound is not None and objective.gap is not None:
         unit = "${:,.0f}" if objective.cheapest else "{:,.6g}"

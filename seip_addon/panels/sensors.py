@@ -81,8 +81,9 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
         column = settings_column(layout)
         for name, wrong in (("heights", survey.wrong_heights()), ("tilts", survey.wrong_tilts())):
             row = column.row()
+            row.use_property_split = True  # a text has no room for its name within
             row.alert = bool(wrong)
-            row.prop(survey, name)
+            row.prop(survey, name, text=name.capitalize() if is_narrow(context) else None)
             if wrong:
                 draw_sentence(column, wrong, icon="ERROR", alert=True)
         if any(one.use and _looks_one_way(one.name) for one in survey.types):

@@ -22,7 +22,7 @@ from ..operators.site import (
 from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar, settings_column
+from .sidebar import RowList, Sidebar, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 
@@ -101,7 +101,7 @@ class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
         if reason:
             draw_sentence(layout, reason, icon="INFO")
         if Role[site.role] in roles.AREAS:
-            row = layout.row(align=True)
+            row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
             for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
                 button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
                 button.role, button.place = site.role, place

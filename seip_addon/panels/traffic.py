@@ -31,12 +31,12 @@ class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
         traffic = context.scene.seip.traffic
         layout = self.layout
         column = layout.column(align=True)
-        column.prop(traffic, "file", text="")
+        column.prop(traffic, "file", text="", placeholder="Traffic (.npz, .xml)")
         if traffic.file and not traffic.file.lower().endswith(".npz"):
             column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
             column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
         reason = why_no_load(context.scene)
-        if reason:
+        if reason and traffic.file:  # an empty field says so itself
             draw_sentence(layout, reason, icon="INFO")
         row = layout.row(align=True)
         draw_run(row, SEIP_OT_load_traffic.bl_idname)

@@ -22,7 +22,7 @@ from .run_button import draw_run, is_running
 from .sidebar import Sidebar
 from .wrapped_text import draw_sentence
 
-ASPECTS = {"seen": "Seen", "times": "By How Many", "weights": "Weights"}
+ASPECTS = {"seen": "Seen", "times": "Sensors", "weights": "Weights"}
 """What the buttons of the colours say."""
 
 
