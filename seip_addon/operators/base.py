@@ -135,7 +135,7 @@ def _say(context: bpy.types.Context, text: str | None) -> None:
 def _in_short(work: str, progress: Progress) -> str:
     """Return how far work is, for the status bar: the sidebar may be closed."""
     share = f" {progress.done / progress.total:.0%}" if progress.total else ""
-    return f"{work}: {progress.what}{share} (stopped in the sidebar, tab SEIP)"
+    return f"{work}: {progress.what}{share} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)"
 
 
 def _stop(running: RunningWork) -> None:
