@@ -22,7 +22,7 @@ from headless.set_up import LOCK
 ROOT = Path(__file__).resolve().parent.parent
 WHEELS = ROOT / "wheels"
 STAGING = ROOT / "build" / "extension"
-CONTENTS = ("__init__.py", "LICENSE", "seip_addon")
+CONTENTS = ("__init__.py", "LICENSE", "seip_addon", "scenes/junction.toml", "scenes/junction.xodr")
 
 WHEEL_TAGS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
@@ -139,6 +139,7 @@ def stage(name: str, platform: str, wheels: list[Path]) -> Path:
     (staged / "wheels").mkdir(parents=True)
     for content in CONTENTS:
         source = ROOT / content
+        (staged / content).parent.mkdir(parents=True, exist_ok=True)
         if source.is_dir():
             shutil.copytree(source, staged / content, ignore=shutil.ignore_patterns("__pycache__"))
         else:

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 Colour = tuple[float, float, float, float]
 
+Label = tuple[str, tuple[float, ...]]
+"""Words, and the place (3,) in metres above which they stand."""
+
 Kind = Literal["POINTS", "LINES", "TRIS"]
 
 POINT_SIZE = 2.0  # pixels, at the interface's usual scale
@@ -67,6 +70,10 @@ class Layer:
         self._batch.draw(shader)
 
 
+def _no_labels(_scene: bpy.types.Scene) -> list[Label]:
+    return []
+
+
 @dataclass(frozen=True)
 class Overlay:
     """Layers that mean something together.
@@ -75,6 +82,8 @@ class Overlay:
     ----------
     legend : callable
         From the scene to the block that explains the layers; called as the view is drawn, so it only reads.
+    labels : callable
+        From the scene to the labels that belong to it; called as the view is drawn.
     about : str
         What the panel calls it: a sensor's label.
     """
@@ -82,3 +91,4 @@ class Overlay:
     layers: Sequence[Layer]
     legend: Callable[[bpy.types.Scene], Block | None]
     about: str = ""
+    labels: Callable[[bpy.types.Scene], list[Label]] = _no_labels

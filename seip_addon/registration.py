@@ -9,12 +9,13 @@ PARTS = (
     "preferences",
     "properties.site", "properties.survey", "properties.placement", "properties.results", "properties.view",
     "properties.traffic", "properties.scene",
-    "session", "scene_survey", "sensor_types", "live_scan", "viewport.beam_preview", "viewport.overlays",
+    "session", "scene_survey", "sensor_types", "live_scan", "loose_pieces",
+    "viewport.beam_preview", "viewport.overlays", "viewport.coverage",
     "operators.base", "operators.site", "operators.sensors", "operators.visibility", "operators.placement",
     "live_coverage",
     "operators.results", "operators.view", "operators.traffic",
     "panels.site", "panels.sensors", "panels.visibility", "panels.placement", "panels.results", "panels.view",
-    "panels.traffic",
+    "panels.traffic", "panels.front_door",
 )  # fmt: skip
 """Modules of the add-on; most have ``CLASSES``.
 

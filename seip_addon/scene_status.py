@@ -19,6 +19,7 @@ NEWER = "This file was saved by a newer version of SEIP: install that version to
 LINKED = "This scene is linked from another file: open that file to work on it."
 NOT_COMPARED = "Not compared with the scene since the file was opened."
 ANOTHER_SITE = "The scene or its settings have changed since this placement: place again."
+NO_SITE = "There is no site yet."
 OLD_CHECK = "Checked before the file was opened: check again."
 
 
@@ -42,6 +43,23 @@ def obstacle(scene: bpy.types.Scene) -> str:
         if not contract.has_members(scene, name):
             return f"There is no {what}: put a mesh into the collection {name!r}."
     return ""
+
+
+def has_nothing(scene: bpy.types.Scene) -> bool:
+    """Return whether there is neither a region nor a road: nobody has begun with a site."""
+    return not any(contract.has_members(scene, name) for name in (contract.REGION, contract.ROADS))
+
+
+def next_step(scene: bpy.types.Scene) -> str:
+    """Return the operator, by its ``bl_idname``, that comes next on the way to placed sensors; empty at its end."""
+    site, state = scene.seip.site, session.state_of(scene)
+    if is_linked(scene) or is_newer(scene) or scene.seip.result.record:
+        return ""
+    if obstacle(scene):
+        return "seip.build_site" if site.has_place() else "seip.choose_map"
+    if not site.checked:
+        return "seip.check_site"
+    return "seip.compute_visibility" if state is None or state.survey is None else "seip.solve_placement"
 
 
 def stale_survey(scene: bpy.types.Scene) -> str:

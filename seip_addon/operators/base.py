@@ -82,7 +82,7 @@ class LongWork(Generic[Result]):
         scene = context.scene
         return attempt(self, lambda: self.conclude(scene, finish(self.prepare(scene))))
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event | None) -> Outcome:
         """Start the work in a thread."""
         if bpy.app.background:
             return self.execute(context)
@@ -99,6 +99,8 @@ class LongWork(Generic[Result]):
             return {"CANCELLED"}
         if not self._running.work.ended:
             _redraw(context)
+            name = type(self).bl_label  # type: ignore[attr-defined]  # of Blender's operators
+            _say(context, _in_short(name, self._running.work.progress))
             return {"PASS_THROUGH"}
         self._end(context)
         return attempt(self, lambda: self.conclude(scene_of(self._scene), self._running.work.result()))
@@ -120,7 +122,20 @@ class LongWork(Generic[Result]):
 
     def _end(self, context: bpy.types.Context) -> None:
         _stop(self._running)
+        _say(context, None)
         _redraw(context)
+
+
+def _say(context: bpy.types.Context, text: str | None) -> None:
+    """Show a text in the status bar, or Blender's own again."""
+    if context.workspace is not None:
+        context.workspace.status_text_set(text)
+
+
+def _in_short(work: str, progress: Progress) -> str:
+    """Return how far work is, for the status bar: the sidebar may be closed."""
+    share = f" {progress.done / progress.total:.0%}" if progress.total else ""
+    return f"{work}: {progress.what}{share} (to stop it: Object ▸ SEIP ▸ Stop, or × in the sidebar)"
 
 
 def _stop(running: RunningWork) -> None:

@@ -23,6 +23,7 @@ from ..core.workflows.survey import Layout, Survey, place, record_of
 from ..core.workflows.traffic import TrafficRuns, TrafficSettings, place_in_traffic, read_runs, runs_in
 from ..scene.write import write_result
 from ..session import SceneState
+from ..viewport import coverage
 from .base import ForReadyScene, LongWork, Outcome, attempt
 from .results import keep_result
 
@@ -60,6 +61,7 @@ class SEIP_OT_solve_placement(ForReadyScene, LongWork[SceneState], bpy.types.Ope
         record = record_of(survey, solution, provenance, self._asked)
         write_result(scene, survey.site, deployment)
         keep_result(scene, result, record)
+        coverage.show_colours(scene)
         self.report({"INFO"}, f"coverage {deployment.coverage:.2%}, price ${deployment.price:,.0f}")
 
 

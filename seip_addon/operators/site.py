@@ -6,121 +6,189 @@ from collections.abc import Generator
 from pathlib import Path
 
 import bpy
+from shapely.geometry.base import BaseGeometry
 
 from .. import scene_status, sensor_types
 from ..core.errors import SeipError
-from ..core.opendrive import read_map
-from ..core.opendrive.road_map import RoadMap
 from ..core.progress import Progress, finish
 from ..core.site.check import Problem, SiteCheck, check_site
 from ..core.site.scene_geometry import SceneGeometry
 from ..core.site.site import Site
-from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX, describe_place
+from ..core.streetscape.description import DESCRIPTION_SUFFIX
 from ..core.streetscape.parts import Role
 from ..core.workflows.site_building import AskedSite, BuiltSite, build_site
+from ..core.workflows.site_places import SitePlaces, site_places
 from ..core.workflows.survey import SurveySettings, lay_out
 from ..properties.site import ROLE_ITEMS, SEIP_PG_site
 from ..scene import contract, roles
 from ..scene.build import build_scene
 from ..scene.changes import watch
 from ..scene.check import contents_of
+from ..scene.startup import remove_startup_objects
+from ..scene.views import frame_site, set_up_view
 from ..session import CheckedScene, session
+from ..viewport import overlays
 from .base import LongWork, Outcome, attempt
 
+EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / f"junction{DESCRIPTION_SUFFIX}"
+"""The site that comes with SEIP: beside the package, in a checkout as in the extension."""
 SHARE_OF_VIEW = 0.6
 """Of a drawn area in the size of the view."""
 AREA_ITEMS = tuple(item for item in ROLE_ITEMS if Role[item[0]] in roles.AREAS)
 
 
-class SEIP_OT_choose_map(bpy.types.Operator):
-    """Choose an OpenDRIVE map (.xodr), or a site description (.toml) that names one, and list its junctions"""
+class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
+    """Choose an OpenDRIVE map (.xodr), an extract of OpenStreetMap (.osm, .osm.gz) or a site description (.toml), and choose among its junctions"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.choose_map"
     bl_label = "Choose Map"
-    bl_options = {"REGISTER", "UNDO"}
 
-    filepath: bpy.props.StringProperty(name="File", description="The map or site description", subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(default=f"*.xodr;*{DESCRIPTION_SUFFIX}", options={"HIDDEN"})
+    filepath: bpy.props.StringProperty(
+        name="File", description="The map, extract or site description", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
+    filter_glob: bpy.props.StringProperty(
+        default=f"*.xodr;*{DESCRIPTION_SUFFIX};*.osm;*.osm.gz", options={"HIDDEN", "SKIP_SAVE"}
+    )
+    _by_hand = False
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Outcome:
-        """Open the file browser."""
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the scene can be written into."""
+        return _is_own(cls, context.scene)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """Open the file browser, unless a file was dropped."""
+        self._by_hand = True
+        if self.filepath:
+            return super().invoke(context, event)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> Outcome:
-        """Read the map's junctions."""
-        return attempt(self, lambda: self._choose(context.scene.seip.site))
+        """List the file's junctions: in a thread where the file browser asks, at once where a script does."""
+        return super().invoke(context, None) if self._by_hand and not bpy.app.background else super().execute(context)
 
-    def _choose(self, site: SEIP_PG_site) -> None:
-        path = Path(bpy.path.abspath(self.filepath))
-        map_path, description = describe_place(path)
-        road_map = read_map(map_path)
-        site.source = self.filepath
-        site.radius = description.radius or DEFAULT_RADIUS
-        list_junctions(site, road_map)
-        self.report({"INFO"}, f"{len(road_map.roads):,} roads, {len(site.junctions):,} junctions")
+    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, SitePlaces]:
+        """Return the reading of the file."""
+        return site_places(Path(bpy.path.abspath(self.filepath)))
 
-
-def list_junctions(site: SEIP_PG_site, road_map: RoadMap) -> None:
-    """List the junctions that a site can be built round, in place of those of another map."""
-    site.junction = ""
-    site.junctions.clear()
-    for junction in road_map.junctions_with_roads():
-        one = site.junctions.add()
-        one.id = junction.id
-        one.name = f"{junction.id} {junction.name}".strip()
+    def conclude(self, scene: bpy.types.Scene, result: SitePlaces) -> None:
+        """List the junctions in place of those of another file, and ask for the place."""
+        site = scene.seip.site
+        site.source, site.radius = self.filepath, result.radius
+        site.junction = site.position = ""
+        site.junctions.clear()
+        for place in result.places:
+            one = site.junctions.add()
+            one.name, one.id = place.name, place.key
+        self.report({"INFO"}, f"{len(site.junctions):,} junction{'s' * (len(site.junctions) != 1)}")
+        if self._by_hand and not bpy.app.background:
+            bpy.ops.seip.choose_place("INVOKE_DEFAULT")
 
 
-class SEIP_OT_build_site(LongWork[BuiltSite], bpy.types.Operator):
-    """Model the chosen place of the map: in this scene with its camera, light and units, or in a new scene of this file where this one has a site already"""  # noqa: E501  # a tooltip is one line
+def _is_own(operator: type[bpy.types.Operator], scene: bpy.types.Scene) -> bool:
+    if scene_status.is_linked(scene):
+        operator.poll_message_set(scene_status.LINKED)
+    return not scene_status.is_linked(scene)
+
+
+class _BuildsSite(LongWork[BuiltSite]):
+    """A mixin for operators that build a site."""
+
+    is_chosen = True
+
+    def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
+        """Build the scene."""
+        report = self.report  # type: ignore[attr-defined]  # of Blender's operators
+        built = scene
+        if has_site(scene):
+            built = bpy.data.scenes.new(result.model.name)
+            if self.is_chosen:
+                _copy_choice(scene.seip.site, built.seip.site)
+            sensor_types.list_types(built)
+        elif remove_startup_objects(scene):
+            report({"INFO"}, "Blender's cube, light and camera were removed")
+        finish(build_scene(built, result.model, result.map_name))
+        _keep_map(built, result)
+        show_site(built, result.model.region)
+        for note in result.model.notes:
+            report({"INFO"}, note)
+        for warning in result.model.warnings:
+            report({"WARNING"}, warning)
+        report({"INFO"}, f"{len(result.model.parts)} objects, region {result.model.region.area:,.0f} m²")
+
+
+class SEIP_OT_build_site(_BuildsSite, bpy.types.Operator):
+    """Model the chosen place of the map: in this scene with its camera, light and units, or in a new scene of this file where this one has a site already. Blender's cube, light and camera are removed where they are all that the scene holds"""  # noqa: E501  # a tooltip is one line
 
     bl_idname = "seip.build_site"
     bl_label = "Build Site"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether a map is chosen."""
+        """Return whether a place is chosen."""
         missing = missing_for_build(context.scene)
         if missing:
             cls.poll_message_set(missing)
-        return not missing
+        return not missing and _is_own(cls, context.scene)
 
     def prepare(self, scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
         """Take what was chosen."""
         site = scene.seip.site
-        junction = site.junction_id()
-        size = None if site.is_described() else float(f"{site.radius:.7g}")
-        radius, approaches = (None, size) if site.follows_approaches() else (size, None)
-        chosen = () if junction is None else (junction,)
-        asked = AskedSite(junction=chosen, radius=radius, approaches=approaches, anywhere=True)
-        return build_site(Path(bpy.path.abspath(site.source)), asked)
+        return build_site(Path(bpy.path.abspath(site.source)), site.asked())
 
-    def conclude(self, scene: bpy.types.Scene, result: BuiltSite) -> None:
-        """Build the scene."""
-        chosen = scene.seip.site
-        built = scene
-        if has_site(scene):
-            built = bpy.data.scenes.new(result.model.name)
-            for name in ("source", "region_shape", "radius"):
-                setattr(built.seip.site, name, getattr(chosen, name))
-            for junction in chosen.junctions:
-                one = built.seip.site.junctions.add()
-                one.name, one.id = junction.name, junction.id
-            built.seip.site.junction = chosen.junction
-            sensor_types.list_types(built)
-        finish(build_scene(built, result.model, result.map_name))
-        if bpy.context.window is not None:
-            bpy.context.window.scene = built
-        for note in result.model.notes:
-            self.report({"INFO"}, note)
-        for warning in result.model.warnings:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"{len(result.model.parts)} objects, region {result.model.region.area:,.0f} m²")
+
+class SEIP_OT_load_example(_BuildsSite, bpy.types.Operator):
+    """Build the junction that comes with SEIP: in this scene, or in a new scene of this file where this one has a site already"""  # noqa: E501  # a tooltip is one line
+
+    bl_idname = "seip.load_example"
+    bl_label = "Load Example"
+    is_chosen = False
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the scene can be written into."""
+        return _is_own(cls, context.scene)
+
+    def prepare(self, _scene: bpy.types.Scene) -> Generator[Progress, None, BuiltSite]:
+        """Take the example's description, which says all."""
+        return build_site(EXAMPLE, AskedSite())
+
+
+def _copy_choice(chosen: SEIP_PG_site, site: SEIP_PG_site) -> None:
+    for name in ("source", "position", "region_shape", "radius"):
+        setattr(site, name, getattr(chosen, name))
+    for junction in chosen.junctions:
+        one = site.junctions.add()
+        one.name, one.id = junction.name, junction.id
+    site.junction = chosen.junction
+
+
+def _keep_map(scene: bpy.types.Scene, built: BuiltSite) -> None:
+    """Keep the map of an extract's streets in the file, as a text: traffic is simulated on it."""
+    if built.map_text is not None:
+        bpy.data.texts.new(f"{scene.name}.xodr").from_string(built.map_text)
+
+
+def show_site(scene: bpy.types.Scene, region: BaseGeometry) -> None:
+    """Bring a scene to the front, with its site in all 3D views of the window and the sidebar beside them."""
+    window = bpy.context.window
+    if window is None:
+        return
+    window.scene = scene
+    for area in window.screen.areas:
+        if area.type == "VIEW_3D":
+            set_up_view(area.spaces.active)
+            frame_site(area, scene, region)
+    overlays.open_sidebar(window)
 
 
 def missing_for_build(scene: bpy.types.Scene) -> str:
     """Say what is missing before a site can be built, or nothing."""
-    return "" if scene.seip.site.source else "Choose a map first"
+    site = scene.seip.site
+    if not site.source:
+        return "Choose a map first"
+    return "" if site.has_place() else "Choose a junction, or give latitude and longitude"
 
 
 def has_site(scene: bpy.types.Scene) -> bool:
@@ -348,6 +416,7 @@ def _frame_selected(context: bpy.types.Context) -> None:
 CLASSES = (
     SEIP_OT_choose_map,
     SEIP_OT_build_site,
+    SEIP_OT_load_example,
     SEIP_OT_assign_role,
     SEIP_OT_take_out_of_role,
     SEIP_OT_add_area,

@@ -46,7 +46,7 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
         description="What the colours of the road mean",
         items=(
             ("seen", "Seen", "Whether some sensor sees the target"),
-            ("times", "Times", "How many sensors see the target"),
+            ("times", "Sensors", "How many sensors see the target"),
             ("weights", "Weights", "How much the target counts"),
         ),
         default="times",
@@ -61,7 +61,7 @@ class SEIP_OT_colour_coverage(bpy.types.Operator):
         """Colour it."""
         outcome = attempt(self, lambda: colour_coverage(context.scene, self.aspect))
         if outcome == {"FINISHED"}:
-            overlays.show(context.scene, coverage.NAME, coverage.coverage_overlay())
+            coverage.show(context.scene)
         return outcome
 
 
@@ -96,9 +96,9 @@ class SEIP_OT_toggle_legend(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> Outcome:
         """Show it where it is hidden, and the other way round."""
         if overlays.find(context.scene, coverage.NAME) is None:
-            overlays.show(context.scene, coverage.NAME, coverage.coverage_overlay())
+            coverage.show(context.scene)
         else:
-            overlays.hide(context.scene, coverage.NAME)
+            coverage.hide(context.scene)
         return {"FINISHED"}
 
 

@@ -14,7 +14,7 @@ from ..operators.results import SEIP_OT_evaluate_sensors, no_placement
 from ..operators.visibility import SEIP_OT_compare_scene
 from ..sensor_edits import sensor_edits
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar, settings_column
+from .sidebar import OfSite, RowList, Sidebar, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 _ERRING = ("position_error", "tilt_error", "seen_by", "failure")
@@ -42,26 +42,31 @@ class SEIP_PT_placement(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the goal and the button."""
         scene = context.scene
+        if scene_status.has_nothing(scene):
+            draw_sentence(self.layout, scene_status.NO_SITE, icon="INFO")
+            return
         goal = scene.seip.goal
         layout = settings_column(self.layout)
         row = layout.row()
         row.use_property_split = False  # else there is no room for three words
-        row.prop(goal, "limit", expand=True)
+        row.prop(goal, "limit", text="", expand=not is_narrow(context))
         column = layout.column()
         column.prop(goal, goal.limit.lower())
-        column.prop(goal, "weighting")
+        row = column.row()
+        row.use_property_split = True  # a list has no room for its name within
+        row.prop(goal, "weighting")
         if goal.weighting == "VALUE":
             column.prop(goal, "central_weight")
         column.prop(goal, "min_distance")
+        draw_run(layout, SEIP_OT_solve_placement.bl_idname)
         obstacle = scene_status.obstacle(scene)
         if obstacle:
             draw_sentence(layout, obstacle, icon="ERROR")
-        draw_run(layout, SEIP_OT_solve_placement.bl_idname)
         if not no_placement(scene):
             _draw_answer(layout, scene)
 
 
-class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
+class SEIP_PT_placement_precaution(OfSite, bpy.types.Panel):
     """What the placement is to stand."""
 
     bl_idname = "SEIP_PT_placement_precaution"
@@ -86,12 +91,12 @@ class SEIP_PT_placement_precaution(Sidebar, bpy.types.Panel):
         draw_sentence(layout, f"This looks from every candidate {looks} and takes minutes.", icon="INFO")
 
 
-class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
+class SEIP_PT_placement_rules(OfSite, bpy.types.Panel):
     """Positions that must, and must not, carry a sensor."""
 
     bl_idname = "SEIP_PT_placement_rules"
     bl_parent_id = "SEIP_PT_placement"
-    bl_label = "Required and Forbidden Positions"
+    bl_label = "Position Rules"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -107,7 +112,7 @@ class SEIP_PT_placement_rules(Sidebar, bpy.types.Panel):
         row.operator("seip.add_rule", text="No Sensor", icon="CANCEL").rule = "FORBIDDEN"
 
 
-class SEIP_PT_placement_solver(Sidebar, bpy.types.Panel):
+class SEIP_PT_placement_solver(OfSite, bpy.types.Panel):
     """How a placement is searched."""
 
     bl_idname = "SEIP_PT_placement_solver"
@@ -158,9 +163,9 @@ def figures(record: PlacementRecord) -> list[tuple[str, str]]:
     coverage, objective = record.coverage, record.objective
     lines = [("Coverage", f"{coverage.whole:.2%}")]
     if coverage.central is not None:
-        lines.append(("Central coverage", f"{coverage.central:.2%}"))
+        lines.append(("Central", f"{coverage.central:.2%}"))
     if objective.kind == "weighted":
-        lines.append(("Weighted coverage", f"{coverage.weighted:.2%}"))
+        lines.append(("Weighted", f"{coverage.weighted:.2%}"))
     lines += [("Price", f"${record.price_usd:,.0f}"), ("Sensors", str(len(record.sensors)))]
     if objective.bound is not None and objective.gap is not None:
         unit = "${:,.0f}" if objective.cheapest else "{:,.6g}"

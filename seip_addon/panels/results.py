@@ -9,7 +9,7 @@ from ..core.results.placement_record import PlacementRecord, parsed_record
 from ..operators import results
 from ..session import FollowedSensors, session
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar
+from .sidebar import RowList, Sidebar, is_narrow
 from .wrapped_text import draw_sentence
 
 
@@ -25,8 +25,10 @@ class SEIP_UL_chosen(RowList, bpy.types.UIList):
         if sensor is None:
             layout.label(text=item.name)
             return
-        row = layout.split(factor=0.75)
-        row.label(text=f"{item.name}  {sensor.sensor} {sensor.height_m:g} m {sensor.position}")
+        narrow = is_narrow(bpy.context)
+        row = layout.split(factor=0.55 if narrow else 0.75)
+        where = "" if narrow else f" {sensor.height_m:g} m {sensor.position}"
+        row.label(text=f"{item.name}  {sensor.sensor}{where}")
         row.label(text=f"{sensor.coverage_alone:.1%}")
 
 
@@ -37,7 +39,7 @@ class SEIP_UL_ranked(RowList, bpy.types.UIList):
 
     def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         """Draw a candidate and its worth."""
-        row = layout.split(factor=0.75)
+        row = layout.split(factor=0.55 if is_narrow(bpy.context) else 0.75)
         row.label(text=item.name)
         row.label(text=f"{item.share:.2%}")
 

@@ -6,14 +6,17 @@ import time
 
 import bpy
 
+from .. import scene_status
 from ..session import session
 
 
-def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE") -> None:
-    """Draw an operator's button, or how far its work is with a button to stop it."""
+def draw_run(layout: bpy.types.UILayout, operator: str, icon: str = "NONE", text: str | None = None) -> None:
+    """Draw an operator's button, or how far its work is with a button to stop it; the next step's is emphasised."""
     running = session.running
     if running is None or not is_running(operator):
-        layout.operator(operator, icon=icon)
+        row = layout.row(align=True)
+        row.active_default = scene_status.next_step(bpy.context.scene) == operator
+        row.operator(operator, icon=icon, text=text)
         return
     progress = running.work.progress
     column = layout.column(align=True)

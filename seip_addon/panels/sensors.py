@@ -19,7 +19,7 @@ from ..operators.sensors import (
 from ..scene.materials import REFLECTIVITY
 from ..session import session
 from ..viewport import beam_preview
-from .sidebar import RowList, Sidebar, settings_column
+from .sidebar import RowList, Sidebar, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 
@@ -33,6 +33,9 @@ class SEIP_UL_sensor_types(RowList, bpy.types.UIList):
         model = session.sensor_types.get(item.name)
         row = layout.row(align=True)
         row.prop(item, "use", text="")
+        if is_narrow(bpy.context):  # the figures are under Details as well
+            row.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
+            return
         split = row.split(factor=0.38)
         split.label(text=item.name, icon="NONE" if model else "ERROR", translate=False)
         split.label(text=_in_short(model) if model else "unknown", translate=False)
@@ -67,7 +70,8 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
             draw_sentence(layout, "Types 1 to 3 of the study are used.", icon="INFO")
             layout.operator(SEIP_OT_list_sensor_types.bl_idname, text="Choose Types")
         else:
-            draw_sentence(layout, "Channels · range · middle price")
+            if not is_narrow(context):
+                draw_sentence(layout, "Channels · range · middle price")
             layout.template_list(SEIP_UL_sensor_types.bl_idname, "", survey, "types", survey, "active_type", rows=5)
             row = layout.row(align=True)
             row.operator(SEIP_OT_add_catalogue.bl_idname, icon="ADD")
@@ -75,8 +79,13 @@ class SEIP_PT_sensors(Sidebar, bpy.types.Panel):
             if not any(one.use for one in survey.types):
                 draw_sentence(layout, "Use at least one type.", icon="ERROR", alert=True)
         column = settings_column(layout)
-        column.prop(survey, "heights")
-        column.prop(survey, "tilts")
+        for name, wrong in (("heights", survey.wrong_heights()), ("tilts", survey.wrong_tilts())):
+            row = column.row()
+            row.use_property_split = True  # a text has no room for its name within
+            row.alert = bool(wrong)
+            row.prop(survey, name, text=name.capitalize() if is_narrow(context) else None)
+            if wrong:
+                draw_sentence(column, wrong, icon="ERROR", alert=True)
         if any(one.use and _looks_one_way(one.name) for one in survey.types):
             column.prop(survey, "yaws")
 

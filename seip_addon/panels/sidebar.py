@@ -4,13 +4,28 @@ from __future__ import annotations
 
 import bpy
 
+from .. import scene_status
+from ..viewport.overlays import TAB
+
+NARROW = 250
+"""Pixels at the interface's usual scale."""
+
 
 class Sidebar:
     """A mixin: a panel in the tab SEIP of the 3D viewport's sidebar."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
-    bl_category = "SEIP"
+    bl_category = TAB
+
+
+class OfSite(Sidebar):
+    """A mixin: a panel that is there once there is a site."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether there is."""
+        return not scene_status.has_nothing(context.scene)
 
 
 class RowList:
@@ -35,8 +50,14 @@ class RowList:
 
 
 def settings_column(layout: bpy.types.UILayout, heading: str = "") -> bpy.types.UILayout:
-    """Return a column of settings: names on the left, values on the right."""
+    """Return a column of settings: names on the left, values on the right; in a narrow sidebar names within fields."""
     column = layout.column(heading=heading)
-    column.use_property_split = True
+    column.use_property_split = not is_narrow(bpy.context)
     column.use_property_decorate = False
     return column
+
+
+def is_narrow(context: bpy.types.Context) -> bool:
+    """Return whether the sidebar has no room for a row of figures."""
+    region = context.region
+    return region is not None and region.width < NARROW * context.preferences.system.ui_scale

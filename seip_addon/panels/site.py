@@ -12,15 +12,17 @@ from ..operators.site import (
     SEIP_OT_build_site,
     SEIP_OT_check_site,
     SEIP_OT_choose_map,
+    SEIP_OT_load_example,
     SEIP_OT_show_problem,
     SEIP_OT_take_out_of_role,
     has_site,
     missing_for_build,
     why_no_role,
 )
+from ..properties.site import SEIP_PG_site
 from ..scene import roles
 from .run_button import draw_run
-from .sidebar import RowList, Sidebar, settings_column
+from .sidebar import RowList, Sidebar, is_narrow, settings_column
 from .wrapped_text import draw_sentence
 
 
@@ -33,9 +35,7 @@ class SEIP_PT_site(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Say what there is to begin with."""
         if not has_site(context.scene):
-            draw_sentence(
-                self.layout, "Build a site from a map, or assign roles to the objects of your own.", icon="INFO"
-            )
+            draw_sentence(self.layout, "Begin with a map, or with roles of your own objects.", icon="INFO")
 
 
 class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
@@ -43,31 +43,43 @@ class SEIP_PT_site_map(Sidebar, bpy.types.Panel):
 
     bl_idname = "SEIP_PT_site_map"
     bl_parent_id = "SEIP_PT_site"
-    bl_label = "From OpenDRIVE"
+    bl_label = "From a Map"
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the choice of the map and the place."""
         site = context.scene.seip.site
         layout = self.layout
         name = bpy.path.basename(site.source)
-        layout.operator(SEIP_OT_choose_map.bl_idname, text=name or "Choose Map…", icon="FILE_FOLDER")
+        if not name:
+            draw_run(layout, SEIP_OT_load_example.bl_idname)
+        draw_run(layout, SEIP_OT_choose_map.bl_idname, icon="FILE_FOLDER", text=name or "Choose Map…")
+        if not name:
+            return
+        draw_place(layout, site)
         missing = missing_for_build(context.scene)
         if missing:
-            draw_sentence(layout, missing, icon="INFO")
-            return
-        column = settings_column(layout)
-        column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
-        if site.is_described():
-            draw_sentence(layout, "The place is the one that the description names.")
-        else:
-            if site.junction:
-                column.prop(site, "region_shape")
-            column.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
-            if not site.junction:
-                draw_sentence(layout, "No junction: the middle of the map.")
-        if has_site(context.scene):
+            draw_sentence(layout, f"{missing}.", icon="INFO")
+        elif has_site(context.scene):
             draw_sentence(layout, "This scene has a site: a new scene is made.", icon="INFO")
         draw_run(layout, SEIP_OT_build_site.bl_idname)
+
+
+def draw_place(layout: bpy.types.UILayout, site: SEIP_PG_site) -> None:
+    """Draw the choice of a place in the chosen file, and how large the site is."""
+    column = settings_column(layout)
+    column.prop_search(site, "junction", site, "junctions", icon="DECORATE_DRIVER")
+    if site.is_extract() and not site.junction:
+        row = column.row()
+        row.alert = bool(site.position and site.wrong_position())
+        row.prop(site, "position")
+    if site.is_described():
+        draw_sentence(layout, "The place is the one that the description names.")
+        return
+    if site.junction or site.is_extract():
+        column.prop(site, "region_shape")
+    column.prop(site, "radius", text="Along Them" if site.follows_approaches() else "Radius")
+    if not site.junction and not site.is_extract():
+        draw_sentence(layout, "No junction: the middle of the map.")
 
 
 class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
@@ -89,7 +101,7 @@ class SEIP_PT_site_roles(Sidebar, bpy.types.Panel):
         if reason:
             draw_sentence(layout, reason, icon="INFO")
         if Role[site.role] in roles.AREAS:
-            row = layout.row(align=True)
+            row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
             for place, text in (("CURSOR", "Draw at Cursor"), ("VIEW", "Draw in View")):
                 button = row.operator(SEIP_OT_add_area.bl_idname, text=text)
                 button.role, button.place = site.role, place

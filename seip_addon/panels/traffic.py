@@ -31,12 +31,12 @@ class SEIP_PT_traffic(Sidebar, bpy.types.Panel):
         traffic = context.scene.seip.traffic
         layout = self.layout
         column = layout.column(align=True)
-        column.prop(traffic, "file", text="")
+        column.prop(traffic, "file", text="", placeholder="Traffic (.npz, .xml)")
         if traffic.file and not traffic.file.lower().endswith(".npz"):
             column.prop(traffic, "routes", text="", placeholder="Routes (vehicle types)")
             column.prop(traffic, "net", text="", placeholder="Network (.net.xml)")
         reason = why_no_load(context.scene)
-        if reason:
+        if reason and traffic.file:  # an empty field says so itself
             draw_sentence(layout, reason, icon="INFO")
         row = layout.row(align=True)
         draw_run(row, SEIP_OT_load_traffic.bl_idname)
@@ -59,15 +59,16 @@ class SEIP_PT_scan(Sidebar, bpy.types.Panel):
         """Draw how scans are made, and the last."""
         traffic = context.scene.seip.traffic
         layout = self.layout
+        why_not = why_no_scan(context.scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
+            return
         column = settings_column(layout)
         column.prop(traffic, "noise")
         column.prop(traffic, "seed")
         column.prop(traffic, "rolling_shutter")
         column.prop(traffic, "follow")
         draw_run(layout, SEIP_OT_scan_frame.bl_idname)
-        why_not = why_no_scan(context.scene)
-        if why_not:
-            draw_sentence(layout, why_not, icon="INFO")
         scan = session.scan_of(context.scene)
         for line in scan.facts if scan is not None else ():
             draw_sentence(layout, line)
@@ -85,6 +86,10 @@ class SEIP_PT_dataset(Sidebar, bpy.types.Panel):
         """Draw what is written where."""
         traffic = context.scene.seip.traffic
         layout = self.layout
+        why_not = why_no_scan(context.scene)
+        if why_not:
+            draw_sentence(layout, why_not, icon="INFO")
+            return
         column = settings_column(layout)
         column.prop(traffic, "folder")
         column.prop(traffic, "whole")
@@ -96,9 +101,6 @@ class SEIP_PT_dataset(Sidebar, bpy.types.Panel):
         layout.label(text="Formats")
         layout.column(align=True).prop(traffic, "formats")
         draw_run(layout, SEIP_OT_write_dataset.bl_idname)
-        why_not = why_no_scan(context.scene)
-        if why_not:
-            draw_sentence(layout, why_not, icon="INFO")
 
 
 CLASSES = (SEIP_PT_traffic, SEIP_PT_scan, SEIP_PT_dataset)

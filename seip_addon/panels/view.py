@@ -22,7 +22,8 @@ from .run_button import draw_run, is_running
 from .sidebar import Sidebar
 from .wrapped_text import draw_sentence
 
-ASPECTS = ("seen", "times", "weights")
+ASPECTS = {"seen": "Seen", "times": "Sensors", "weights": "Weights"}
+"""What the buttons of the colours say."""
 
 
 class SEIP_PT_view(Sidebar, bpy.types.Panel):
@@ -33,9 +34,14 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw what can be shown."""
+        scene = context.scene
+        if why_no_coverage(scene) and no_placement(scene) and session.scan_of(scene) is None:
+            draw_sentence(self.layout, "There is nothing to show yet.", icon="INFO")
+            return
         self._draw_coverage(context)
         self._draw_sight(context)
-        self._draw_cloud(context)
+        if session.scan_of(scene) is not None:
+            self._draw_cloud(context)
         self._draw_picture(context)
 
     def _draw_coverage(self, context: bpy.types.Context) -> None:
@@ -46,9 +52,9 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
         head.operator(SEIP_OT_toggle_legend.bl_idname, text="", icon="INFO", depress=shown)
         obj = coverage_of(context.scene)
         row = column.row(align=True)
-        for aspect in ASPECTS:
+        for aspect, words in ASPECTS.items():
             now = obj is not None and obj.get(ASPECT) == aspect
-            button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=aspect.capitalize(), depress=now)
+            button = row.operator(SEIP_OT_colour_coverage.bl_idname, text=words, depress=now)
             button.aspect = aspect
         why_not = why_no_coverage(context.scene)
         if why_not:
@@ -75,14 +81,8 @@ class SEIP_PT_view(Sidebar, bpy.types.Panel):
     def _draw_cloud(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         column.label(text="Point Cloud")
-        row = column.row(align=True)
-        there = session.scan_of(context.scene) is not None
-        row.enabled = there
-        row.prop(context.scene.seip.view, "cloud_colour", expand=True)
-        if there:
-            column.operator("seip.hide_scan", icon="X")
-        else:
-            draw_sentence(column, "There is no scan yet: scan a frame, under Traffic and Scans.", icon="INFO")
+        column.row(align=True).prop(context.scene.seip.view, "cloud_colour", expand=True)
+        column.operator("seip.hide_scan", icon="X")
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
         view = context.scene.seip.view

@@ -9,7 +9,7 @@ from ..core.visibility.estimate import Estimate
 from ..operators.visibility import SEIP_OT_compute_visibility, SEIP_OT_estimate_visibility
 from ..session import session
 from .run_button import draw_run, in_words
-from .sidebar import Sidebar, settings_column
+from .sidebar import OfSite, Sidebar, settings_column
 from .wrapped_text import draw_sentence
 
 
@@ -22,17 +22,20 @@ class SEIP_PT_visibility(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw settings, what they will take, and the button."""
         scene = context.scene
+        if scene_status.has_nothing(scene):
+            draw_sentence(self.layout, scene_status.NO_SITE, icon="INFO")
+            return
         survey = scene.seip.survey
         layout = settings_column(self.layout)
         column = layout.column()
         for name in ("grid", "delta"):
             column.prop(survey, name)
-        _draw_state(layout, scene)
-        draw_run(layout, SEIP_OT_estimate_visibility.bl_idname)
         draw_run(layout, SEIP_OT_compute_visibility.bl_idname)
+        draw_run(layout, SEIP_OT_estimate_visibility.bl_idname)
+        _draw_state(layout, scene)  # below the buttons, which stay where they are when it grows
 
 
-class SEIP_PT_visibility_details(Sidebar, bpy.types.Panel):
+class SEIP_PT_visibility_details(OfSite, bpy.types.Panel):
     """How the site is laid out and looked at."""
 
     bl_idname = "SEIP_PT_visibility_details"

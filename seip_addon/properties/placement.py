@@ -68,7 +68,7 @@ class SEIP_PG_goal(bpy.types.PropertyGroup):
     central_weight: FloatProperty(
         name="Weight", description="Of targets in weighted regions, where others have 1", default=2.0, min=0.001
     )
-    min_distance: of_setting(Objective, "min_distance", "Minimum Distance")
+    min_distance: of_setting(Objective, "min_distance", "Min. Distance")
     objective: EnumProperty(
         name="Optimise for",
         description="Whether the placement trusts the map, or is chosen for what may go wrong",

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..core.errors import SeipError
+from ..core.openstreetmap.site import is_extract
 from ..core.site.scene_geometry import DEFAULT_WEIGHT
 from ..core.streetscape.description import DEFAULT_RADIUS, DESCRIPTION_SUFFIX
+from ..core.workflows.site_building import AskedSite
+from ..core.workflows.site_places import parsed_position
 from ..scene import contract, roles
 from .conversion import as_typed
 
 
 class SEIP_PG_junction(bpy.types.PropertyGroup):
-    """A junction of the chosen map; its name is what the list shows."""
+    """A junction of the chosen file; its name is what the list shows."""
 
-    id: StringProperty(name="Id", description="Of the junction, as in the map")
+    id: StringProperty(name="Id", description="Of the junction as in the map, or its latitude and longitude")
 
 
 class SEIP_PG_count(bpy.types.PropertyGroup):
@@ -44,14 +50,20 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
 
     source: StringProperty(
         name="Map",
-        description="OpenDRIVE map, or site description that names one",
+        description="OpenDRIVE map, site description that names one, or extract of OpenStreetMap",
         subtype="FILE_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     junctions: CollectionProperty(type=SEIP_PG_junction)
     junction: StringProperty(
         name="Junction",
-        description="In the middle of the site; empty for the middle of the map, or the description's own place",
+        description="In the middle of the site, by the streets that meet there: type to search. Empty for the middle "
+        "of the map, or the description's own place",
+    )
+    position: StringProperty(
+        name="Lat, Lon",
+        description="Latitude and longitude in degrees, as maps in the browser give them: 52.47391, 13.44048. The "
+        "junction nearest to it is in the middle of the site, or the place itself with a circle",
     )
     region_shape: EnumProperty(
         name="Region",
@@ -84,16 +96,43 @@ class SEIP_PG_site(bpy.types.PropertyGroup):
         """Return whether a site description says where the place is, and how large."""
         return self.source.lower().endswith(DESCRIPTION_SUFFIX) and not self.junction
 
-    def follows_approaches(self) -> bool:
-        """Return whether the region follows the approaches of a chosen junction."""
-        return bool(self.junction) and self.region_shape == "APPROACHES"
+    def is_extract(self) -> bool:
+        """Return whether the site comes from an extract of OpenStreetMap."""
+        return is_extract(Path(self.source))
 
-    def junction_id(self) -> str | None:
-        """Return the id of the chosen junction, what was typed where the map has no such, None where none is chosen."""
-        if not self.junction:
-            return None
+    def wrong_position(self) -> str:
+        """Say what is wrong with latitude and longitude, or nothing."""
+        try:
+            parsed_position(self.position)
+        except SeipError as error:
+            return str(error)
+        return ""
+
+    def has_place(self) -> bool:
+        """Return whether enough is chosen to build a site: a map has a middle, an extract none."""
+        return bool(self.source and (self.junction or self.position or not self.is_extract()))
+
+    def follows_approaches(self) -> bool:
+        """Return whether the region follows the approaches of a junction."""
+        return (bool(self.junction) or self.is_extract()) and self.region_shape == "APPROACHES"
+
+    def asked(self) -> AskedSite:
+        """Return what is asked for, as the core takes it.
+
+        Raises
+        ------
+        SeipError
+            The position is none.
+        """
+        size = None if self.is_described() else as_typed(self.radius)
+        radius, approaches = (None, size) if self.follows_approaches() else (size, None)
         found = self.junctions.get(self.junction)
-        return str(self.junction if found is None else found.id)
+        chosen = self.junction if found is None else found.id
+        if not self.is_extract():
+            junction = (chosen,) if chosen else ()
+            return AskedSite(junction=junction, radius=radius, approaches=approaches, anywhere=True)
+        near = parsed_position(chosen or self.position)
+        return AskedSite(near_latlon=near, radius=radius, approaches=approaches)
 
 
 def _region_weight(obj: bpy.types.Object) -> float:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..core.errors import SeipError
 from ..core.site.candidates import MAX_SENSOR_HEIGHT, CandidateSettings, heights_of, tilts_of
 from ..core.site.weather import Weather
 from ..core.visibility.settings import VisibilitySettings
@@ -52,9 +54,9 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
     )
     yaws: of_setting(CandidateSettings, "yaws", "Yaws", soft_max=36)
     grid: of_setting(SurveySettings, "grid_spacing", "Target Spacing", min=0.05, soft_max=10.0, step=10)
-    delta: of_setting(VisibilitySettings, "delta", "δ", min=0.01, soft_max=5.0, step=10)
-    min_intensity: of_setting(VisibilitySettings, "min_intensity", "Minimum Intensity", subtype="FACTOR")
-    detection: of_setting(VisibilitySettings, "detection", "Detection Probability", subtype="FACTOR")
+    delta: of_setting(VisibilitySettings, "delta", "Seen Within δ", min=0.01, soft_max=5.0, step=10)
+    min_intensity: of_setting(VisibilitySettings, "min_intensity", "Min. Intensity", subtype="FACTOR")
+    detection: of_setting(VisibilitySettings, "detection", "Detection", subtype="FACTOR")
     rain: of_setting(Weather, "rain", "Rain (mm/h)", max=500.0, soft_max=50.0)
     fog: BoolProperty(name="Fog", description="Look through fog or snow")
     visibility: of_setting(Weather, "visibility", "Visibility", default=200.0, soft_max=2000.0)
@@ -105,6 +107,14 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
         soft_max=3600.0,
     )
 
+    def wrong_heights(self) -> str:
+        """Say what is wrong with the heights, or nothing."""
+        return _complaint(lambda: CandidateSettings(heights=heights_of(self.heights.split())))
+
+    def wrong_tilts(self) -> str:
+        """Say what is wrong with the tilts, or nothing."""
+        return _complaint(lambda: CandidateSettings(tilts=tilts_of(self.tilts.split())))
+
     def settings(self) -> SurveySettings:
         """Return what is asked, as the core takes it.
 
@@ -135,6 +145,14 @@ class SEIP_PG_survey(bpy.types.PropertyGroup):
             time_limit=math.inf if self.effort else as_typed(self.time_limit),
             effort=as_typed(self.effort) if self.effort else math.inf,
         )
+
+
+def _complaint(read: Callable[[], object]) -> str:
+    try:
+        read()
+    except SeipError as error:
+        return str(error)
+    return ""
 
 
 CLASSES = (SEIP_PG_sensor_type, SEIP_PG_survey)

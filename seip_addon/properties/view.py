@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .. import live_scan
 
@@ -15,6 +15,9 @@ def _recolour(_own: object, context: bpy.types.Context) -> None:
 class SEIP_PG_view(bpy.types.PropertyGroup):
     """How what was found is shown."""
 
+    legend: BoolProperty(
+        name="Legend", description="Show what the colours of the coverage mean, and the sensors' labels", default=True
+    )
     cloud_colour: EnumProperty(
         name="Point Colours",
         description="What the colours of the point cloud mean",

@@ -9,9 +9,7 @@ import bpy
 from ..core.errors import SeipError
 from ..core.storage.files import whole_file
 from .interrupts import held_interrupts
-
-CLIP_START, CLIP_END = 0.5, 5000.0
-"""Metres before the eye between which a 3D view shows objects: a site, without flicker of what lies close together."""
+from .views import set_up_view
 
 
 def new_file() -> bpy.types.Scene:
@@ -83,7 +81,6 @@ def _is_whole(path: Path) -> bool:
 def _set_up_views() -> None:
     views = (area.spaces.active for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
     for view in views:
-        view.clip_start, view.clip_end = CLIP_START, CLIP_END
-        view.shading.color_type = "MATERIAL"
+        set_up_view(view)
         if bpy.context.scene.camera is not None:
             view.region_3d.view_perspective = "CAMERA"

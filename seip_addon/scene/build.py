@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 
 import bpy
 import numpy as np
@@ -14,10 +14,10 @@ from ..core.storage.files import digest
 from ..core.streetscape.model import AREA_OVERLAYS, SiteModel
 from ..core.streetscape.parts import Part, Role
 from . import contract
-from .blend_file import CLIP_END, CLIP_START
 from .daylight import add_daylight
 from .meshes import mesh_of
 from .named_places import places_text
+from .views import CLIP_END, CLIP_START
 
 DRESSING = "Dressing"
 VIEW = "View"
@@ -62,10 +62,13 @@ def build_scene(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> Gene
     for name in COLLECTIONS.values():
         contract.find_or_make(scene, name)
     meshes: dict[str, bpy.types.Mesh] = {}
+    made: dict[str, bpy.types.Object] = {}
     for number, part in enumerate(model.parts):
         if number % STEP == 0:
             yield Progress(number, len(model.parts), "objects")
-        _add(scene, part, meshes)
+        made[part.name] = _add(scene, part, meshes)
+        if part.of:
+            _attach(made[part.name], made[part.of])
     yield Progress(len(model.parts), len(model.parts), "objects")
     add_daylight(scene, contract.find_or_make(scene, VIEW))
     _frame(scene, model)
@@ -83,7 +86,23 @@ def _describe(scene: bpy.types.Scene, model: SiteModel, map_name: str) -> None:
     scene.unit_settings.scale_length = 1.0
 
 
-def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) -> None:
+def _attach(piece: bpy.types.Object, whole: bpy.types.Object) -> None:
+    """Have a piece go where the whole goes, from where it stands."""
+    piece.parent = whole
+    piece.matrix_parent_inverse = whole.matrix_basis.inverted()
+    piece[contract.PIECE_OF] = whole.name
+
+
+def loose_pieces(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Return the pieces among objects whose whole is gone; one that was only taken off its whole is not among them."""
+    return [
+        obj
+        for obj in objects
+        if obj.parent is None and contract.PIECE_OF in obj and obj[contract.PIECE_OF] not in bpy.data.objects
+    ]
+
+
+def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) -> bpy.types.Object:
     """Add a part as an object; parts of one shape share a mesh."""
     solid = part.solid
     shape = digest(solid.vertices, repr(solid.faces), repr(solid.materials))
@@ -101,6 +120,7 @@ def _add(scene: bpy.types.Scene, part: Part, meshes: dict[str, bpy.types.Mesh]) 
     obj.hide_render = AREA_OVERLAYS.keys() >= set(part.roles)  # the viewport shows what only means an area
     for role in part.roles:
         contract.find_or_make(scene, COLLECTIONS[role]).objects.link(obj)
+    return obj
 
 
 def _frame(scene: bpy.types.Scene, model: SiteModel) -> None:

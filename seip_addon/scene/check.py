@@ -16,6 +16,7 @@ from .named_places import places_of
 from .read import (
     Shown,
     area_of,
+    check_units,
     foot_sentences,
     geo_reference_of,
     geometry_of,
@@ -113,14 +114,7 @@ def _finite(parts: list[Shown]) -> list[Shown]:
 
 
 def _odd_scene(scene: bpy.types.Scene) -> Iterator[Problem]:
-    scale = scene.unit_settings.scale_length
-    if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6:
-        yield Problem(
-            "WARNING",
-            f"The scene's unit scale is {scale:g}, but one unit of Blender is taken for one metre: "
-            "set the unit scale to 1 and scale the objects.",
-        )
-    for read in (origin_of, geo_reference_of, places_of):
+    for read in (check_units, origin_of, geo_reference_of, places_of):
         try:
             read(scene)
         except SeipError as error:

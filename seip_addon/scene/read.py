@@ -88,9 +88,10 @@ def read_scene(scene: bpy.types.Scene) -> SceneReading:
     Raises
     ------
     SeipError
-        The region or the road is missing; an object that must have faces has
+        The scene does not count in metres; the region or the road is missing; an object that must have faces has
         none, has a coordinate that is no number, or has no area at all.
     """
+    check_units(scene)
     members = contract.members(scene)
     for sentence in missing_libraries(scene, members).values():
         raise SeipError(sentence)
@@ -369,6 +370,16 @@ def _finite_origin(part: Shown) -> Float:
     if not np.isfinite(origin).all():
         raise SeipError(f"pole {part.name!r} stands at a place that is no finite number: set its location")
     return origin
+
+
+def check_units(scene: bpy.types.Scene) -> None:
+    """Raise SeipError where one unit of a scene is no metre."""
+    units = scene.unit_settings
+    if units.system != "NONE" and not math.isclose(units.scale_length, 1.0, rel_tol=1e-6):
+        raise SeipError(
+            f"one unit of scene {scene.name!r} is {units.scale_length:g} m, but is read as one metre: set Unit Scale "
+            "to 1 under Scene ▸ Units, and scale all objects by what it was"
+        )
 
 
 def origin_of(scene: bpy.types.Scene) -> Float:

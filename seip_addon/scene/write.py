@@ -113,7 +113,6 @@ def _empty(sensor: Sensor) -> bpy.types.Object:
     empty = bpy.data.objects.new(_name(sensor), None)
     empty.empty_display_type = "ARROWS"
     empty.empty_display_size = 0.8
-    empty.show_name = True
     empty.show_in_front = True
     empty.location = sensor.xyz
     empty.rotation_euler = (0.0, sensor.tilt, sensor.yaw)

@@ -5,14 +5,37 @@ import bpy
 from ..core.pictures.palette import rgb
 from ..overlay import Block, Entry, Overlay
 from ..scene.write import CLASS_COLOURS, CLASS_WORDS, SHARES, coverage_of
+from . import overlays
+from .labels import labels_of_sensors
 
 NAME = "coverage"
 SHOWN_BY = {"MATERIAL", "VERTEX"}  # ways to colour Solid shading that show the coverage
 
 
 def coverage_overlay() -> Overlay:
-    """Return the legend of whatever colours the coverage has; the mesh itself is Blender's to draw."""
-    return Overlay((), legend_of_coverage)
+    """Return the legend of the coverage's colours, and the sensors' labels; the mesh is Blender's to draw."""
+    return Overlay((), legend_of_coverage, labels=labels_of_sensors)
+
+
+def show(scene: bpy.types.Scene) -> None:
+    """Show the legend of a scene's coverage, from now on and when the file is opened again."""
+    scene.seip.view.legend = True
+    overlays.show(scene, NAME, coverage_overlay())
+
+
+def hide(scene: bpy.types.Scene) -> None:
+    """Show no legend."""
+    scene.seip.view.legend = False
+    overlays.hide(scene, NAME)
+
+
+def show_colours(scene: bpy.types.Scene) -> None:
+    """Show a scene's coverage with its legend, in all views of Solid shading."""
+    show(scene)
+    areas = (area for one in bpy.context.window_manager.windows if one.scene == scene for area in one.screen.areas)
+    for view in (area.spaces.active for area in areas if area.type == "VIEW_3D"):
+        if view.shading.type == "SOLID" and not shows_coverage(view):
+            set_shading(view)
 
 
 def legend_of_coverage(scene: bpy.types.Scene) -> Block | None:
@@ -35,3 +58,24 @@ def set_shading(space: bpy.types.SpaceView3D) -> None:
     """Set a view's shading so that it shows the colours of the coverage."""
     space.shading.type = "SOLID"
     space.shading.color_type = "MATERIAL"
+
+
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
+def _after_load(*_: object) -> None:
+    """Show what was shown when the file was saved."""
+    for scene in bpy.data.scenes:
+        if scene.seip.view.legend and coverage_of(scene) is not None:
+            overlays.show(scene, NAME, coverage_overlay())
+
+
+def attach() -> None:
+    """Show legends whenever a file is opened, and now as soon as Blender lets look at the file."""
+    bpy.app.handlers.load_post.append(_after_load)
+    bpy.app.timers.register(_after_load, first_interval=0.0)
+
+
+def detach() -> None:
+    """Show none any longer."""
+    bpy.app.handlers.load_post.remove(_after_load)
+    if bpy.app.timers.is_registered(_after_load):
+        bpy.app.timers.unregister(_after_load)

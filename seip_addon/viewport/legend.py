@@ -40,11 +40,11 @@ def draw_legend_at(blocks: Sequence[Block], right: float, bottom: float, scale: 
     wide = max(_width(block) for block in blocks) + 2 * GAP * scale + (SWATCH + GAP) * scale
     lines = sum(1 + len(block.entries) for block in blocks)
     tall = (lines * LINE + (len(blocks) + 1) * GAP) * scale
-    _fill(right - wide, bottom, wide, tall, (PAPER, PAPER))
+    fill(right - wide, bottom, wide, tall, (PAPER, PAPER))
     x, y = right - wide + GAP * scale, bottom + tall - GAP * scale
     for block in blocks:
         y -= LINE * scale
-        _write(block.title, x, y, scale)
+        write(block.title, x, y, scale)
         for entry in block.entries:
             y -= LINE * scale
             _draw_entry(entry, x, y, scale)
@@ -56,21 +56,22 @@ def _width(block: Block) -> float:
 
 
 def _draw_entry(entry: Entry, x: float, y: float, scale: float) -> None:
-    _fill(x - scale, y + scale, (SWATCH + 2) * scale, 13 * scale, (EDGE, EDGE))
+    fill(x - scale, y + scale, (SWATCH + 2) * scale, 13 * scale, (EDGE, EDGE))
     ends = entry.colours if len(entry.colours) > 1 else entry.colours * 2
     part = SWATCH * scale / (len(ends) - 1)
     for number, pair in enumerate(pairwise(ends)):
-        _fill(x + number * part, y + 2 * scale, part, 11 * scale, pair)
-    _write(entry.words, x + (SWATCH + GAP) * scale, y, scale)
+        fill(x + number * part, y + 2 * scale, part, 11 * scale, pair)
+    write(entry.words, x + (SWATCH + GAP) * scale, y, scale)
 
 
-def _write(words: str, x: float, y: float, scale: float) -> None:
+def write(words: str, x: float, y: float, scale: float) -> None:
+    """Write words from their lower left corner."""
     blf.position(FONT, x, y + 3 * scale, 0)
     blf.color(FONT, *INK)
     blf.draw(FONT, words)
 
 
-def _fill(x: float, y: float, width: float, height: float, colours: tuple[Colour, ...]) -> None:
+def fill(x: float, y: float, width: float, height: float, colours: tuple[Colour, ...]) -> None:
     """Fill a rectangle with a colour on the left that runs into one on the right."""
     left, right = colours
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")

@@ -3,15 +3,20 @@
 Blender's draw handlers are registered only while there is an overlay.
 """
 
+from contextlib import suppress
 from typing import Any
 
 import bpy
 import gpu
 
-from ..overlay import Block, Overlay
+from ..overlay import Block, Label, Overlay
 from ..session import session
+from .labels import draw_labels
 from .legend import draw_legend
 
+TAB = "SEIP"
+DRAWN = 0.5
+"""Seconds after which a sidebar that was opened has been drawn."""
 _handles: list[Any] = []
 
 
@@ -62,6 +67,26 @@ def redraw() -> None:
                 area.tag_redraw()
 
 
+def open_sidebar(window: bpy.types.Window) -> None:
+    """Open the sidebar of a window's 3D views, with this add-on's tab in front."""
+    for area in window.screen.areas:
+        if area.type == "VIEW_3D":
+            area.spaces.active.show_region_ui = True
+    if not bpy.app.background and not bpy.app.timers.is_registered(_bring_forward):
+        bpy.app.timers.register(_bring_forward, first_interval=DRAWN)
+
+
+def _bring_forward() -> None:
+    """Put the tab in front: it is there once the sidebar has been drawn."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI" and region.width > 1:
+                    with suppress(TypeError):  # the tab has not been drawn
+                        region.active_panel_category = TAB
+                        region.tag_redraw()
+
+
 def _update_handlers() -> None:
     """Forget scenes without overlays and deleted ones, and register or remove the draw handlers as needed."""
     existing = {scene.session_uid for scene in bpy.data.scenes}
@@ -81,16 +106,25 @@ def legend_blocks(scene: bpy.types.Scene) -> list[Block]:
     return [block for overlay in overlays_of(scene) if (block := overlay.legend(scene)) is not None]
 
 
+def labels_of(scene: bpy.types.Scene) -> list[Label]:
+    """Return the labels of all overlays of a scene."""
+    return [label for overlay in overlays_of(scene) for label in overlay.labels(scene)]
+
+
 def _draw_view() -> None:
     draw_overlays(bpy.context.scene)
 
 
 def _draw_pixels() -> None:
     context = bpy.context
-    draw_legend(legend_blocks(context.scene), context.region, context.area, context.preferences.system.ui_scale)
+    region, scale = context.region, context.preferences.system.ui_scale
+    draw_labels(labels_of(context.scene), context.region_data.perspective_matrix, (region.width, region.height), scale)
+    draw_legend(legend_blocks(context.scene), region, context.area, scale)
 
 
 def forget() -> None:
-    """Remove the overlays of all scenes."""
+    """Remove the overlays of all scenes, and wait for no sidebar."""
     session.overlays.clear()
     _update_handlers()
+    if bpy.app.timers.is_registered(_bring_forward):
+        bpy.app.timers.unregister(_bring_forward)

@@ -243,3 +243,13 @@ def test_the_preview_of_a_tilted_sensor_says_what_lies_before_it(survey):
     assert tilted.tilt == pytest.approx(0.2)
     assert upright.resolved_to() == unresolved_from(model, 5.4, 1.0, upright.range_on_road())
     assert tilted.resolved_to() == pytest.approx(unresolved_from(model, 5.4, 1.0, upright.range_on_road(), 0.2))
+
+
+def test_heights_and_tilts_are_checked_as_they_are_typed(survey):
+    assert (survey.wrong_heights(), survey.wrong_tilts()) == ("", "")
+    survey.heights, survey.tilts = "8 high", "95"
+    assert "'high' is neither a height" in survey.wrong_heights()
+    assert "less than 90°" in survey.wrong_tilts()
+    survey.heights, survey.tilts = "", "0:10:5"
+    assert "no mounting height is given" in survey.wrong_heights()
+    assert survey.wrong_tilts() == ""

@@ -32,7 +32,9 @@ def shapes(scene):
 
 
 def test_a_map_s_junctions_are_listed(scene):
-    assert [one.name for one in choose(scene).junctions] == ["100 Central junction"]
+    (junction,) = choose(scene).junctions
+    assert junction.name == "100 · Central junction · East Street / North Street / West Street / South Street"
+    assert junction.id == "100"
     assert scene.seip.site.radius == 30.0
 
 

@@ -116,7 +116,7 @@ def test_the_cloud_is_drawn_in_the_colours_asked_for(placed):
     assert not np.array_equal(seen[0], seen[1])
     assert len(np.unique(seen[0], axis=0)) == 2
     bpy.ops.seip.hide_scan()
-    assert overlays.handler_count() == 0
+    assert overlays.find(placed, CLOUD) is None
 
 
 def test_animated_objects_are_scanned_as_the_file_is(placed):

@@ -7,6 +7,7 @@ from PIL import Image
 
 import seip_addon
 from seip_addon.scene import render
+from seip_addon.scene.sensors import placed_sensors
 from seip_addon.session import session
 from seip_addon.viewport import overlays
 from seip_addon.viewport.coverage import legend_of_coverage, shows_coverage
@@ -123,3 +124,29 @@ def test_a_view_that_hides_the_colours_is_set_in_one_click(placed):
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area):
         bpy.ops.seip.show_coverage_colours()
     assert shows_coverage(space)
+
+
+def test_a_placement_shows_its_coverage_with_legend_and_labels_and_so_does_the_file_when_it_is_opened(placed, tmp_path):
+    blocks, labels = overlays.legend_blocks(placed), overlays.labels_of(placed)
+    assert [block.title for block in blocks] == ["Coverage"]
+    assert [words for words, _ in labels] == ["S1  type1", "S2  type1"]
+    path = tmp_path / "placed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scene = bpy.context.scene
+    assert overlays.legend_blocks(scene) == blocks
+    assert overlays.labels_of(scene) == labels
+    bpy.ops.seip.toggle_legend()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert overlays.handler_count() == 0
+
+
+def test_labels_are_of_sensors_that_are_shown_where_they_are(placed):
+    sensors = placed_sensors(placed)
+    sensors["S1"].hide_set(True)
+    sensors["S2"].location.x += 5.0
+    bpy.context.view_layer.update()
+    ((words, place),) = overlays.labels_of(placed)
+    assert words == "S2  type1"
+    assert place == pytest.approx(tuple(sensors["S2"].location))

@@ -1,5 +1,6 @@
 """What goes into the extension, and what does not."""
 
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -45,6 +46,7 @@ def test_the_zip_holds_the_add_on_and_nothing_else(built):
     with zipfile.ZipFile(built) as archive:
         names = set(archive.namelist())
     expected = {"blender_manifest.toml", "__init__.py", "LICENSE", f"wheels/{FAKE_WHEEL}"}
+    expected |= {"scenes/junction.toml", "scenes/junction.xodr"}
     package = {
         path.relative_to(ROOT).as_posix()
         for path in (ROOT / "seip_addon").rglob("*")
@@ -73,6 +75,16 @@ def test_the_manifest_lets_the_zip_into_its_own_blender_alone(name):
 def test_one_version_stands_in_manifest_and_project():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert build_extension.manifest()["version"] == project["version"]
+
+
+def test_the_listing_has_tags_that_blender_s_platform_knows_and_no_address_that_is_not_ours():
+    manifest = build_extension.manifest()
+    folder = Path(build_extension.importlib.util.find_spec("bpy").origin).parent
+    script = next(folder.glob("*/scripts/modules/_bpy_internal/extensions/tags.py"))
+    assert set(manifest["tags"]) <= runpy.run_path(str(script))["addons"]
+    assert "website" not in manifest
+    assert len(manifest["tagline"]) <= 64
+    assert all(len(words) <= 64 for words in manifest["permissions"].values())
 
 
 def test_blender_brings_its_own_numpy():

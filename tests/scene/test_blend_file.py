@@ -8,7 +8,8 @@ import bpy
 import pytest
 
 from seip_addon.core.errors import SeipError
-from seip_addon.scene.blend_file import CLIP_END, CLIP_START, new_file, open_blend, save_blend
+from seip_addon.scene.blend_file import new_file, open_blend, save_blend
+from seip_addon.scene.views import CLIP_END, CLIP_START
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -14,7 +14,7 @@ from seip_addon.core.streetscape.parts import Part, Role
 from seip_addon.core.streetscape.street_furniture import block, tree
 from seip_addon.scene import contract
 from seip_addon.scene.blend_file import new_file
-from seip_addon.scene.build import COLLECTIONS, build_scene
+from seip_addon.scene.build import COLLECTIONS, build_scene, loose_pieces
 from seip_addon.scene.materials import COLOURS
 from seip_addon.scene.read import read_scene
 
@@ -32,7 +32,8 @@ def model():
         Part("Middle", slab, (Role.WEIGHTED_REGIONS,), weight=3.0),
         Part("Tree 1", tree(8, 5, 0), (Role.OCCLUDERS,), (3.0, 4.0, 0.5), 0.7),
         Part("Tree 2", tree(8, 5, 0), (Role.OCCLUDERS,), (6.0, 4.0, 0.5), 0.9),
-        Part("Panes", slab, (Role.DRESSING,)),
+        Part("House", slab, (Role.OCCLUDERS,), (20.0, 5.0, 1.0), 0.4),
+        Part("Panes", slab, (Role.DRESSING,), (20.5, 5.0, 1.0), 0.4, of="House"),
         Part("Signal pole 1", slab, (Role.POLES,), (11.0, 5.0, 0.0), source=ASSUMED),
     )
     return SiteModel(
@@ -141,3 +142,25 @@ def test_the_source_of_a_pole_is_kept_in_the_scene(model):
     scene = built(model)
     assert scene.objects["Signal pole 1"][contract.SOURCE] == ASSUMED
     assert [pole.source for pole in read_scene(scene).geometry.poles] == [ASSUMED]
+
+
+def test_windows_go_where_their_building_goes(model):
+    scene = built(model)
+    house, panes = scene.objects["House"], scene.objects["Panes"]
+    before = house.matrix_world.inverted() @ panes.matrix_world
+    house.location, house.rotation_euler.z, house.scale = (30.0, -5.0, 2.0), 1.5, (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    after = house.matrix_world.inverted() @ panes.matrix_world
+    np.testing.assert_allclose(np.array(after), np.array(before), atol=1e-5)
+    assert tuple(panes.matrix_world.translation) != pytest.approx((20.5, 5.0, 1.0))
+
+
+def test_windows_are_loose_once_their_building_is_gone_and_not_when_they_are_taken_off(model):
+    scene = built(model)
+    house, panes = scene.objects["House"], scene.objects["Panes"]
+    assert loose_pieces(scene.objects) == []
+    panes.parent = None
+    assert loose_pieces(scene.objects) == []
+    panes.parent = house
+    bpy.data.objects.remove(house)
+    assert loose_pieces(scene.objects) == [panes]

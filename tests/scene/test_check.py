@@ -96,7 +96,9 @@ def test_an_area_that_stands_on_edge(scene):
 
 def test_a_unit_scale_that_is_none_of_metres(scene):
     scene.unit_settings.scale_length = 0.01
-    assert "unit scale is 0.01" in only(scene)[2]
+    assert "is 0.01 m, but is read as one metre: set Unit Scale to 1" in only(scene)[2]
+    with pytest.raises(SeipError, match="set Unit Scale to 1 under Scene"):
+        read_scene(scene)
 
 
 @pytest.mark.parametrize("name", ["seip_origin", "seip_header_offset", "seip_places"])

@@ -115,7 +115,7 @@ def write_streets(
         lines += _way(number, way.nodes, _tags(way, medians, left_hand=left_hand))
     lines += _restrictions(extract, {number for number, _ in pieces})
     path.write_text(os.linesep.join([*lines, "</osm>", ""]), encoding="utf-8")
-    roundabouts = _joined(way.nodes for _, way in pieces if _is_roundabout(way.tags))
+    roundabouts = _joined(way.nodes for _, way in pieces if is_roundabout(way.tags))
     slip_ends = tuple(_slip_ends(extract, [way for _, way in pieces]))
     return StreetFile(len(pieces), elevated, left_hand, roundabouts, slip_ends, tuple(notes))
 
@@ -316,7 +316,7 @@ def shown_name(tags: Tags) -> dict[str, str]:
 def is_one_way(tags: Tags) -> bool:
     """Return whether traffic goes along a street in one direction only."""
     motorway = tags.get("highway", "").startswith("motorway")
-    return tags.get("oneway", "yes" if motorway or _is_roundabout(tags) else "no") in ONE_WAY
+    return tags.get("oneway", "yes" if motorway or is_roundabout(tags) else "no") in ONE_WAY
 
 
 def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool, bool]:
@@ -325,7 +325,7 @@ def _sidewalks(way: Way, medians: "_Medians", *, left_hand: bool) -> tuple[bool,
     if left is None or right is None:
         kind = way.tags.get("highway", "")
         usual_left = usual_right = kind in PAVED_CLASSES
-        if _is_roundabout(way.tags):
+        if is_roundabout(way.tags):
             usual_left, usual_right = (True, False) if left_hand else (False, True)
         elif kind.endswith("_link") and kind not in ("motorway_link", "trunk_link"):
             usual_left, usual_right = left_hand, not left_hand
@@ -390,7 +390,8 @@ class _Medians:
         return line[::-1] if way.tags.get("oneway") in ("-1", "reverse") else line
 
 
-def _is_roundabout(tags: Tags) -> bool:
+def is_roundabout(tags: Tags) -> bool:
+    """Return whether a way is a piece of a roundabout."""
     return tags.get("junction") in ("roundabout", "circular")
 
 

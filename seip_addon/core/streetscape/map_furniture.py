@@ -56,7 +56,7 @@ def building_parts(name: str, base: Float, height: Float, number: int, shape: So
     if not level or height[0] < street_furniture.STOREY_HEIGHT or walls_area > MAX_FACADE_AREA:
         return (block,)
     panes = street_furniture.windows(base[:, :2], float(base[0, 2]), float(height[0]))
-    return (block, Part(f"{name} windows", panes, (Role.DRESSING,))) if panes.faces else (block,)
+    return (block, Part(f"{name} windows", panes, (Role.DRESSING,), of=name)) if panes.faces else (block,)
 
 
 def facade(number: int) -> str:

@@ -40,6 +40,8 @@ class Part:
         Who says that it stands there, as in `scene_geometry.Pole`; empty for what only means an area.
     height_assumed : bool
         Whether that source does not give its height.
+    of : str
+        Name of the part, an earlier one, that takes this along where it is moved or deleted; empty where none does.
     """
 
     name: str
@@ -50,3 +52,4 @@ class Part:
     weight: float | None = None
     source: str = ""
     height_assumed: bool = False
+    of: str = ""

@@ -12,8 +12,8 @@ from ..errors import SeipError
 from ..progress import Progress, in_thread
 
 MISSING = (
-    "SUMO is not installed, which lays out streets and simulates traffic: `make sumo`, `pip install --group traffic`, "
-    "or put sumo and netconvert on the PATH"
+    "SUMO is not installed, which lays out streets and simulates traffic: install Eclipse SUMO and put sumo and "
+    "netconvert on the PATH or set SUMO_HOME (in a checkout `make sumo`, with pip `pip install --group traffic`)"
 )
 SYSTEM_HOMES = (Path("/usr/share/sumo"), Path("/usr/local/share/sumo"), Path("/opt/homebrew/share/sumo"))
 """Where systems keep SUMO's data."""

@@ -54,7 +54,7 @@ def resolution_warnings(site: Site, models: Mapping[str, LidarModel], settings: 
         if beyond:
             warnings.append(
                 f"{key}: beyond {', '.join(beyond)} neighbouring rings on a level road are more than "
-                f"2δ = {2 * settings.delta:g} m apart, so coverage there counts beams, not view"
+                f"2δ = {2 * settings.delta:g} m apart, so road between them counts as unseen though nothing hides it"
             )
         warnings += _of_tilted(model, site, of_type & ~upright, settings.delta, reach)
     if settings.delta < site.targets.spacing / math.sqrt(2):
@@ -77,7 +77,7 @@ def _of_rosette(model: LidarModel, site: Site, of_type: Boolean, delta: float, r
             beyond.append(f"{limit:.0f} m (at {level:g} m height)")
     sentence = (
         f"{model.key}: from {', '.join(beyond)} on a frame of {1 / model.rotation_rate:g} s leaves level road in view "
-        f"more than δ = {delta:g} m from all of its rays, so coverage there counts beams, not view"
+        f"more than δ = {delta:g} m from all of its rays, so road between them counts as unseen though nothing hides it"
     )
     return [sentence] if beyond else []
 
@@ -94,7 +94,8 @@ def _of_tilted(model: LidarModel, site: Site, tilted: Boolean, delta: float, rea
             beyond.append(f"{limit:.0f} m (at {level:g} m height)")
     sentence = (
         f"{model.key}: where it is tilted, beyond {', '.join(beyond)} neighbouring rings on a level road before it are "
-        f"more than 2δ = {2 * delta:g} m apart, and behind it sooner, so coverage there counts beams, not view"
+        f"more than 2δ = {2 * delta:g} m apart, and behind it sooner, so road between them counts as "
+        "unseen though nothing hides it"
     )
     return [sentence] if beyond else []
 

@@ -1,0 +1,74 @@
+"""Crossings of named streets in an extract: places that people know by two names."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ..opendrive.junctions import STREETS
+from .extract import Extract, rings
+from .streets import is_roundabout, is_street
+
+ONE_CROSSING = 60.0  # metres between nodes of the same streets that are one crossing, as those of two carriageways are
+EARTH_RADIUS = 6_371_000.0  # metres
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A place at which streets of different names meet.
+
+    Parameters
+    ----------
+    streets : tuple of str
+        Their names, in alphabetical order.
+    latitude, longitude : float, degrees
+    """
+
+    streets: tuple[str, ...]
+    latitude: float
+    longitude: float
+
+    @property
+    def name(self) -> str:
+        """The streets' names, as `junctions.find_junction` knows them."""
+        return STREETS.join(self.streets)
+
+
+def named_crossings(extract: Extract) -> tuple[Crossing, ...]:
+    """Return the crossings of an extract's named streets, by name; a roundabout is one crossing."""
+    streets = [way for way in extract.ways.values() if "highway" in way.tags and is_street(way.tags)]
+    round_ways = [way for way in streets if is_roundabout(way.tags)]
+    ring_of = {node: number for number, ring in enumerate(rings(round_ways)[0]) for node in ring}
+    names: defaultdict[int, set[str]] = defaultdict(set)
+    nodes: defaultdict[int, set[int]] = defaultdict(set)
+    for way in streets:
+        for node in way.nodes:
+            if node in extract.nodes:
+                place = -1 - ring_of[node] if node in ring_of else node
+                nodes[place].add(node)
+                if "name" in way.tags:
+                    names[place].add(way.tags["name"])
+    places: defaultdict[tuple[str, ...], list[tuple[float, float]]] = defaultdict(list)
+    for place, streets_there in names.items():
+        if len(streets_there) > 1:
+            there = [extract.nodes[node] for node in sorted(nodes[place])]
+            middle = (sum(n.latitude for n in there) / len(there), sum(n.longitude for n in there) / len(there))
+            places[tuple(sorted(streets_there))].append(middle)
+    found = [Crossing(pair, *middle) for pair, there in places.items() for middle in _apart(there)]
+    return tuple(sorted(found, key=lambda one: (one.streets, one.latitude, one.longitude)))
+
+
+def _apart(places: list[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """Yield the middles of places that lie together."""
+    waiting = sorted(places)
+    while waiting:
+        group = [place for place in waiting if _metres(waiting[0], place) <= ONE_CROSSING]
+        waiting = [place for place in waiting if place not in group]
+        yield sum(place[0] for place in group) / len(group), sum(place[1] for place in group) / len(group)
+
+
+def _metres(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Return the distance of two places near each other."""
+    north = math.radians(other[0] - one[0])
+    east = math.radians(other[1] - one[1]) * math.cos(math.radians(one[0]))
+    return EARTH_RADIUS * math.hypot(north, east)

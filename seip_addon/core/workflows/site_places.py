@@ -1,0 +1,114 @@
+"""Places of a file that a site can be built round: what a person chooses from."""
+
+import re
+from collections import Counter
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import SeipError
+from ..opendrive import LaneSurface, lane_surfaces, read_map
+from ..opendrive.junctions import STREETS, streets_of_junctions
+from ..openstreetmap.crossings import Crossing, named_crossings
+from ..openstreetmap.extract import MAX_LATITUDE, read_extract
+from ..openstreetmap.site import is_extract
+from ..progress import Progress
+from ..streetscape.description import DEFAULT_RADIUS, describe_place
+
+ROADS_PER_STEP = 20
+_NUMBER = r"[+-]?\d+(?:\.\d*)?"
+_POSITION = re.compile(rf"\s*({_NUMBER})\s*°?\s*[,;\s]\s*({_NUMBER})\s*°?\s*")
+
+
+@dataclass(frozen=True)
+class NamedPlace:
+    """A junction.
+
+    Parameters
+    ----------
+    name : str
+        What people call it; no other place of the file has the same.
+    key : str
+        Its id in a map; in an extract its latitude and longitude, as `parsed_position` reads them.
+    """
+
+    name: str
+    key: str
+
+
+@dataclass(frozen=True)
+class SitePlaces:
+    """The places of a file.
+
+    Parameters
+    ----------
+    radius : float, metres
+        How large a site is where nobody says.
+    """
+
+    radius: float
+    places: tuple[NamedPlace, ...]
+
+
+def site_places(source: Path) -> Generator[Progress, None, SitePlaces]:
+    """List the junctions of a map, or of the map that a site description names, or the crossings of an extract.
+
+    Raises
+    ------
+    SeipError
+        The file cannot be read.
+    """
+    yield Progress(0, 0, "reading the file")
+    if is_extract(source):
+        extract = yield from read_extract(source)
+        crossings = named_crossings(extract)
+        named = _unlike([one.name for one in crossings])
+        places = tuple(NamedPlace(name, _position(one)) for name, one in zip(named, crossings, strict=True))
+        return SitePlaces(DEFAULT_RADIUS, places)
+    map_path, description = describe_place(source)
+    road_map = read_map(map_path)
+    lanes: list[LaneSurface] = []
+    for number, road in enumerate(road_map.roads):
+        if number % ROADS_PER_STEP == 0:
+            yield Progress(number, len(road_map.roads), "junctions")
+        lanes += lane_surfaces(road)
+    meeting = streets_of_junctions(road_map, lanes)
+    junctions = road_map.junctions_with_roads()
+    streets = {one.id: STREETS.join(meeting.get(one.id, ())) for one in junctions}
+    named = [" · ".join(filter(None, (one.id, one.name, streets[one.id]))) for one in junctions]
+    places = tuple(NamedPlace(name, one.id) for name, one in zip(_unlike(named), junctions, strict=True))
+    return SitePlaces(description.radius or DEFAULT_RADIUS, places)
+
+
+def parsed_position(text: str) -> tuple[float, float]:
+    """Return latitude and longitude, degrees, from a text such as ``52.47391, 13.44048``.
+
+    Raises
+    ------
+    SeipError
+        It is no such text.
+    """
+    found = _POSITION.fullmatch(text)
+    if found is None:
+        raise SeipError(f"{text!r} is no place: give latitude and longitude in degrees, like 52.47391, 13.44048")
+    latitude, longitude = float(found[1]), float(found[2])
+    if abs(latitude) > MAX_LATITUDE or abs(longitude) > 180.0:
+        raise SeipError(
+            f"{text!r} is no place for streets: the latitude comes first, up to {MAX_LATITUDE:g} degrees, then the "
+            "longitude, up to 180"
+        )
+    return latitude, longitude
+
+
+def _position(crossing: Crossing) -> str:
+    return f"{crossing.latitude:.7f}, {crossing.longitude:.7f}"
+
+
+def _unlike(names: Iterable[str]) -> list[str]:
+    """Return names of which each is there once: those that are repeated get a number."""
+    known: Counter[str] = Counter()
+    numbered = []
+    for name in names:
+        known[name] += 1
+        numbered.append(f"{name} ({known[name]})" if known[name] > 1 else name)
+    return numbered

@@ -1,0 +1,190 @@
+"""Where people look for the add-on: the File menu, files dropped into a view, and the menus that the search goes by."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import bpy
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from osm_text import crossing
+from sumo_here import needs_sumo
+
+from seip_addon import loose_pieces, scene_status
+from seip_addon.panels import front_door
+from seip_addon.scene import contract
+from seip_addon.scene.read import read_scene
+from seip_addon.scene.views import CLIP_END
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+
+
+@pytest.fixture
+def scene(add_on):
+    return bpy.context.scene
+
+
+@pytest.fixture
+def fresh(add_on):
+    """Blender as it starts, with cube, light and camera."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    return bpy.context.scene
+
+
+@pytest.fixture
+def extract(tmp_path):
+    return crossing().write(tmp_path / "place.osm")
+
+
+def views():
+    return [a.spaces.active for a in bpy.context.window.screen.areas if a.type == "VIEW_3D"]
+
+
+def drawn(draw):
+    """Return the texts and operators that a menu draws."""
+    layout = MagicMock()
+    draw(SimpleNamespace(layout=layout), bpy.context)
+    return [call.args[0] for call in layout.operator.call_args_list]
+
+
+def test_import_is_in_the_file_menu_and_takes_dropped_files(scene):
+    assert drawn(front_door.draw_import) == ["seip.choose_map"] * 2
+    handlers = [bpy.types.SEIP_FH_opendrive, bpy.types.SEIP_FH_openstreetmap]
+    assert [one.bl_import_operator for one in handlers] == ["seip.choose_map"] * 2
+    assert [one.bl_file_extensions for one in handlers] == [".xodr", ".osm;.gz"]
+    for kind, expected in (("VIEW_3D", True), ("TEXT_EDITOR", False)):
+        area = SimpleNamespace(area=SimpleNamespace(type=kind))
+        assert [one.poll_drop(area) for one in handlers] == [expected] * 2
+
+
+def test_all_main_operators_are_in_a_menu_that_the_search_goes_by(scene):
+    names = drawn(bpy.types.SEIP_MT_main.draw)
+    assert {"seip.load_example", "seip.build_site", "seip.check_site", "seip.solve_placement"} <= set(names)
+    for name in names:
+        module, _, operator = name.partition(".")
+        assert getattr(getattr(bpy.ops, module), operator).get_rna_type().name
+    assert front_door.draw_object in bpy.types.VIEW3D_MT_object._dyn_ui_initialize()  # noqa: SLF001  # Blender has no other list
+
+
+def test_junctions_of_an_extract_are_listed_by_their_streets(scene, extract):
+    assert bpy.ops.seip.choose_map(filepath=str(extract)) == {"FINISHED"}
+    site = scene.seip.site
+    assert [one.name for one in site.junctions] == ["East Road / North Road"]
+    assert site.is_extract()
+    with pytest.raises(RuntimeError, match="Choose a junction, or give latitude and longitude"):
+        bpy.ops.seip.build_site()
+    site.position = "somewhere"
+    assert "is no place" in site.wrong_position()
+    with pytest.raises(RuntimeError, match="'somewhere' is no place: give latitude and longitude"):
+        bpy.ops.seip.build_site()
+    site.position = "52.5, 13.4"
+    assert site.asked().near_latlon == (52.5, 13.4)
+    assert (site.asked().approaches, site.asked().radius) == (80.0, None)
+    site.region_shape = "CIRCLE"
+    assert (site.asked().approaches, site.asked().radius) == (None, 80.0)
+    site.junction = site.junctions[0].name
+    assert site.asked().near_latlon == pytest.approx((52.5, 13.4))
+
+
+@needs_sumo
+@pytest.mark.parametrize("by", ["junction", "position"])
+def test_a_site_of_an_extract_is_built_with_its_map(scene, extract, by):
+    bpy.ops.seip.choose_map(filepath=str(extract))
+    site = scene.seip.site
+    site.radius = 40.0
+    if by == "junction":
+        site.junction = site.junctions[0].name
+    else:
+        site.position = "52.5, 13.4"
+    assert bpy.ops.seip.build_site() == {"FINISHED"}
+    assert read_scene(scene).geometry.region.area > 400
+    assert len(contract.find(scene, contract.OCCLUDERS).objects) >= 4
+    (text,) = bpy.data.texts
+    assert text.name.endswith(".xodr")
+    assert "<OpenDRIVE" in text.as_string()
+
+
+def test_the_start_up_cube_is_no_part_of_a_site_and_the_view_shows_it_all(fresh):
+    assert bpy.ops.seip.load_example() == {"FINISHED"}
+    assert bpy.context.scene == fresh
+    assert not {"Cube", "Light", "Camera"} & set(fresh.objects.keys())
+    assert views()
+    middle = np.mean([obj.location[:2] for obj in contract.find(fresh, contract.POLES).objects], axis=0)
+    for view in views():
+        assert view.clip_end == CLIP_END
+        assert view.shading.color_type == "MATERIAL"
+        assert view.region_3d.view_perspective == "PERSP"
+        assert np.hypot(*(np.array(view.region_3d.view_location[:2]) - middle)) < 60
+        assert 50 < view.region_3d.view_distance < 1000
+    assert scene_status.next_step(fresh) == "seip.check_site"
+
+
+@pytest.mark.parametrize("change", ["move", "sculpt", "add"])
+def test_a_cube_that_somebody_worked_on_stays(fresh, change):
+    if change == "move":
+        fresh.objects["Cube"].location.x = 3.0
+    elif change == "sculpt":
+        fresh.objects["Cube"].data.vertices[0].co.x = 4.0
+    else:
+        fresh.collection.objects.link(bpy.data.objects.new("mine", None))
+    bpy.ops.seip.load_example()
+    assert {"Cube", "Light", "Camera"} <= set(fresh.objects.keys())
+
+
+def test_the_example_is_the_shipped_junction(scene):
+    bpy.ops.seip.load_example()
+    built = read_scene(scene).geometry
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / "junction.blend"))
+    shipped = read_scene(bpy.context.scene).geometry
+    assert built.region.area == pytest.approx(shipped.region.area)
+    assert len(built.occluders) == len(shipped.occluders)
+
+
+def test_the_next_step_leads_to_placed_sensors(junction):
+    assert scene_status.next_step(junction) == "seip.check_site"
+    bpy.ops.seip.check_site()
+    assert scene_status.next_step(junction) == "seip.compute_visibility"
+    bpy.ops.seip.compute_visibility()
+    assert scene_status.next_step(junction) == "seip.solve_placement"
+    bpy.ops.seip.solve_placement()
+    assert scene_status.next_step(junction) == ""
+
+
+def test_a_map_is_the_next_step_where_there_is_nothing(scene):
+    assert scene_status.next_step(scene) == "seip.choose_map"
+    bpy.ops.seip.choose_map(filepath=str(SCENES / "junction.xodr"))
+    assert scene_status.next_step(scene) == "seip.build_site"
+
+
+def test_windows_of_a_deleted_building_go_with_it(scene):
+    bpy.ops.seip.load_example()
+    windows = next(obj for obj in scene.objects if obj.name.endswith(" windows"))
+    building = windows.parent
+    assert building.name == windows.name.removesuffix(" windows")
+    name = windows.name
+    with bpy.context.temp_override(selected_objects=[building]):
+        bpy.ops.object.delete()
+    bpy.context.view_layer.update()
+    assert bpy.app.timers.is_registered(loose_pieces.remove)
+    loose_pieces.remove()
+    assert name not in scene.objects
+    assert any(obj.name.endswith(" windows") for obj in scene.objects)
+
+
+@pytest.mark.parametrize("name", ["visibility", "placement", "view", "scan", "dataset"])
+def test_a_panel_says_one_line_where_there_is_nothing_yet(scene, name, monkeypatch):
+    panel = getattr(bpy.types, f"SEIP_PT_{name}")
+    module = sys.modules[panel.__module__]
+    said = []
+    monkeypatch.setattr(module, "draw_sentence", lambda _, text, **__: said.append(text))
+    layout = MagicMock()
+    own = SimpleNamespace(layout=layout)
+    panel.draw(own, bpy.context)
+    assert len(said) == 1
+    assert not layout.operator.called
+    for details in ("visibility_details", "placement_rules", "placement_solver", "placement_precaution"):
+        assert not getattr(bpy.types, f"SEIP_PT_{details}").poll(bpy.context)
