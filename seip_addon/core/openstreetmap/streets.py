@@ -233,6 +233,8 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
         return tags
     if given.get("tunnel") == "building_passage":
         tags.pop("layer", None)
+    elif given.get("bridge", "no") != "no":
+        tags.setdefault("layer", "1")
     if tags.get("lanes") is not None and not (count(tags["lanes"], MAX_LANES) or 0) >= 1:
         del tags["lanes"]
     near, far = ("left", "right") if left_hand else ("right", "left")

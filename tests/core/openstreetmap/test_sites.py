@@ -383,3 +383,14 @@ def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
     model = built(extract, tmp_path).model
     assert {row.kind: row.count for row in model.sources()}["Building"] == 5
     assert any(note.startswith("2 outlines that are drawn twice") for note in model.notes)
+
+
+def test_a_bridge_without_a_layer_lies_above(tmp_path):
+    extract = crossing()
+    extract.way([(-300, 60), (-60, 60)], highway="primary", name="High Road")
+    extract.way([(-60, 60), (60, 60)], highway="primary", name="High Road", bridge="yes")
+    extract.way([(60, 60), (300, 60)], highway="primary", name="High Road")
+    model = built(extract, tmp_path).model
+    above = [part for part in model.parts if part.name == "Roads above"]
+    assert above
+    assert above[0].solid.vertices[:, 2].max() > 5
