@@ -309,9 +309,14 @@ def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
 
 
 def shown_name(tags: Tags) -> dict[str, str]:
-    """Return the name of a street that pictures can show: in English where theirs has no letters for it."""
+    """Return the name of a street that pictures can show, where it is not as given.
+
+    It is in English where its own has no letters for the pictures, and the number of a road that has none.
+    """
     name = tags.get("name", "")
     english = tags.get("name:en")
+    if not name:
+        return {"name": tags["ref"]} if tags.get("ref") else {}
     return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
 
 
