@@ -106,3 +106,11 @@ def test_a_site_file_without_a_map_says_so(tmp_path):
     site.write_text("near = [0, 0]", encoding="utf-8")
     with pytest.raises(SeipError, match="names no map"):
         build_scene.main([str(site), "-o", str(tmp_path / "site.blend")])
+
+
+@pytest.mark.parametrize("suffix", [".blend", ".xodr"])
+def test_a_folder_in_place_of_a_result_is_refused_before_anything_is_written(tmp_path, road, suffix):
+    (tmp_path / f"out{suffix}").mkdir()
+    with pytest.raises(SeipError, match="is a folder"):
+        build_scene.main([str(road), "--near", "1100", "2000", "-o", str(tmp_path / "out.blend")])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([f"out{suffix}", road.name])

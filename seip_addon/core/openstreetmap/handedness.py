@@ -24,7 +24,7 @@ _LEFT_HAND = (
     ("Australia and Tasmania", -44.0, 112.8, -10.0, 154.0),
     ("New Zealand", -47.6, 166.0, -34.0, 179.0),
     ("Papua New Guinea", -11.8, 140.9, -1.0, 156.1),
-    ("Fiji", -19.5, 176.8, -16.0, 180.0),
+    ("Fiji", -19.5, 176.8, -16.0, 182.0),
     ("southern Africa", -35.0, 11.7, -17.0, 33.0),
     ("Mozambique, Zimbabwe, Malawi and Tanzania", -27.0, 30.0, -1.0, 41.0),
     ("Zambia", -18.1, 22.0, -8.2, 33.7),
@@ -37,7 +37,10 @@ _LEFT_HAND = (
     ("the Bahamas", 21.9, -79.3, 27.3, -72.7),
     ("Guyana and Suriname", 1.8, -60.0, 8.3, -54.0),
 )
-"""Regions of left-hand traffic as south, west, north, east in degrees: coarse, for where an extract shows nothing."""
+"""Regions of left-hand traffic as south, west, north, east in degrees: coarse, for where an extract shows nothing.
+
+East is above 180 where a region reaches across the date line.
+"""
 _MIN_EVIDENCE = 3.0  # right angles of turn in roundabouts
 
 
@@ -53,7 +56,7 @@ def drives_on_the_left(extract: Extract) -> tuple[bool, str]:
     nodes = list(extract.nodes.values())
     middle = nodes[len(nodes) // 2]
     for name, south, west, north, east in _LEFT_HAND:
-        if south <= middle.latitude <= north and west <= middle.longitude <= east:
+        if south <= middle.latitude <= north and west <= west + (middle.longitude - west) % 360.0 <= east:
             return True, f"as in {name}"
     return False, "as in most countries"
 

@@ -136,7 +136,7 @@ def site_of_extract(
     names = _street_names(road_map, lanes, junction[0][0].id, together) if junction else ()
     description = replace(
         beside,
-        name=STREETS.join(names[:2]),
+        name=STREETS.join(names[:2]) or path.name.partition(".")[0],
         near=None if place.radius is None else (float(middle[0]), float(middle[1])),
         junction=junction[0][0].id if place.radius is None else None,
         radius=place.radius,

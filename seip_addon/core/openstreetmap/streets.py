@@ -233,6 +233,8 @@ def _tags(way: Way, medians: "_Medians", *, left_hand: bool) -> dict[str, str]:
         return tags
     if given.get("tunnel") == "building_passage":
         tags.pop("layer", None)
+    elif given.get("bridge", "no") != "no":
+        tags.setdefault("layer", "1")
     if tags.get("lanes") is not None and not (count(tags["lanes"], MAX_LANES) or 0) >= 1:
         del tags["lanes"]
     near, far = ("left", "right") if left_hand else ("right", "left")
@@ -307,9 +309,14 @@ def _lane_widths(tags: Tags, way: str, lanes: int) -> list[float]:
 
 
 def shown_name(tags: Tags) -> dict[str, str]:
-    """Return the name of a street that pictures can show: in English where theirs has no letters for it."""
+    """Return the name of a street that pictures can show, where it is not as given.
+
+    It is in English where its own has no letters for the pictures, and the number of a road that has none.
+    """
     name = tags.get("name", "")
     english = tags.get("name:en")
+    if not name:
+        return {"name": tags["ref"]} if tags.get("ref") else {}
     return {"name": english} if english and any(character >= _FIRST_OTHER for character in name) else {}
 
 

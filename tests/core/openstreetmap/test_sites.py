@@ -398,3 +398,25 @@ def test_an_outline_that_is_drawn_twice_counts_once(tmp_path):
     model = built(extract, tmp_path).model
     assert {row.kind: row.count for row in model.sources()}["Building"] == 5
     assert any(note.startswith("2 outlines that are drawn twice") for note in model.notes)
+
+
+def test_a_bridge_without_a_layer_lies_above(tmp_path):
+    extract = crossing()
+    extract.way([(-300, 60), (-60, 60)], highway="primary", name="High Road")
+    extract.way([(-60, 60), (60, 60)], highway="primary", name="High Road", bridge="yes")
+    extract.way([(60, 60), (300, 60)], highway="primary", name="High Road")
+    model = built(extract, tmp_path).model
+    above = [part for part in model.parts if part.name == "Roads above"]
+    assert above
+    assert above[0].solid.vertices[:, 2].max() > 5
+
+
+def test_streets_without_names_are_called_by_number_or_by_the_file(tmp_path):
+    for ref, name in (({"ref": "B 1"}, "B 1"), ({}, "place")):
+        extract = Extract()
+        usual = {"highway": "primary", "oneway": "yes", "lanes": 2} | ref
+        extract.way([(-250, -8), (0, -8), (250, -8)], **usual)
+        extract.way([(250, 8), (0, 8), (-250, 8)], **usual)
+        extract.way([(0, -200), (0, -8), (0, 8), (0, 200)], highway="unclassified")
+        model = built(corner_houses(extract, near=24), tmp_path).model
+        assert model.name == name

@@ -122,7 +122,16 @@ def test_a_roundabout_shows_the_side_and_stays_whole(tmp_path):
 
 
 LEFT = [
-    *((51.5, -0.1), (53.3, -6.3), (35.7, 139.7), (-33.9, 151.2), (13.75, 100.5), (28.6, 77.2), (-1.3, 36.8)),
+    *(
+        (51.5, -0.1),
+        (53.3, -6.3),
+        (35.7, 139.7),
+        (-33.9, 151.2),
+        (13.75, 100.5),
+        (28.6, 77.2),
+        (-1.3, 36.8),
+        (-16.8, -179.99),
+    ),
     *((22.3, 114.2), (-36.8, 174.8), (18.0, -76.8), (6.5, -58.2), (-26.2, 28.0), (1.3, 103.8), (34.9, 33.6)),
 ]
 RIGHT = [
@@ -163,4 +172,6 @@ def test_a_name_without_letters_in_the_pictures_is_in_english(tmp_path):
     extract.way([(-100, 0), (100, 0)], highway="residential", name="中山北路", name__en="Zhongshan North Road")
     extract.way([(-100, 50), (100, 50)], highway="residential", name="Straße", name__en="Street")
     extract.way([(-100, 90), (100, 90)], highway="residential", name="南京東路")
-    assert [tags["name"] for tags in streets(extract, tmp_path)[1]] == ["Zhongshan North Road", "Straße", "南京東路"]
+    extract.way([(-100, 120), (100, 120)], highway="primary", ref="B 1")
+    names = [tags["name"] for tags in streets(extract, tmp_path)[1]]
+    assert names == ["Zhongshan North Road", "Straße", "南京東路", "B 1"]
