@@ -5,6 +5,7 @@ python -m headless.build_scene place.osm --near-latlon 52.47391 13.44048 -o site
 python -m headless.build_scene place.osm --junction "One Street" "Other Street" -o site.blend
 python -m headless.build_scene map.xodr --junction 53 --site site.toml -o site.blend
 python -m headless.build_scene site.toml -o site.blend
+python -m headless.build_scene place.osm --near-latlon 51.906 4.456 --buildings town.json --terrain dem.tif -o a.blend
 """
 
 import argparse

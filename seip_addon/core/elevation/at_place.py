@@ -143,7 +143,7 @@ def _heights_note(path: Path, smooth: HeightRaster) -> str:
     low, high = float(smooth.heights.min()), float(smooth.heights.max())
     return (
         f"roads and ground take their heights from {path.name}, {low:.1f} to {high:.1f} m, smoothed by a Gaussian of "
-        f"{SMOOTHING:g} m; the map itself stays flat"
+        f"{SMOOTHING:g} m"
     )
 
 

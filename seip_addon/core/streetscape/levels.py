@@ -158,7 +158,7 @@ def _crossings(roads: Mapping[str, _RoadArea]) -> tuple[Crossing, ...]:
                 above, below = (one, other) if rise[0] > 0 else (other, one)
                 x, y = part.centroid.coords[0]
                 found.append(Crossing(above, below, float(np.abs(rise).min()), (x, y)))
-    return tuple(found)
+    return tuple(sorted(found, key=lambda one: (one.above, one.below, one.place)))
 
 
 def _joined(roads: Mapping[str, _RoadArea]) -> dict[str, set[str]]:

@@ -13,6 +13,7 @@ from ..arrays import Float
 from ..citymodel.at_place import AskedBuildings, with_city_model
 from ..elevation.at_place import AskedTerrain, MapSurroundings, with_terrain
 from ..elevation.obstacles import Merging
+from ..elevation.raised_map import raised_map
 from ..errors import SeipError
 from ..opendrive import RoadMap, lane_surfaces, read_map
 from ..opendrive.geo_reference import GeoReference
@@ -159,6 +160,8 @@ def _of_extract(source: Path, asked: AskedSite) -> Generator[Progress, None, Bui
         level=asked.level,
     )
     description, more, merging = yield from _with_sources(road_map, description, asked)
+    if description.relief is not None:
+        map_text = raised_map(map_text, road_map, description.relief)
     model = yield from site_model(road_map, description)
     return BuiltSite(source.name, replace(model, notes=(*notes, *more, *model.notes)), map_text, merging)
 

@@ -10,6 +10,7 @@ from sumo_here import needs_sumo
 
 from seip_addon.core.elevation.at_place import AskedTerrain
 from seip_addon.core.errors import SeipError
+from seip_addon.core.opendrive import read_map
 from seip_addon.core.progress import finish
 from seip_addon.core.streetscape.parts import Role
 from seip_addon.core.workflows.site_building import AskedSite, build_site
@@ -101,6 +102,13 @@ def test_streets_of_an_extract_lie_on_the_ground(tmp_path):
     slope = np.linalg.lstsq(np.column_stack([roads[:, :2], np.ones(len(roads))]), roads[:, 2], rcond=None)[0]
     assert slope[:2] == pytest.approx([0.03, -0.05], abs=1e-4)
     assert built.model.origin[2] == 40
+    (tmp_path / "raised.xodr").write_text(built.map_text, encoding="utf-8")
+    raised = read_map(tmp_path / "raised.xodr")
+    offset = raised.header_offset[:2]
+    roads = [each.place(np.array([0.0, each.length / 3, each.length]), np.zeros(3)) for each in raised.roads]
+    places = np.concatenate(roads)
+    inside = np.abs(places[:, :2] - built.model.origin[:2]).max(axis=1) < 120  # of the raster; it goes on level
+    assert places[inside, 2] == pytest.approx(plane(*(places[inside, :2] + offset).T), abs=0.05)  # bends
     for part in built.model.parts:
         assert np.isfinite(part.solid.vertices).all()
         if Role.POLES in part.roles:
