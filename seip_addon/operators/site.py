@@ -83,6 +83,7 @@ class SEIP_OT_choose_map(LongWork[SitePlaces], bpy.types.Operator):
             one.name, one.id = place.name, place.key
         self.report({"INFO"}, f"{len(site.junctions):,} junction{'s' * (len(site.junctions) != 1)}")
         if self._by_hand and not bpy.app.background:
+            site.junction = result.places[0].name if len(result.places) == 1 else ""
             bpy.ops.seip.choose_place("INVOKE_DEFAULT")
 
 
