@@ -34,6 +34,7 @@ def coarse(junction):
     return junction
 
 
+@pytest.mark.slow
 def test_panel_and_batch_place_alike_and_what_it_was_chosen_on_stays_with_it(coarse, tmp_path, small_scene):
     goal = coarse.seip.goal
     goal.layer, goal.weights_from_traffic = "height", True

@@ -93,6 +93,7 @@ def test_every_option_survives_the_record(folder, typed):
     assert (again.pose_errors, again.no_render) == (asked.pose_errors, asked.no_render)
 
 
+@pytest.mark.slow
 def test_a_new_placement_takes_the_report_on_the_old_one_away(folder, small_scene, tmp_path):
     place.main([str(small_scene), "-o", str(tmp_path), *QUICK, "--count", "1"])
     report.main([str(tmp_path), "--effort", "0"])

@@ -164,6 +164,7 @@ def test_what_cannot_be_read_is_refused(tmp_path):
             load_catalogue([tmp_path / name if name[0] != "v" else name])
 
 
+@pytest.mark.slow
 def test_xml_as_deep_as_the_limit_lets_it_be_is_refused(written):
     depth = MAX_BYTES // 7 - 1
     with pytest.raises(SeipError, match=r"holds 0 elevations|is broken"):

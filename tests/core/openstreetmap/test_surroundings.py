@@ -223,7 +223,7 @@ tag_sets = st.dictionaries(st.sampled_from(KEYS), st.sampled_from([*VALUES, "12 
 points = st.lists(st.tuples(st.integers(-60, 60), st.integers(-60, 60)), min_size=1, max_size=8)
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(shapes=st.lists(st.tuples(points, tag_sets, st.booleans()), min_size=1, max_size=6))
 def test_no_tags_and_shapes_break_the_reader(tmp_path_factory, shapes):
     extract = Extract()

@@ -401,6 +401,7 @@ def test_the_same_effort_gives_the_same_answer_again(solver: str) -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", [0, 320])
 def test_a_search_that_ends_at_its_limit_of_branches_is_an_answer(goal: int) -> None:
     visible = np.random.default_rng(7).random((150, 400)) < 0.12

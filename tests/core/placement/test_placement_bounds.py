@@ -75,6 +75,7 @@ def test_tabu_search_keeps_the_constraints_and_never_ends_worse(problem):
     assert instance.value(found) >= instance.value(choices[0])
 
 
+@pytest.mark.slow
 def test_districts_and_exchanges_close_most_of_the_gap_of_many_sensors():
     instance, _ = make_instance(street_problem(60, 800, blocks=2, count=7))
     chosen = greedy(instance, np.zeros(0, np.int64))

@@ -78,6 +78,7 @@ def test_nothing_comes_from_elsewhere(page):
     assert all(source.startswith("data:image/png;base64,") for source in page.sources)
 
 
+@pytest.mark.slow
 def test_the_same_folder_gives_the_same_bytes(folder, tmp_path):
     first = [(folder / name).read_bytes() for name in FILES]
     finish(write_report(folder, EFFORT))

@@ -140,6 +140,7 @@ def test_the_road_between_vehicles_is_that_of_a_full_scan(engine, bodies):
     assert (views([bodies], around=around)[0] == by_full_scan(bodies, engine, around)).all()
 
 
+@pytest.mark.slow
 @cases(5, 2)
 @given(bodies=crowds)
 def test_only_returns_that_are_strong_enough_count(bodies):
@@ -150,6 +151,7 @@ def test_only_returns_that_are_strong_enough_count(bodies):
         assert (views([bodies], around=around)[0] == by_full_scan(bodies, around=around)).all()
 
 
+@pytest.mark.slow
 @cases(5, 1)
 @given(bodies=crowds)
 def test_points_above_the_road_are_seen_by_beams_that_pass(bodies):
@@ -163,6 +165,7 @@ def test_the_empty_road_is_the_visibility_grid():
     assert (views([NO_TRAFFIC])[0] == grid.visible).all()
 
 
+@pytest.mark.slow
 @cases(10, 3)
 @given(bodies=crowds, more=crowds)
 def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):

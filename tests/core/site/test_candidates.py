@@ -63,6 +63,7 @@ def one_by_one(area, spacing):
     return taken
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(spacing=st.floats(1.5, 6.0), angle=st.floats(0, 3), width=st.floats(0.2, 20.0), hole=st.floats(0.1, 8.0))
 def test_spread_is_the_same_as_one_by_one(spacing, angle, width, hole):

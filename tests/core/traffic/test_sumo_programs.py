@@ -14,6 +14,7 @@ PYTHON = Path(sys.executable)
 PROGRAMS = Sumo(PYTHON, PYTHON, None)
 
 
+@pytest.mark.slow
 def test_a_program_ends_with_the_run_that_started_it(tmp_path):
     mark = tmp_path / "mark"
     script = f"import pathlib, time\nmark = pathlib.Path({str(mark)!r})\nmark.touch()\ntime.sleep(2)\nmark.unlink()"

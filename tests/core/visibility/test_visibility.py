@@ -505,6 +505,7 @@ def test_warnings_name_the_radius_from_which_rings_are_too_far_apart() -> None:
     assert resolution_warnings(site, models, VisibilitySettings(80.0)) == ()
 
 
+@pytest.mark.slow
 def test_warnings_name_the_radius_from_which_a_rosette_leaves_gaps() -> None:
     models = load_catalogue()
     site = junction_site(positions=8, sensors=["mid40"], heights=[8.0])

@@ -34,6 +34,7 @@ def test_grids_of_many_random_scenes(engine: Engine) -> None:
     no_fault(search([engine], MANY, first_seed=100_000))
 
 
+@pytest.mark.slow
 def test_the_arithmetic_decides_nearly_all_by_itself() -> None:
     """The reference is no echo of what it judges: it says seen and unseen of what shares no code with it."""
     verdicts = [judge(draw_case(seed)) for seed in range(QUICK)]
