@@ -40,6 +40,7 @@ def test_traffic_is_loaded_animated_and_cleared(placed):
     assert not placed.seip.traffic.loaded
 
 
+@pytest.mark.slow
 def test_what_traffic_leaves_of_a_placement_stands_with_it(placed, tmp_path):
     assert not bpy.ops.seip.try_in_traffic.poll()
     bpy.ops.seip.load_traffic()

@@ -122,6 +122,7 @@ def test_fates_correlate_as_drawn_ones_do(sensor):
     assert [found.along_ring[lag] for lag in lags] == pytest.approx((product / variance).tolist(), abs=0.04)
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_file_and_charts(reference, tmp_path, capsys):
     output = tmp_path / "out"
     content = measured(LAW)

@@ -422,6 +422,7 @@ def test_more_effort_proves_no_less() -> None:
     assert little.objective <= more.objective <= more.bound < little.bound
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_not_proven_says_what_more_time_does() -> None:
     short, longer = (finish(solve(hard_problem(), SolverLimits("highs", math.inf, effort))) for effort in (0.5, 1.0))
     assert "hardly closed in the second half of the time" in short.notes[1]

@@ -179,6 +179,7 @@ def test_where_more_vehicles_stand_less_is_seen_above_the_road(bodies, more):
     assert (some <= nobody).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layer", ["road", "height"])
 def test_neither_order_nor_company_of_instants_matters(layer):
     instants = [

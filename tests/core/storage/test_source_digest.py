@@ -63,6 +63,7 @@ print(*_sources(sys.argv[1]))
     assert sources[-1] == "False"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "other"),
     [

@@ -118,6 +118,7 @@ def test_hardly_a_ray_is_kept_that_passes_over_its_target() -> None:
     assert (gap < 1.03).all()
 
 
+@pytest.mark.slow
 def test_steep_surfaces_are_met_by_few_rays_more_than_needed() -> None:
     """A wall beside the sensor's view: of all rays within its heights only those that end on its line are kept."""
     wall = np.array([[[10.0, -9, -1], [10, 9, -1], [10, 9, 3]], [[10.0, -9, -1], [10, 9, 3], [10, -9, 3]]])

@@ -58,6 +58,7 @@ def test_a_turned_sensor_sees_what_its_full_scan_sees(engine, angles):
     assert seen.any()
 
 
+@pytest.mark.slow
 @given(
     angles=st.tuples(st.floats(-4, 4), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
     place=st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(2, 9)),
