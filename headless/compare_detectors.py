@@ -16,7 +16,6 @@ from headless.charts.detection import DetectorSetting, save_setting_chart
 from headless.detection import case_study
 from headless.detection.detector import Detector
 from headless.detection.inference import detect
-from headless.detection.pillars import grid_of
 from headless.detection.recordings import Simulator
 from headless.detection.settings import PUBLISHED_NETWORK, NetworkSettings, TrainingSettings
 from headless.detection.training import deterministic
@@ -91,10 +90,9 @@ def _train(
     study: evaluate.DetectionStudy, model: case_study.ModelConfiguration, device: str
 ) -> Generator[Progress, None, tuple[Detector, float]]:
     """Simulate the training set and train a detector on it; return it with the CPU time of the training in seconds."""
-    simulator = Simulator(study.simulator.static, study.simulator.settings, study.simulator.site)
-    grid = grid_of(study.surveyed.geometry, model.network.pillar)
+    simulator = Simulator(study.surveyed.geometry, study.simulator.settings)
     training_set = yield from case_study.simulate_training_set(
-        simulator, model.configurations, study.traffic, grid, model.network.most_points
+        simulator, model.configurations, study.traffic, model.network
     )
     begin = time.thread_time()
     trained = yield from case_study.training(model, training_set, device=device)
@@ -106,11 +104,12 @@ def _inference_seconds(study: evaluate.DetectionStudy, detector: Detector) -> fl
     medians = []
     for configuration in study.configurations:
         frame = study.simulator.frame(configuration, study.traffic.test[0], 0)
+        area = study.simulator.area(detector.settings.pillar)
         times = []
         for _ in range(TIMED_RUNS):
             begin = time.thread_time()
             with deterministic(1):
-                detect(detector, frame.points, frame.intensity)
+                detect(detector, area, frame)
             times.append(time.thread_time() - begin)
         medians.append(np.median(times))
     return float(np.mean(medians))

@@ -22,9 +22,9 @@ from headless.detection.average_precision import precision_recall
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
 from headless.detection.case_study import MAIN_RULE, read_runs
 from headless.detection.chart_data import error_view, parts
-from headless.detection.detector import Detector, check_device, on_grid
+from headless.detection.detection_area import area_of
+from headless.detection.detector import Detector, check_device
 from headless.detection.judgement import Judgement, figures, judge
-from headless.detection.pillars import grid_of
 from headless.detection.suitability import suitability_warnings
 from headless.options import add_settings, new_parser, read_settings
 
@@ -73,11 +73,11 @@ def main(argv: list[str]) -> None:
     scans = read_settings(
         ScanSettings, options, weather=tuple(options.weather), reflectivity=tuple(options.reflectivity)
     )
-    here = on_grid(detector, grid_of(geometry, detector.grid.pillar))
-    steps = judge(here, static, sensors, runs, scans, threads=options.threads)
+    area = area_of(geometry, detector.settings.pillar)
+    steps = judge(detector, area, static, sensors, runs, scans, threads=options.threads)
     judgement = runtime.finish_with_bar(steps)
     types = sorted({sensor.model.key for sensor in sensors})
-    doubts = suitability_warnings(detector, types, geometry.name, judgement.cloud)
+    doubts = suitability_warnings(detector, types, area, judgement.scan)
     runtime.warn(doubts)
     with runtime.incomplete_if_interrupted(options.output):
         _save(options.output, judgement, static, sensors, geometry.name)
@@ -117,7 +117,8 @@ def _save(folder: Path, judgement: Judgement, static: StaticScene, sensors: list
     frame = judgement.frames[judgement.fullest]
     places = np.array([sensor.xyz for sensor in sensors])
     title = f"{len(sensors)} × {types}: AP {evaluation.average_precision:.2f} over all frames"
-    view = error_view(title, frame, MAIN_RULE, score=score, cloud=judgement.cloud, region=static.region, sensors=places)
+    cloud = judgement.scan.points
+    view = error_view(title, frame, MAIN_RULE, score=score, cloud=cloud, region=static.region, sensors=places)
     save_error_view(folder / "errors.png", [view], f"{name}, {frame.run} at {frame.time:.1f} s")
     for number, one in enumerate(judgement.frames):
         boxes, categories, scores = one.detected.boxes, one.detected.category.tolist(), one.detected.score

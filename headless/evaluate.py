@@ -20,7 +20,6 @@ from headless.coverage_study.cells import COUNTS
 from headless.detection import case_study, study_results
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
-from headless.detection.pillars import grid_of
 from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.options import new_parser
@@ -30,7 +29,7 @@ import bpy
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.objective import Objective, check_objective
 from seip_addon.core.results.placement_record import versions
-from seip_addon.core.scans import ScanSettings, static_scene
+from seip_addon.core.scans import ScanSettings
 from seip_addon.core.workflows.survey import Survey
 
 
@@ -42,8 +41,7 @@ def main(argv: list[str]) -> None:
     study = prepare_study(options)
     watch, simulator, folder = study.stopwatch, study.simulator, options.output
     network = NetworkSettings()
-    grid = grid_of(study.surveyed.geometry, network.pillar)
-    steps = case_study.simulate_training_set(simulator, study.configurations, study.traffic, grid, network.most_points)
+    steps = case_study.simulate_training_set(simulator, study.configurations, study.traffic, network)
     training_set = watch.run("simulation", steps)
     models = case_study.model_configurations(
         study.configurations,
@@ -109,7 +107,7 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     runtime.LOG.info(traffic.overlap())
     configurations = watch.run("placements", case_study.place_all(surveyed))
     scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
-    simulator = Simulator(static_scene(surveyed.geometry), scans, surveyed.site.name)
+    simulator = Simulator(surveyed.geometry, scans)
     return DetectionStudy(surveyed, watch, traffic, configurations, simulator)
 
 

@@ -21,12 +21,12 @@ from headless import runtime
 from headless.charts.detection import save_training_chart
 from headless.detection.average_precision import evaluate
 from headless.detection.cloud_in_plan import CloudInPlan
+from headless.detection.detection_area import DetectionArea, area_of
 from headless.detection.detector import Detector, check_device
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.frames import SampledRecording, recording_of, require_independent_splits, require_separate
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
-from headless.detection.pillars import grid_of
 from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from headless.detection.suitability import suitability_warnings
 from headless.detection.training import train
@@ -57,15 +57,13 @@ def main(argv: list[str]) -> None:
     runtime.check_folder(options.output)
     runtime.open_scene(options.scene)
     geometry = read_scene(bpy.context.scene).geometry
-    grid = grid_of(geometry, network.pillar)
-    runtime.LOG.info(
-        f"{grid.columns} × {grid.rows} pillars of {grid.pillar:g} m, from {grid.bottom:.1f} to {grid.top:.1f} m"
-    )
+    area = area_of(geometry, network.pillar)
+    runtime.LOG.info(f"{area.grid.columns} × {area.grid.rows} pillars of {network.pillar:g} m")
 
     path = options.output / "detector.pt"
     learning, aside = (
         [
-            SampledRecording(replace(recording, site=geometry.name), grid, network.most_points)
+            SampledRecording(replace(recording, site=geometry.name), area, network.most_points)
             for recording in splits[name]
         ]
         for name in ("train", "validation")
@@ -79,26 +77,28 @@ def main(argv: list[str]) -> None:
         options.output / "training.png", trained.curve.loss, trained.curve.validation, f"{geometry.name}: training"
     )
     if options.test:
-        figures = _evaluated(trained.detector, options.test, geometry)
+        figures = _evaluated(trained.detector, area, options.test, geometry)
         save_json(options.output / "evaluation.json", figures)
     runtime.print_line(f"written to {options.output}/")
 
 
-def _evaluated(detector: Detector, runs: Sequence[Path], geometry: SceneGeometry) -> dict[str, dict[str, float]]:
+def _evaluated(
+    detector: Detector, area: DetectionArea, runs: Sequence[Path], geometry: SceneGeometry
+) -> dict[str, dict[str, float]]:
     """Return the figures of each run, and say them, with what speaks against trusting them."""
     figures = {}
     for folder in runs:
-        recording = recording_of(folder, geometry.name)
-        doubts = suitability_warnings(detector, recording.sensors, recording.site, recording.frames[0].points)
+        recording = recording_of(folder)
+        doubts = suitability_warnings(detector, recording.sensors, area, recording.frames[0])
         runtime.warn(f"{folder}: {doubt}" for doubt in doubts)
-        results = _results(detector, folder, geometry.region)
+        results = _results(detector, area, folder, geometry.region)
         figures[str(folder)] = {name: evaluate(results, rule).average_precision for name, rule in RULES.items()}
         words = ", ".join(f"{name} {value:.1%}" for name, value in figures[str(folder)].items())
         runtime.print_line(f"{folder}: {words}")
     return figures
 
 
-def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[FrameResult]:
+def _results(detector: Detector, area: DetectionArea, folder: Path, region: BaseGeometry) -> list[FrameResult]:
     """Return what is there and what is detected in each frame of a run."""
     recording = recording_of(folder)
     sensors = np.array([sensor["local_m"] for sensor in load_manifest(folder)["sensors"]])
@@ -107,7 +107,7 @@ def _results(detector: Detector, folder: Path, region: BaseGeometry) -> list[Fra
         frame_result(
             frame,
             CloudInPlan(frame.points),
-            detect(detector, frame.points, frame.intensity),
+            detect(detector, area, frame),
             run=recording.traffic,
             **common,
         )

@@ -328,6 +328,7 @@ def _arrays(folder: Path) -> list[bytes]:
         delay=np.zeros(50, dtype=np.float32),
         intensity=random.random(50).astype(np.float32),
         instance=np.where(random.random(50) < 0.5, -1, 3).astype(np.int32),
+        foreground=random.random(50) < 0.5,
         labels=labels,
     )
     contents = []

@@ -15,7 +15,7 @@ from .heads import BoxProposals, TrainingTargets, cell_centres, inner_cells, mat
 from .losses import focal_loss
 from .network import OUTPUT_STRIDE
 from .pillars import PillarGrid
-from .settings import CLASSES, GROUND_ABOVE_BOTTOM
+from .settings import CLASSES
 
 ANCHOR_CHANNELS = 10  # of an anchor: score, seven of its box, two of its direction
 DIRECTION_FROM = math.pi / 4  # yaw at which the first of the two directions begins: no street along the axes runs there
@@ -158,7 +158,7 @@ def anchor_boxes(grid: PillarGrid, anchor: Tensor, row: Tensor, column: Tensor) 
     sizes = torch.tensor([(s.length, s.width, s.height) for s in ANCHOR_SIZES], device=anchor.device)
     size = sizes[anchor // len(ANCHOR_YAWS)]
     yaw = torch.tensor(ANCHOR_YAWS, device=anchor.device)[anchor % len(ANCHOR_YAWS)]
-    z = grid.bottom + GROUND_ABOVE_BOTTOM + size[:, 2] / 2
+    z = size[:, 2] / 2
     return torch.cat((torch.stack((x[column], y[row], z), dim=1), size, yaw[:, None]), dim=1)
 
 

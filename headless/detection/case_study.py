@@ -34,7 +34,6 @@ from .frames import SampledRecording
 from .inference import detect
 from .kitti_precision import kitti
 from .matching import Rule
-from .pillars import PillarGrid
 from .recordings import SampledRun, SensorConfiguration, Simulator
 from .settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from .suitability import suitability_warnings
@@ -238,17 +237,19 @@ def simulate_training_set(
     simulator: Simulator,
     configurations: Sequence[SensorConfiguration],
     traffic: Traffic,
-    grid: PillarGrid,
-    most_points: int,
+    network: NetworkSettings,
 ) -> Generator[Progress, None, TrainingSet]:
-    """Simulate what the configurations measure, and keep what a detector on a grid learns from it."""
+    """Simulate what the configurations measure, and keep what a network learns from it."""
     training_set = TrainingSet({}, {})
     total = sum(len(run.times) for run in (*traffic.training, *traffic.validation)) * len(configurations)
     done = 0
     for configuration in configurations:
         for kept, runs in ((training_set.training, traffic.training), (training_set.validation, traffic.validation)):
             kept[configuration.name] = [
-                SampledRecording(simulator.record(configuration, run), grid, most_points) for run in runs
+                SampledRecording(
+                    simulator.record(configuration, run), simulator.area(network.pillar), network.most_points
+                )
+                for run in runs
             ]
             for sampled in kept[configuration.name]:
                 for number in range(len(sampled)):
@@ -310,7 +311,7 @@ def evaluate_all(
                     cloud = CloudInPlan(frame.points)
                     for model, detector in asked:
                         with deterministic(model.training.threads):
-                            found = detect(detector, frame.points, frame.intensity)
+                            found = detect(detector, simulator.area(detector.settings.pillar), frame)
                         result = frame_result(frame, cloud, found, run=run.name, **known)
                         results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "evaluated")
@@ -325,7 +326,9 @@ def suitability_by_configuration(
     frames = {one.name: simulator.frame(one, traffic.test[0], 0) for model in models for one in model.configurations}
     for model, detector in zip(models, detectors, strict=True):
         for one in model.configurations:
-            sentences = suitability_warnings(detector, [one.case.sensor], simulator.site, frames[one.name].points)
+            sentences = suitability_warnings(
+                detector, [one.case.sensor], simulator.area(detector.settings.pillar), frames[one.name]
+            )
             found.setdefault(one.name, {}).update(dict.fromkeys(sentences))
     return {name: tuple(sentences) for name, sentences in found.items()}
 

@@ -1,4 +1,4 @@
-"""A detector: network, weights and pillar grid, and the file that holds them."""
+"""A detector: network and weights, and the file that holds them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ from .anchor_head import AnchorHead
 from .centre_head import CentreHead
 from .heads import DetectionHead
 from .network import FeatureMap
-from .pillars import MAX_PILLARS, PillarGrid, Pillars
+from .pillars import Pillars
 from .settings import NetworkSettings
 
-SCHEMA, VERSION = "seip.detector", 2
-_OLD_VERSION = 1  # the version of files that hold no digest
+SCHEMA, VERSION = "seip.detector", 3
 _MAX_BYTES = 1 << 32  # bytes of a file: 4 GiB
 _SEED_LOCK = threading.Lock()  # torch draws first weights from one source of random numbers for all threads
 
@@ -50,12 +49,10 @@ class TrainingRecord:
 
 
 class Detector(nn.Module):
-    """PointPillars on a grid.
+    """PointPillars, for foreground returns with heights above the road.
 
     Parameters
     ----------
-    grid : PillarGrid
-        That of the whole extent.
     seed : int
         Of the weights it begins with.
     training_record : TrainingRecord
@@ -65,12 +62,11 @@ class Detector(nn.Module):
     def __init__(
         self,
         settings: NetworkSettings,
-        grid: PillarGrid,
         seed: int = 0,
         training_record: TrainingRecord = TrainingRecord(),
     ) -> None:
         super().__init__()
-        self.settings, self.grid, self.training_record = settings, grid, training_record
+        self.settings, self.training_record = settings, training_record
         with _SEED_LOCK, torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.feature_map = FeatureMap(settings)
@@ -92,18 +88,18 @@ class Detector(nn.Module):
         """Return the head's output for some clouds; ``shape`` is their number and the rows and columns of a cloud."""
         features = torch.from_numpy(pillars.features).to(self.device)
         pillar = torch.from_numpy(pillars.pillar).to(self.device)
-        output: Tensor = self.head(self.feature_map(features, pillar, shape))
-        return output
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=has_bfloat16(self.device)):
+            output: Tensor = self.head(self.feature_map(features, pillar, shape))
+        return output.float()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write settings, grid and weights; the same detector gives the same bytes."""
+        """Write settings and weights; the same detector gives the same bytes."""
         save_state(path, {**self.description(), "weights": self.state_dict()})
 
     def description(self) -> dict[str, Any]:
-        """Return settings, grid and what it has learnt from as plain values."""
+        """Return settings and what it has learnt from as plain values."""
         return {
             "settings": _plain(asdict(self.settings)),
-            "grid": asdict(self.grid),
             "experience": _plain(asdict(self.training_record)),
         }
 
@@ -119,41 +115,27 @@ class Detector(nn.Module):
         state = load_state(path)
         with fault_of(path):
             settings = NetworkSettings(**{**state["settings"], "blocks": tuple(state["settings"]["blocks"])})
-            grid = PillarGrid(**state["grid"])
-            _check_grid(grid, settings)
             training_record = _training_record(state.get("experience", {}))
             if not all(bool(torch.isfinite(tensor).all()) for tensor in state["weights"].values()):
                 raise _ContentError("its weights are not finite")
-            detector = cls(settings, grid, training_record=training_record)
+            detector = cls(settings, training_record=training_record)
             detector.load_state_dict(state["weights"])
         return detector.to(device).eval()
 
 
 def keeping_at_most(detector: Detector, points: int) -> Detector:
     """Return the detector with pillars that keep so many points at most, whatever it has learnt with."""
-    return _with_the_same_weights(detector, replace(detector.settings, most_points=points), detector.grid)
-
-
-def on_grid(detector: Detector, grid: PillarGrid) -> Detector:
-    """Return the detector on the grid of another site, of pillars as large as those that it has learnt with.
-
-    Raises
-    ------
-    SeipError
-        They are not.
-    """
-    if grid.pillar != detector.grid.pillar:
-        raise SeipError(
-            f"a detector that has learnt with pillars of {detector.grid.pillar:g} m sees nothing in those of "
-            f"{grid.pillar:g} m: lay the grid with its own"
-        )
-    return _with_the_same_weights(detector, detector.settings, grid)
-
-
-def _with_the_same_weights(detector: Detector, settings: NetworkSettings, grid: PillarGrid) -> Detector:
-    other = Detector(settings, grid, training_record=detector.training_record)
+    settings = replace(detector.settings, most_points=points)
+    other = Detector(settings, training_record=detector.training_record)
     other.load_state_dict(detector.state_dict())
     return other.to(detector.device).eval()
+
+
+def has_bfloat16(device: torch.device) -> bool:
+    """Return whether a device multiplies numbers of 16 bits faster than of 32 (bfloat16)."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    return device.type == "cpu" and torch.cpu._is_avx512_bf16_supported()  # noqa: SLF001  # there is no other way
 
 
 def check_device(device: str) -> None:
@@ -199,9 +181,8 @@ def load_state(path: str | os.PathLike[str]) -> dict[str, Any]:
         if sum(tensor.numel() * tensor.element_size() for tensor in _tensors(state)) > len(content):
             raise _ContentError("it has tensors larger than itself")
         version = state["version"]
-        known = state["schema"] == SCHEMA and version in {_OLD_VERSION, VERSION}
-        written = state.pop("digest", None)
-        if known and (version != _OLD_VERSION or written is not None) and written != _digest(state):
+        known = state["schema"] == SCHEMA and version == VERSION
+        if known and state.pop("digest", None) != _digest(state):
             raise _ContentError("its content is not what was written")
     if not known:
         raise SeipError(f"{path} is no detector of this version; train it again")
@@ -237,17 +218,6 @@ def _check_archive(content: bytes) -> None:
             raise _ContentError("it is packed as torch packs none")
         if archive.testzip() is not None:
             raise _ContentError("its checksums do not fit")
-
-
-def _check_grid(grid: PillarGrid, settings: NetworkSettings) -> None:
-    if grid.pillar != settings.pillar:
-        raise _ContentError(f"it is of pillars of {settings.pillar:g} m on a grid with pillars of {grid.pillar:g} m")
-    places = (grid.west, grid.south, grid.bottom, grid.top)
-    counts = (grid.columns, grid.rows)
-    if not all(isinstance(value, int | float) and abs(value) <= 1e8 for value in places) or grid.bottom >= grid.top:
-        raise _ContentError("its grid is nowhere")
-    if not all(isinstance(count, int) and count > 0 for count in counts) or len(grid) > MAX_PILLARS:
-        raise _ContentError("its grid has no or too many pillars")
 
 
 def _training_record(known: Mapping[str, Any]) -> TrainingRecord:

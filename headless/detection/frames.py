@@ -16,8 +16,9 @@ from seip_addon.core.scans.frame import Frame
 from seip_addon.core.scans.run_folder import frame_path, load_manifest
 from seip_addon.core.traffic.run_overlap import VehiclePositions, require_independent
 
+from .detection_area import DetectionArea
 from .detector import TrainingRecord
-from .pillars import PillarGrid, fill_pillars
+from .pillars import fill_pillars
 from .settings import CLASS_OF
 
 
@@ -89,14 +90,14 @@ class LazyFrames(Sequence[Frame]):
 
 @dataclass(frozen=True, eq=False)
 class TrainingSample:
-    """A training sample: the pillars of a frame and its boxes.
+    """A training sample: the foreground of a frame and its boxes, with heights above the road.
 
     Parameters
     ----------
     points : (n, 4) float32
-        x, y, z (metres, local site axes), intensity; of each pillar no more than it can keep.
+        x, y, height (metres), intensity; by ascending x, and of each pillar no more than it can keep.
     boxes : (k, 7) float64
-        x, y, z of the middle, length, width, height (metres), yaw; of all road users in the extent.
+        x, y, height of the middle, length, width, height (metres), yaw; of all road users in the area.
     category : (k,) int64
         Index into `settings.CLASSES`.
     returns : (k,) int64
@@ -109,31 +110,34 @@ class TrainingSample:
     returns: Integer
 
 
-def sample_of(frame: Frame, grid: PillarGrid, most_points: int) -> TrainingSample:
-    """Return what a detector on a grid, whose pillars keep ``most_points``, can learn from a frame."""
+def sample_of(frame: Frame, area: DetectionArea, most_points: int) -> TrainingSample:
+    """Return what a detector, whose pillars keep ``most_points``, can learn from a frame of a site."""
     labels = frame.labels
-    points = np.column_stack((frame.points, frame.intensity))
-    kept = np.sort(fill_pillars(points, grid, most_points).chosen)
-    inside = grid.holds(labels.centre)
+    cloud = area.cloud(frame)
+    points = cloud[fill_pillars(cloud, area.grid, most_points).chosen]
+    boxes = area.levelled(np.column_stack((labels.centre, labels.size, labels.yaw)))
+    inside = area.grid.holds(boxes)
     return TrainingSample(
-        points=points[kept],
-        boxes=np.column_stack((labels.centre, labels.size, labels.yaw))[inside],
+        points=points[np.lexsort(points.T[::-1])],
+        boxes=boxes[inside],
         category=np.array([CLASS_OF[name] for name in labels.category[inside].tolist()], dtype=np.int64),
         returns=labels.points.sum(axis=1)[inside],
     )
 
 
 class SampledRecording:
-    """A recording's samples, each made when it is first asked for and kept: a few megabytes at most.
+    """A recording's samples, each made when it is first asked for and kept: some hundred kilobytes.
 
     Parameters
     ----------
+    area : DetectionArea
+        Of the recording's site.
     most_points : int
         That a pillar keeps.
     """
 
-    def __init__(self, recording: Recording, grid: PillarGrid, most_points: int) -> None:
-        self.recording, self.grid, self.most_points = recording, grid, most_points
+    def __init__(self, recording: Recording, area: DetectionArea, most_points: int) -> None:
+        self.recording, self.area, self.most_points = recording, area, most_points
         self.get = functools.cache(self._sample)
 
     def __len__(self) -> int:
@@ -141,7 +145,7 @@ class SampledRecording:
 
     def _sample(self, frame: int) -> TrainingSample:
         """Return the sample of a frame."""
-        return sample_of(self.recording.frames[frame], self.grid, self.most_points)
+        return sample_of(self.recording.frames[frame], self.area, self.most_points)
 
 
 def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -> TrainingSample:
@@ -150,13 +154,15 @@ def drawn(recordings: Sequence[SampledRecording], random: np.random.Generator) -
     return recording.get(int(random.integers(len(recording))))
 
 
-def spread(recordings: Sequence[SampledRecording], most: int) -> list[TrainingSample]:
-    """Return so many samples at most, of all recordings in turn and from all over each."""
+def spread(recordings: Sequence[SampledRecording], most: int) -> list[tuple[DetectionArea, TrainingSample]]:
+    """Return so many samples at most with their areas, of all recordings in turn and from all over each."""
     each = max(1, most // len(recordings))
     chosen = []
     for recording in recordings[:most]:
         count = min(each, len(recording))
-        chosen += [recording.get((2 * part + 1) * len(recording) // (2 * count)) for part in range(count)]
+        chosen += [
+            (recording.area, recording.get((2 * part + 1) * len(recording) // (2 * count))) for part in range(count)
+        ]
     return chosen
 
 

@@ -4,37 +4,61 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from seip_addon.core.errors import SeipError
+from seip_addon.core.scans.frame import Frame
+
+from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import Detections
-from .pillars import fill_pillars
+from .pillars import PillarGrid, fill_pillars
 from .rotated_boxes import in_plan, suppress
 
 MIN_SCORE = 0.05  # boxes below it are not kept: average precision hardly sees them, and time is spent on each
 MAX_OVERLAP = 0.1  # intersection over union in plan beyond which two boxes are one road user
 
 
-@torch.inference_mode()
-def detect(
-    detector: Detector, points: NDArray[np.float32], intensity: NDArray[np.float32], *, least_score: float = MIN_SCORE
-) -> Detections:
-    """Return the road users in a cloud.
+def detect(detector: Detector, area: DetectionArea, frame: Frame, *, least_score: float = MIN_SCORE) -> Detections:
+    """Return the road users in a frame, in local site axes, best first.
 
     Parameters
     ----------
-    points : (n, 3) float32, metres
-        Merged cloud of all sensors, local site axes. What lies outside the detector's grid is left out.
-    intensity : (n,) float32, 0 to 1
+    area : DetectionArea
+        Of the frame's site; what lies outside is left out.
     least_score : float
         What scores less is not returned.
+
+    Raises
+    ------
+    SeipError
+        The detector has learnt with pillars of another size.
+    """
+    found = detect_on_level(detector, area.grid, area.cloud(frame), least_score=least_score)
+    return Detections(area.raised(found.boxes), found.score, found.category)
+
+
+@torch.inference_mode()
+def detect_on_level(
+    detector: Detector, grid: PillarGrid, cloud: NDArray[np.float32], *, least_score: float = MIN_SCORE
+) -> Detections:
+    """Return the road users in foreground returns, best first.
+
+    Parameters
+    ----------
+    cloud : (n, 4) float32
+        x, y, height above the road (metres), intensity, 0 to 1.
 
     Returns
     -------
     Detections
-        Best first.
+        With heights above the road.
     """
+    if grid.pillar != detector.settings.pillar:
+        raise SeipError(
+            f"a detector that has learnt with pillars of {detector.settings.pillar:g} m sees nothing in those of "
+            f"{grid.pillar:g} m: lay the grid with its own"
+        )
     detector.eval()
-    grid = detector.grid
-    pillars = fill_pillars(np.column_stack((points, intensity)), grid, detector.settings.most_points)
+    pillars = fill_pillars(cloud, grid, detector.settings.most_points)
     output = detector(pillars, (1, grid.rows, grid.columns))
     (found,) = detector.found_by.candidates(output, grid, least_score)
     stays = suppress(in_plan(found.boxes), found.score, MAX_OVERLAP)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
@@ -16,6 +15,7 @@ from seip_addon.core.traffic.bodies import fitted_body
 from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
 from .case_study import MAIN_RULE, RULES
 from .cloud_in_plan import CloudInPlan
+from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .inference import detect
@@ -38,8 +38,8 @@ class Judgement:
         Of all runs, one after the other.
     fullest : int
         The frame with the most road users in the region.
-    cloud : (n, 3) float32, metres
-        Of that frame.
+    scan : Frame
+        Of that instant.
     score : float
         The best balance of precision and recall on these frames.
     """
@@ -47,7 +47,7 @@ class Judgement:
     frames: tuple[FrameResult, ...]
     evaluation: Evaluation
     fullest: int
-    cloud: NDArray[np.float32]
+    scan: Frame
     score: float
 
     @property
@@ -69,8 +69,9 @@ class Judgement:
             yield name, found.average_precision, average_precision_interval(found, seed=0), len(found.wanted)
 
 
-def judge(
+def judge(  # noqa: PLR0913  # a detector, where it looks, what measures there, and how
     detector: Detector,
+    area: DetectionArea,
     static: StaticScene,
     sensors: Sequence[MountedSensor],
     runs: Sequence[SampledRun],
@@ -82,8 +83,8 @@ def judge(
 
     Parameters
     ----------
-    detector : Detector
-        On the grid of this site.
+    area : DetectionArea
+        Of this site.
     threads : int
         Of torch.
 
@@ -98,24 +99,25 @@ def judge(
     known["classes"] = tuple(CLASS_CATEGORIES.values())
     total = sum(len(run.times) for run in runs)
     frames: list[FrameResult] = []
-    most, fullest = -1, 0
-    cloud: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
+    most, fullest, scan = -1, 0, None
     for run in runs:
         yield Progress(len(frames), total, f"prepare {run.name}")
         bodies = [fitted_body(user) for user in run.trajectories.users]
         simulation: Simulation = finish(prepare(static, sensors, run.trajectories, bodies, scans))
         for number, time in enumerate(run.times):
             yield Progress(len(frames), total, f"detect in {run.name}")
-            frame: Frame = simulation.frame(number, float(time))
+            frame = simulation.frame(number, float(time))
             with deterministic(threads):
-                found = detect(detector, frame.points, frame.intensity)
+                found = detect(detector, area, frame)
             result = frame_result(frame, CloudInPlan(frame.points), found, run=run.name, **known)
             if result.truth.inside.sum() > most:
-                most, fullest, cloud = int(result.truth.inside.sum()), len(frames), frame.points
+                most, fullest, scan = int(result.truth.inside.sum()), len(frames), frame
             frames.append(result)
     yield Progress(total, total, "detected")
     evaluation = evaluate(frames, MAIN_RULE)
-    return Judgement(tuple(frames), evaluation, fullest, cloud, balanced_score(evaluation))
+    if scan is None:
+        raise SeipError("there is no run of traffic to detect in: name some with --traffic")
+    return Judgement(tuple(frames), evaluation, fullest, scan, balanced_score(evaluation))
 
 
 def figures(judgement: Judgement) -> Mapping[str, Any]:

@@ -110,7 +110,8 @@ class FeatureMap(nn.Module):
             Clouds, rows, columns.
         """
         clouds, rows, columns = shape
-        pillars = self.encoder(features, pillar, clouds * rows * columns)
+        with torch.autocast(features.device.type, enabled=False):  # many numbers of 16 bits would not add up
+            pillars = self.encoder(features, pillar, clouds * rows * columns)
         # The channels of a pillar stay side by side in memory, which is how convolutions on the CPU like them best.
         picture = pillars.view(clouds, rows, columns, -1).permute(0, 3, 1, 2)
         features_: Tensor = self.backbone(picture)

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from seip_addon.core.arrays import Boolean, Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.site.scene_geometry import SceneGeometry, joined
 
-from .settings import GRID_STRIDE, GROUND_ABOVE_BOTTOM, HEADROOM
+from .settings import GRID_STRIDE
 
 POINT_FEATURES = 8
 _KEY_BITS = 63  # of a non-negative int64
@@ -27,14 +26,14 @@ MAX_PILLARS = 16_000_000  # of a grid at most
 
 @dataclass(frozen=True)
 class PillarGrid:
-    """Pillars over a rectangle in plan, local site axes; row by row from the south-west.
+    """Pillars over a rectangle in plan, local site axes, with heights above the road; row by row from the south-west.
 
     Parameters
     ----------
     west, south : float, metres
         Corner with the least x and y.
     bottom, top : float, metres
-        Points below or above are left out.
+        Heights above the road; points below or above are left out.
     columns, rows : int
         Along x and y.
     pillar : float, metres
@@ -112,24 +111,6 @@ def grid_over(
         rows=rows,
         pillar=pillar,
     )
-
-
-def grid_of(geometry: SceneGeometry, pillar: float) -> PillarGrid:
-    """Return the grid over a scene's region of interest, from below its lowest road to above lorries on its highest.
-
-    Raises
-    ------
-    SeipError
-        There is no region or no road in it.
-    """
-    west, south, east, north = geometry.region.bounds
-    corners = joined(geometry.roads).reshape(-1, 3)
-    x, y, z = corners.T
-    heights = z[(x >= west) & (x <= east) & (y >= south) & (y <= north)]
-    if len(heights) == 0:
-        raise SeipError("no road begins or ends in the region of interest: put the carriageway into SEIP Roads")
-    bounds = (float(west), float(south), float(east), float(north))
-    return grid_over(bounds, (float(heights.min()) - GROUND_ABOVE_BOTTOM, float(heights.max()) + HEADROOM), pillar)
 
 
 @dataclass(frozen=True, eq=False)

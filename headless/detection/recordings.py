@@ -9,11 +9,13 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
+from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, prepare, static_scene
+from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
 
+from .detection_area import area_of
 from .frames import LazyFrames, Recording
 
 
@@ -68,10 +70,16 @@ class Simulator:
 
     What stands still is cast against once for a configuration and a run, and
     kept until another is asked for: ask for the frames of one after the other.
+
+    Attributes
+    ----------
+    area : callable
+        From the width of a pillar in metres to the `DetectionArea` of the scene.
     """
 
-    def __init__(self, static: StaticScene, settings: ScanSettings, site: str = "") -> None:
-        self.static, self.settings, self.site = static, settings, site
+    def __init__(self, geometry: SceneGeometry, settings: ScanSettings) -> None:
+        self.static, self.settings, self.site = static_scene(geometry), settings, geometry.name
+        self.area = functools.cache(functools.partial(area_of, geometry))
         self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
 
     def record(self, configuration: SensorConfiguration, run: SampledRun) -> Recording:

@@ -25,8 +25,7 @@ CLASS_OF = {category: number for number, group in enumerate(CLASS_CATEGORIES.val
 """Index of the class of each category of road users."""
 
 GRID_STRIDE = 8  # stride of the network's coarsest feature map in pillars; grids have a multiple of it along each side
-GROUND_ABOVE_BOTTOM = 1.0  # metres from the bottom of a detector's extent to the lowest road
-HEADROOM = 4.5  # metres from the highest road to the top of a detector's extent
+BOTTOM, TOP = -1.0, 4.5  # metres above the road between which a detector looks
 
 
 def _require(rules: dict[str, bool]) -> None:

@@ -1,10 +1,10 @@
-"""Warnings where a detector is used beyond the sensor types, sites and densities that it was trained on."""
+"""Warnings where a detector is used beyond the sensor types and densities that it was trained on."""
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from seip_addon.core.scans.frame import Frame
 
+from .detection_area import DetectionArea
 from .detector import Detector
 from .pillars import filling
 
@@ -17,20 +17,20 @@ kept fewer points than they were learnt with: `disturbances.Capped`.
 
 
 def suitability_warnings(
-    detector: Detector, sensors: Sequence[str], site: str, points: NDArray[np.float32]
+    detector: Detector, sensors: Sequence[str], area: DetectionArea, frame: Frame
 ) -> tuple[str, ...]:
-    """Return warnings about using a detector beyond the types, the site and the densities that it was trained on.
+    """Return warnings about using a detector beyond the types and the densities that it was trained on.
 
     Parameters
     ----------
     sensors : sequence of str
         Catalogue keys of the types whose clouds it is used on.
-    site : str
-        The scene's name; empty where it is not known.
-    points : (n, 3 or more) float32, metres
-        A cloud as it is used on.
+    area : DetectionArea
+        Of the site where it is used.
+    frame : Frame
+        That it is used on.
     """
-    found = (_of_types(detector, sensors), _of_site(detector, site), _of_pillars(detector, points))
+    found = (_of_types(detector, sensors), _of_pillars(detector, area, frame))
     return tuple(sentence for sentence in found if sentence)
 
 
@@ -44,19 +44,9 @@ def _of_types(detector: Detector, sensors: Sequence[str]) -> str:
     )
 
 
-def _of_site(detector: Detector, site: str) -> str:
-    sites = detector.training_record.sites
-    if not sites or not site or site in sites:
-        return ""
-    return (
-        f"the detector has learnt at {' and '.join(sites)}, not at {site}: where the road rises and falls otherwise "
-        "it may miss most road users, so train it on traffic of this site too"
-    )
-
-
-def _of_pillars(detector: Detector, points: NDArray[np.float32]) -> str:
-    most, grid = detector.settings.most_points, detector.grid
-    full = filling(points, grid, most)
+def _of_pillars(detector: Detector, area: DetectionArea, frame: Frame) -> str:
+    most = detector.settings.most_points
+    full = filling(area.cloud(frame), area.grid, most)
     if full.over_full <= MAX_OVERFULL_SHARE:
         return ""
     return (

@@ -20,14 +20,15 @@ from seip_addon.core.errors import SeipError
 from seip_addon.core.progress import Progress
 
 from .average_precision import evaluate
+from .detection_area import DetectionArea
 from .detector import Detector, fault_of, load_state, save_state
 from .frame_results import EvaluatedBoxes, FrameResult, GroundTruth
 from .frames import SampledRecording, TrainingSample, drawn, require_separate, spread, training_record_of
 from .heads import TrainingTargets
-from .inference import detect
+from .inference import detect_on_level
 from .matching import Rule
-from .pillars import PillarGrid, fill_pillars, stacked
-from .settings import CLASS_CATEGORIES, GRID_STRIDE, NetworkSettings, TrainingSettings
+from .pillars import PillarGrid, fill_pillars, grid_over, stacked
+from .settings import BOTTOM, CLASS_CATEGORIES, TOP, NetworkSettings, TrainingSettings
 
 VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings set aside
 LOSS_MARGIN = 1.6  # metres at the border of a window for which no loss is computed: much of what is there lies outside
@@ -85,7 +86,7 @@ def train(
     Parameters
     ----------
     recordings, validation : sequence of SampledRecording
-        Training and validation recordings; on one pillar grid, from separate runs of traffic.
+        Training and validation recordings, of one site or of several, from separate runs of traffic.
     device : str
         PyTorch device: ``cpu``, ``cuda``.
     store : path, optional
@@ -137,14 +138,15 @@ class _Run:
         self.settings = settings
         self.training_set, self.aside = _with_frames(recordings), _with_frames(validation)
         training_record = training_record_of([sampled.recording for sampled in self.training_set])
-        self.detector = Detector(network, self.training_set[0].grid, settings.seed, training_record).to(device)
+        self.detector = Detector(network, settings.seed, training_record).to(device)
         self.optimiser = torch.optim.AdamW(
             self.detector.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
         )
         self.schedule = torch.optim.lr_scheduler.OneCycleLR(
             self.optimiser, settings.learning_rate, total_steps=settings.steps + 1
         )
-        self.window = GRID_STRIDE * math.ceil(settings.window / (network.pillar * GRID_STRIDE) - 1e-9)
+        half = settings.window / 2
+        self.window = grid_over((-half, -half, half, half), (BOTTOM, TOP), network.pillar)
         self.step = 0
         self.curve = LearningCurve()
         self.best = _copied(self.detector.state_dict())
@@ -160,7 +162,7 @@ class _Run:
         self.detector.train()
         random = np.random.default_rng([self.settings.seed, 1, self.step])
         samples = [drawn(self.training_set, random) for _ in range(self.settings.batch)]
-        grid = self.detector.grid.window(*self.detector.grid.centre, self.window)
+        grid = self.window
         varied = [vary(sample, grid, random) for sample in samples]
         pillars = stacked([fill_pillars(one.points, grid, self.detector.settings.most_points) for one in varied], grid)
         targets = [_targets(one, self.settings.least_points, self.detector.device) for one in varied]
@@ -176,7 +178,9 @@ class _Run:
 
     def validate(self) -> None:
         """Take the average precision on the frames set aside, which are always the same."""
-        results = [result_of_sample(self.detector, sample) for sample in spread(self.aside, VALIDATION_FRAMES)]
+        results = [
+            result_of_sample(self.detector, area, sample) for area, sample in spread(self.aside, VALIDATION_FRAMES)
+        ]
         rule = Rule(fewest_points=self.settings.least_points)
         self.curve.validation[self.step] = evaluate(results, rule).average_precision
         if self.curve.best == self.step:
@@ -220,15 +224,14 @@ class _Run:
         state = load_state(path)
         earlier = state.get("training", {})
         same = (
-            all(state.get(name) == self.detector.description()[name] for name in ("settings", "grid"))
+            all(state.get(name) == self.detector.description()[name] for name in ("settings", "experience"))
             and isinstance(earlier, dict)
             and earlier.get("settings") == asdict(self.settings)
             and earlier.get("recordings") == self._sources()
         )
         if not same:
             raise SeipError(
-                f"{path} is of a training with other settings, another grid or other recordings: "
-                "delete it, or choose another file"
+                f"{path} is of a training with other settings or other recordings: delete it, or choose another file"
             )
         with fault_of(path):
             self.step = int(earlier["step"])
@@ -269,24 +272,24 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
     if mirrored:
         matrix = matrix @ np.diag((1.0, -1.0))
     reach = size * math.sqrt(0.5) / (1 - MAX_STRETCH)
-    near = (np.abs(sample.points[:, :2] - focus) <= reach).all(axis=1)
-    points = sample.points[near]
+    first, last = np.searchsorted(sample.points[:, 0], (focus[0] - reach, focus[0] + reach))
+    points = sample.points[first:last]
+    points = points[np.abs(points[:, 1] - focus[1]) <= reach]
     middle = np.array(window.centre)
     points[:, :2] = (points[:, :2] - focus) @ matrix.T + middle
-    points[:, 2] = (points[:, 2] - window.bottom) * scale + window.bottom
+    points[:, 2] *= scale
 
     boxes = sample.boxes.copy()
     boxes[:, :2] = (boxes[:, :2] - focus) @ matrix.T + middle
-    boxes[:, 2] = (boxes[:, 2] - window.bottom) * scale + window.bottom
-    boxes[:, 3:6] *= scale
+    boxes[:, 2:6] *= scale
     boxes[:, 6] = angle + (-boxes[:, 6] if mirrored else boxes[:, 6])
     seen = (np.abs(boxes[:, :2] - middle) <= size / 2).all(axis=1)
     return TrainingSample(points, boxes[seen], sample.category[seen], sample.returns[seen])
 
 
-def result_of_sample(detector: Detector, sample: TrainingSample) -> FrameResult:
+def result_of_sample(detector: Detector, area: DetectionArea, sample: TrainingSample) -> FrameResult:
     """Return what a detector finds in a sample, all of which counts, beside what is there."""
-    found = detect(detector, sample.points[:, :3], sample.points[:, 3])
+    found = detect_on_level(detector, area.grid, sample.points)
     names = np.array([members[0] for members in CLASS_CATEGORIES.values()], dtype=np.str_)
     return FrameResult(
         run="",
@@ -330,6 +333,7 @@ def deterministic(threads: int) -> Iterator[None]:
     before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(mode=True)
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]  # debugging aid: a tenth
     try:
         yield
     finally:

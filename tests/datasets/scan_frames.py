@@ -83,6 +83,7 @@ def make_frame(seed=0, users=7, static=50, sensors=2, time=0.0, pitch=0.0, outsi
         delay=random.uniform(0, 0.1, len(points)).astype(np.float32),
         intensity=random.random(len(points)).astype(np.float32),
         instance=owner[order],
+        foreground=owner[order] != STATIC_INSTANCE,
         labels=labels,
     )
 

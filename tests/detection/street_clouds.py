@@ -40,6 +40,7 @@ def street_frame(seed, *, half=16.0, users=6, rays=6000, time=0.0, kinds=tuple(S
         delay=np.zeros(len(points), dtype=np.float32),
         intensity=random.uniform(0.1, 0.9, len(points)).astype(np.float32),
         instance=instance.astype(np.int32),
+        foreground=instance >= 0,
         labels=labels,
     )
 

@@ -37,6 +37,7 @@ def simulated(points):
         delay=np.zeros(count, dtype=np.float32),
         intensity=np.zeros(count, dtype=np.float32),
         instance=np.full(count, -1, dtype=np.int32),
+        foreground=np.zeros(count, dtype=np.bool_),
         labels=labels,
     )
 

@@ -198,7 +198,7 @@ def full_scan(scanner: Scanner, surface: ReflectiveSurface, owner: Integer, user
         instance[begin + hit] = owner[triangle[hit]]
     chance = return_chance(model, distance, reflected).astype(np.float32)
     nobody = np.zeros(users, dtype=np.int64)
-    return Scan(distance, intensity, chance, instance, nobody, nobody)
+    return Scan(distance, distance, intensity, chance, instance, nobody, nobody)
 
 
 def differing(one: Scan, other: Scan) -> Integer:

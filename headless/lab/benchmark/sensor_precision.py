@@ -11,10 +11,10 @@ from headless.coverage_study.cells import Cell, solve_cell
 from headless.detection import case_study
 from headless.detection.average_precision import evaluate
 from headless.detection.cloud_in_plan import CloudInPlan
+from headless.detection.detection_area import area_of
 from headless.detection.frame_results import FrameResult, frame_result
 from headless.detection.inference import detect
 from headless.detection.matching import Rule
-from headless.detection.pillars import grid_of
 from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
 from headless.detection.settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector, deterministic
@@ -112,8 +112,8 @@ def precision_front(
     cell = Cell(lidar.key, None, count, 1.0)
     placed = solve_cell(survey.site, survey.models, survey.grid.visible, cell, survey.settings.limits)
     configuration = SensorConfiguration((yield from within(progress, placed)))
-    static = static_scene(survey.geometry)
-    trained = yield from _trained(configuration, static, traffic, survey, training, folder)
+    static, area = static_scene(survey.geometry), area_of(survey.geometry, NetworkSettings().pillar)
+    trained = yield from _trained(configuration, traffic, survey, training, folder)
 
     costs = {model.name: Cost() for model in models}
     results: dict[str, list[FrameResult]] = {model.name: [] for model in models}
@@ -126,7 +126,7 @@ def precision_front(
         yield Progress(done, total, "scan and detect")
         for model, (run, frame) in zip(models, frames, strict=True):
             with deterministic(1):
-                found = detect(trained.detector, frame.points, frame.intensity)
+                found = detect(trained.detector, area, frame)
             results[model.name].append(
                 frame_result(
                     frame,
@@ -152,17 +152,15 @@ def precision_front(
 
 def _trained(
     configuration: SensorConfiguration,
-    static: StaticScene,
     traffic: case_study.Traffic,
     survey: Survey,
     training: TrainingSettings,
     folder: Path,
 ) -> Generator[Progress, None, TrainedDetector]:
     network = NetworkSettings()
-    simulator = Simulator(static, ScanSettings(seed=training.seed), survey.site.name)
+    simulator = Simulator(survey.geometry, ScanSettings(seed=training.seed))
     name = f"detector-{configuration.case.sensor}-{training.steps}-{training.seed}"
     asked = case_study.ModelConfiguration(name, (configuration,), network, training)
-    grid = grid_of(survey.geometry, network.pillar)
-    learnt = yield from case_study.simulate_training_set(simulator, [configuration], traffic, grid, network.most_points)
+    learnt = yield from case_study.simulate_training_set(simulator, [configuration], traffic, network)
     (trained,) = yield from case_study.train_all([asked], learnt, folder, device="cpu")
     return trained

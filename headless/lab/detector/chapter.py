@@ -9,8 +9,6 @@ from pathlib import Path
 from headless import runtime, survey
 from headless.detection import case_study
 from headless.detection.average_precision import balanced_score
-from headless.detection.detector import on_grid
-from headless.detection.pillars import grid_of
 from headless.detection.recordings import SampledRun, SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.detection.training import TrainedDetector
@@ -21,7 +19,7 @@ from headless.lab.detector.trials import EvaluatedDetector, TrialSite, trials
 import bpy
 
 from seip_addon.core.progress import Progress
-from seip_addon.core.scans import ScanSettings, static_scene
+from seip_addon.core.scans import ScanSettings
 from seip_addon.core.workflows.survey import Layout, Survey, lay_out, see
 from seip_addon.scene.read import read_scene
 
@@ -69,7 +67,7 @@ def detector_limits(
     configurations = yield from case_study.place_all(surveyed)
     simulator = _studio(surveyed)
     asked = training_plan(configurations, network, TrainingSettings(steps=steps), seeds=seeds, padding=True)
-    trained = yield from _trained(asked, simulator, configurations, traffic, surveyed, folder)
+    trained = yield from _trained(asked, simulator, configurations, traffic, folder)
     candidates = asked.candidates([one.detector for one in trained])
 
     main = _most(configurations)
@@ -93,14 +91,10 @@ def _trained(
     simulator: Simulator,
     configurations: Sequence[SensorConfiguration],
     traffic: case_study.Traffic,
-    layout: Layout,
     folder: Path,
 ) -> Generator[Progress, None, list[TrainedDetector]]:
     network = NetworkSettings()
-    grid = grid_of(layout.geometry, network.pillar)
-    training_set = yield from case_study.simulate_training_set(
-        simulator, configurations, traffic, grid, network.most_points
-    )
+    training_set = yield from case_study.simulate_training_set(simulator, configurations, traffic, network)
     return (yield from case_study.train_all(asked.models, training_set, folder, device="cpu"))
 
 
@@ -115,13 +109,11 @@ def _on_other_scene(
     layout = lay_out(reading.geometry, replace(settings, candidates=candidates), reading.warnings)
     there = yield from case_study.place_all((yield from see(layout, folder / f"visibility_{scene.stem}.npz")))
     runs = case_study.read_runs(survey.runs_beside(scene), layout.geometry.origin, TRAINING_INTERVAL)
-    pillars = grid_of(layout.geometry, tested[0].detector.grid.pillar)
-    moved = tuple(EvaluatedDetector(one.name, on_grid(one.detector, pillars)) for one in tested)
-    return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), moved)
+    return OtherSite(TrialSite(layout.site.name, _studio(layout), _thinned(runs)), (_most(there),), tuple(tested))
 
 
 def _studio(layout: Layout) -> Simulator:
-    return Simulator(static_scene(layout.geometry), ScanSettings(engine=layout.settings.engine), layout.site.name)
+    return Simulator(layout.geometry, ScanSettings(engine=layout.settings.engine))
 
 
 def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:

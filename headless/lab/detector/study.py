@@ -533,9 +533,10 @@ def _pillars(site: TrialSite, configuration: SensorConfiguration, detector: Dete
         site.simulator.frame(configuration, site.runs[0], number)
         for number in range(min(COUNTED_FRAMES, len(site.runs[0].times)))
     ]
+    area = site.simulator.area(detector.settings.pillar)
     counted = {}
     for cap in dict.fromkeys(caps):
-        each = [filling(frame.points, detector.grid, cap) for frame in frames]
+        each = [filling(area.cloud(frame), area.grid, cap) for frame in frames]
         counted[cap] = Filling(
             *(float(np.mean([getattr(one, part) for one in each])) for part in ("empty", "over_full", "left_out"))
         )

@@ -105,9 +105,9 @@ class EvaluatedDetector:
 
     @cached_property
     def key(self) -> str:
-        """Digest of its weights, its settings and its grid."""
+        """Digest of its weights and its settings."""
         weights = [part for name, value in self.detector.state_dict().items() for part in (name, value.cpu().numpy())]
-        return digest(repr(self.detector.settings), repr(self.detector.grid), *weights)
+        return digest(repr(self.detector.settings), *weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,6 @@ def trials(
     Parameters
     ----------
     tested : sequence of EvaluatedDetector
-        With pillars on the site's own grid.
     store : path
         Folder of what was tried before.
 
@@ -203,7 +202,7 @@ def _results(
         cloud = CloudInPlan(frame.points)
         for detector, own in zip(detectors, results, strict=True):
             with deterministic(1):
-                found = detect(detector, frame.points, frame.intensity)
+                found = detect(detector, site.simulator.area(detector.settings.pillar), frame)
             own.append(
                 frame_result(
                     frame,

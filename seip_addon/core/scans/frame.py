@@ -23,6 +23,7 @@ _POINTS = {
     "delay": ArrayRule("f4", ("n",), -1e3, 1e3),
     "intensity": ArrayRule("f4", ("n",), 0.0, _ROUNDED_ONE),
     "instance": ArrayRule("i4", ("n",), -1),
+    "foreground": ArrayRule("b1", ("n",)),
 }
 _LABELS = {
     "labels.user": ArrayRule("i8", ("k",), 0),
@@ -37,7 +38,7 @@ _LABELS = {
     "labels.inside": ArrayRule("b1", ("k",)),
 }
 FILE = ArrayFile(
-    "seip.frame", 2, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False, undigested=True
+    "seip.frame", 3, "frame of scans", "simulate it again", _POINTS | _LABELS, compressed=False, undigested=True
 )
 
 STATIC_INSTANCE = -1
@@ -101,6 +102,9 @@ class Frame:
     intensity : (n,) float32, 0 to 1
     instance : (n,) int32
         Road user that returned it, `STATIC_INSTANCE` for none.
+    foreground : (n,) bool
+        Whether it is nearer than the range of the same ray in the empty scene, by more than the noise: what a sensor
+        that knows the background of its site keeps.
     """
 
     time: float
@@ -109,6 +113,7 @@ class Frame:
     delay: NDArray[np.float32]
     intensity: NDArray[np.float32]
     instance: NDArray[np.int32]
+    foreground: Boolean
     labels: Labels
 
     def __len__(self) -> int:

@@ -132,6 +132,8 @@ class Scan:
     ----------
     distance : (r,) float64, metres
         Infinite on a miss.
+    empty : (r,) float64, metres
+        The distance without traffic.
     intensity : (r,) float64, 0 to 1
     chance : (r,) float32
         That the ray's return is not lost.
@@ -144,6 +146,7 @@ class Scan:
     """
 
     distance: Float
+    empty: Float
     intensity: Float
     chance: NDArray[np.float32]
     instance: NDArray[np.int32]
@@ -230,7 +233,7 @@ class Scanner:
             intensity[ray] = self._model.law.intensity(hits.distance[nearest], hits.reflected[nearest])
             instance[ray] = motion.user
         visible = returns_by_user(instance[self.in_range(distance) & (instance != STATIC_INSTANCE)], users)
-        return Scan(distance, intensity, chance, instance, unoccluded, visible)
+        return Scan(distance, self._distance, intensity, chance, instance, unoccluded, visible)
 
     def in_range(self, distance: Float) -> Boolean:
         """Return which distances the sensor can measure."""

@@ -232,6 +232,9 @@ def frame_times(
     return start + np.arange(math.floor(duration * rate + _TIME_TOLERANCE) + 1) / rate
 
 
+FOREGROUND_SIGMAS, FOREGROUND_MARGIN = 3.0, 0.05
+"""By how many standard deviations of the range noise, and metres, foreground is nearer than the background."""
+
 _TIME_TOLERANCE = 1e-6
 """Seconds, and shares of a frame, by which times may be off for being decimal fractions."""
 
@@ -246,6 +249,7 @@ def _returns(
         measured = scan.distance[ray]
     else:
         ray, measured = measured_returns(sensor.model, scan.distance, scan.chance, random)
+    noise = sensor.model.range_noise(measured) if random is not None else 0.0
     points = scanner.coarse_directions.take(ray, axis=0)
     points *= measured.astype(np.float32)[:, None]
     points += sensor.xyz.astype(np.float32)
@@ -256,4 +260,5 @@ def _returns(
         "delay": delay.astype(np.float32),
         "intensity": scan.intensity[ray].astype(np.float32),
         "instance": scan.instance[ray],
+        "foreground": measured + FOREGROUND_SIGMAS * noise + FOREGROUND_MARGIN < scan.empty[ray],
     }
