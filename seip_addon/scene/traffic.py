@@ -310,10 +310,10 @@ def _shape(root: bpy.types.Object) -> tuple[float, float, float, float]:
     values = given.to_list() if hasattr(given, "to_list") else [given]
     if not is_shape(values):
         raise SeipError(
-            f"object {root.name!r} has {str(values)[:80]} as its custom property {contract.SHAPE!r}: set it to four numbers "
-            f"whose first two and last two add up to {MAX_BEND:g} at most, or remove it"
+            f"object {root.name!r} has {str(values)[:80]} as its custom property {contract.SHAPE!r}: set it to four "
+            f"numbers whose first two and last two add up to {MAX_BEND:g} at most, or remove it"
         )
-    return tuple(values)  # type: ignore[return-value]  # four numbers
+    return tuple(values)
 
 
 def _motion(run: _Run, box: Float, rate: float) -> tuple[Float, ...]:
