@@ -99,8 +99,16 @@ def varied(trajectories: Trajectories, seed: int) -> Generator[Progress, None, T
     """
     random = _generator(seed)
     drawn = [_size_within_kinds(user, random) for user in trajectories.users]
-    shaped = tuple(replace(user, shape=draw_shape(user.category, random)) for user in trajectories.users)
-    return (yield from _with_sizes(replace(trajectories, users=shaped), np.array(drawn)))
+    return (yield from _with_sizes(shaped(trajectories, seed), np.array(drawn)))
+
+
+def shaped(trajectories: Trajectories, seed: int) -> Trajectories:
+    """Give each road user a shape of its own, and leave its size."""
+    random = _generator(seed, 1)
+    return replace(
+        trajectories,
+        users=tuple(replace(user, shape=draw_shape(user.category, random)) for user in trajectories.users),
+    )
 
 
 def resized(trajectories: Trajectories, change: float, seed: int) -> Generator[Progress, None, Trajectories]:
@@ -180,10 +188,10 @@ def _size(user: RoadUser) -> tuple[float, float, float]:
     return user.length, user.width, user.height
 
 
-def _generator(seed: int) -> np.random.Generator:
+def _generator(seed: int, stream: int = 0) -> np.random.Generator:
     if seed < 0:
         raise SeipError(f"a seed of bodies is a whole number of 0 or more, not {seed}")
-    return np.random.default_rng([seed, _STREAM])
+    return np.random.default_rng([seed, _STREAM, stream])
 
 
 _STREAM = 0x626F6479  # keeps these draws apart from others of the same seed
