@@ -15,6 +15,7 @@ VERBS = {
     "in-traffic": "choose sensors for a road full of traffic",
     "traffic": "put traffic on the road, recorded or simulated by SUMO",
     "simulate": "scan traffic with the sensors of a scene",
+    "generate-sites": "generate random sites with traffic, to train detectors on",
     "evaluate": "average precision of types × numbers",
     "train": "train and test one detector",
     "detect": "judge a placement by what a detector finds with its sensors",

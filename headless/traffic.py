@@ -12,8 +12,6 @@ or as plain Python on the bpy module::
 import argparse
 import math
 import sys
-import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 if not __package__:  # run as a file by `blender -P`
@@ -22,26 +20,15 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime
 from headless.options import new_parser
 from headless.sumo.demand import Demand
-from headless.sumo.simulation import Scenario, SignalPlan, simulate
+from headless.sumo.simulation import Scenario, SignalPlan
+from headless.sumo.traffic_run import simulate_run
 
 import bpy
-import numpy as np
 
-from seip_addon.core.errors import SeipError
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.traffic import Trajectories
-from seip_addon.core.traffic.floating_car_data import Extent, listed
-from seip_addon.core.traffic.overlaps import without_overlaps
-from seip_addon.core.traffic.road_fit import fit_to_road
-from seip_addon.core.traffic.smooth_walks import smooth_walks
-from seip_addon.core.traffic.source import (
-    ROAD_MARGIN,
-    TrafficFiles,
-    describe_categories,
-    load_traffic,
-    read_sumo,
-    road_bounds,
-)
+from seip_addon.core.traffic.floating_car_data import listed
+from seip_addon.core.traffic.source import TrafficFiles, describe_categories, load_traffic
 from seip_addon.scene.blend_file import check_name, save_blend
 from seip_addon.scene.read import read_scene
 from seip_addon.scene.traffic import animate
@@ -70,26 +57,17 @@ def _imported(options: argparse.Namespace, geometry: SceneGeometry) -> Trajector
 
 
 def _simulated(options: argparse.Namespace, geometry: SceneGeometry) -> Trajectories:
-    if not 0.0 <= options.warm_up < math.inf or not 0.0 < options.duration < math.inf:
-        raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
     demand = Demand(options.flow, tuple(options.turns), options.pedestrians)
     end = options.warm_up + options.duration
     scenario = Scenario(demand, SignalPlan(options.green), options.seed, end)
-    with tempfile.TemporaryDirectory() as folder:
-        steps = simulate(options.simulate, Path(folder), scenario, road_bounds(geometry, 0.0))
-        files = runtime.finish_with_bar(steps)
-        source = f"SUMO on {options.simulate.name}, {options.flow:g} vehicles per hour and arm, seed {options.seed}"
-        window = Extent(options.warm_up, end, road_bounds(geometry, ROAD_MARGIN))
-        read = runtime.finish_with_bar(read_sumo(files, window, geometry, source))
-    fit = fit_to_road(smooth_walks(read.trajectories), geometry)
-    runtime.warn((*read.warnings, *fit.warnings))
-    simulated = fit.trajectories
-    apart, collided = runtime.finish_with_bar(without_overlaps(simulated))
-    if collided:
+    run = runtime.finish_with_bar(simulate_run(options.simulate, scenario, options.warm_up, geometry))
+    runtime.warn(run.warnings)
+    if run.collided:
         runtime.LOG.info(
-            f"{len(collided)} of {len(simulated)} road users ran into others and are left out: {listed(collided)}"
+            f"{len(run.collided)} of {run.simulated} road users ran into others and are left out: "
+            f"{listed(run.collided)}"
         )
-    return replace(apart, time=np.round(apart.time - options.warm_up, 3))
+    return run.trajectories
 
 
 def _in_words(trajectories: Trajectories) -> str:

@@ -1,14 +1,16 @@
 """Traffic demand, departures and routes of vehicles and pedestrians, as a route file for SUMO."""
 
+import math
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.storage.files import whole_file
+from seip_addon.core.traffic.varied_bodies import draw_size
 
 from .street_network import DRIVING, PARKED_CLASS, PARKING, WALKING, NetworkEdge, NetworkLane, StreetNetwork
 
@@ -17,6 +19,7 @@ _MAX_WALK = 150.0  # metres in plan from one pavement to another
 _MIN_PAVEMENT = 20.0  # metres; on a shorter one nobody sets out
 _DELIVERY_SHARE = 0.35  # of the vans and trucks; they stop once on their way
 _STOP_SECONDS = (20.0, 60.0)  # seconds
+_PARKED_GAP = 0.5  # metres between parked cars at least
 _BAY_LENGTH = 6.5  # metres of kerb for a parked car
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
 _CARS_AT_KERB = 3  # cars at the kerb of a street without parking lane
@@ -91,11 +94,20 @@ class Demand:
         Shares that turn left, go straight on and turn right, where a junction offers that.
     pedestrians : float, persons per hour
         That set out for each arm of the network.
+    shares : mapping of str to float
+        Shares of the vehicles by category.
+    own_sizes : bool
+        Whether each road user has a size of its own, drawn as `varied_bodies` draws it, in place of a model's.
+    kerbside : (int, float)
+        Where no street has parking lanes: cars of a row at the kerb at most, and share of the streets with room for one.
     """
 
     flow: float = 600.0
     turns: tuple[float, float, float] = (0.2, 0.6, 0.2)
     pedestrians: float = 200.0
+    shares: Mapping[str, float] = field(default_factory=VEHICLE_SHARES.copy)
+    own_sizes: bool = False
+    kerbside: tuple[int, float] = (_CARS_AT_KERB, 0.5)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.flow <= 3000.0:
@@ -104,6 +116,8 @@ class Demand:
             raise SeipError(f"--pedestrians must be 0 to 3000 per hour and arm, not {self.pedestrians:g}")
         if min(self.turns) < 0.0 or not 0.0 < sum(self.turns) < np.inf:
             raise SeipError(f"--turns must be three shares of which one is above 0, not {self.turns}")
+        if not self.shares.keys() <= MODELS.keys() or min(self.shares.values()) < 0.0 or not sum(self.shares.values()):
+            raise SeipError(f"shares of vehicles are of {', '.join(VEHICLE_SHARES)}, and one is above 0: {self.shares}")
 
 
 def write_routes(
@@ -122,35 +136,63 @@ def write_routes(
             "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
         )
     random = np.random.default_rng([seed, 0])
-    bays = _bays(network, random)
+    bays = _bays(network, demand.kerbside, random)
     entries = list(_parked(bays, random))
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
         random = np.random.default_rng([seed, 1, number])
         for depart in _departures(demand.flow, random, duration):
             route = _route(network, arm, demand.turns, random)
-            entries.append(_vehicle(f"{arm.id}.{len(entries)}", depart, route, free, random))
+            entries.append(_vehicle(f"{arm.id}.{len(entries)}", depart, route, demand.shares, free, random))
     entries += _walkers(network, demand.pedestrians * len(arms), np.random.default_rng([seed, 2]), duration)
     entries.sort(key=lambda entry: entry.depart)
-    lines = ["<routes>", *_type_lines(), *(entry.text for entry in entries), "</routes>"]
+    own = _own_type_lines(entries, np.random.default_rng([seed, 3])) if demand.own_sizes else ()
+    texts = (entry.text.format(type=entry.name if demand.own_sizes else entry.type) for entry in entries)
+    lines = ["<routes>", *_type_lines(), *own, *texts, "</routes>"]
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 class _Departure(NamedTuple):
-    """An element of the route file and when it departs, seconds."""
+    """An element of the route file: when it departs (seconds), its id, its type, and its text without that."""
 
     depart: float
+    name: str
+    type: str
     text: str
 
 
 def _type_lines() -> Iterator[str]:
     for models in MODELS.values():
         for name, model in models.items():
-            stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
-            yield _type_line(name, model.v_class, model, stop)
+            yield _driven_type(name, model)
             if model.v_class in ("passenger", "delivery"):
-                yield _type_line(f"parked_{name}", PARKED_CLASS, model, ' minGap="0.5"')
+                yield _parked_type(f"{_PARKED}{name}", model)
+
+
+_PARKED = "parked_"  # begins the types of parked vehicles
+
+
+def _own_type_lines(entries: list[_Departure], random: np.random.Generator) -> Iterator[str]:
+    """Yield a type for each road user, with its own size; what is parked fits into its bay."""
+    known = {name: (category, model) for category, models in MODELS.items() for name, model in models.items()}
+    for entry in entries:
+        parked = entry.type.startswith(_PARKED)
+        category, model = known[entry.type.removeprefix(_PARKED)]
+        size = draw_size(category, random)
+        while parked and size[0] > _BAY_LENGTH - _PARKED_GAP:
+            size = draw_size(category, random)
+        own = model._replace(length=size[0], width=size[1], height=size[2])
+        yield _parked_type(entry.name, own) if parked else _driven_type(entry.name, own)
+
+
+def _driven_type(name: str, model: RoadUserModel) -> str:
+    stop = "" if model.v_class == "pedestrian" else ' jmStoplineGap="1.5" lcKeepRight="0"'
+    return _type_line(name, model.v_class, model, stop)
+
+
+def _parked_type(name: str, model: RoadUserModel) -> str:
+    return _type_line(name, PARKED_CLASS, model, f' minGap="{_PARKED_GAP}"')
 
 
 def _type_line(name: str, v_class: str, model: RoadUserModel, more: str) -> str:
@@ -177,16 +219,23 @@ def _departures(rate: float, random: np.random.Generator, duration: float) -> It
 
 
 def _vehicle(
-    number: str, depart: float, route: list[NetworkEdge], free: set[str], random: np.random.Generator
+    number: str,
+    depart: float,
+    route: list[NetworkEdge],
+    share_of: Mapping[str, float],
+    free: set[str],
+    random: np.random.Generator,
 ) -> _Departure:
-    categories, shares = list(VEHICLE_SHARES), np.array(list(VEHICLE_SHARES.values()))
+    categories, shares = list(share_of), np.array(list(share_of.values()))
     category = str(random.choice(categories, p=shares / shares.sum()))
     delivers = category in {"van", "truck"} and random.random() < _DELIVERY_SHARE
     stop = _delivery([edge for edge in route if edge.id in free], random) if delivers else ""
     edges = " ".join(edge.id for edge in route)
     return _Departure(
         depart,
-        f'<vehicle id="{category}-{number}" type="{_pick(MODELS[category], random)}" depart="{depart}" '
+        f"{category}-{number}",
+        _pick(MODELS[category], random),
+        f'<vehicle id="{category}-{number}" type="{{type}}" depart="{depart}" '
         f'departLane="best" departSpeed="max"><route edges="{edges}"/>{stop}</vehicle>',
     )
 
@@ -217,10 +266,17 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
     return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP_SECONDS):.0f}"/>'
 
 
-def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[NetworkEdge, NetworkLane, float]]:
+def _bays(
+    network: StreetNetwork, kerbside: tuple[int, float], random: np.random.Generator
+) -> list[tuple[NetworkEdge, NetworkLane, float]]:
     """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
 
-    A row stands in the outer of several lanes of every second street on which vehicles leave the network.
+    A row stands in the outer of several lanes of some of the streets on which vehicles leave the network.
+
+    Parameters
+    ----------
+    kerbside : (int, float)
+        Cars of a row, and share of the streets that have one.
     """
     bays = [
         (edge, lane, float(place))
@@ -229,26 +285,28 @@ def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[Net
         for place in np.arange(_BAY_LENGTH + 2.0, lane.length - 2.0, _BAY_LENGTH)
         if random.random() < _OCCUPIED_SHARE
     ]
-    return bays or list(_rows(network, random))
+    return bays or list(_rows(network, *kerbside, random))
 
 
 def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.random.Generator) -> Iterator[_Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
     for number, (edge, lane, place) in enumerate(bays):
         text = (
-            f'<vehicle id="parked-{number}" type="parked_{_pick(models, random)}" depart="0" departLane="{lane.index}" '
+            f'<vehicle id="parked-{number}" type="{{type}}" depart="0" departLane="{lane.index}" '
             f'departPos="{place:.1f}" departSpeed="0"><route edges="{edge.id}"/>'
             f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
         )
-        yield _Departure(0.0, text)
+        yield _Departure(0.0, f"parked-{number}", f"{_PARKED}{_pick(models, random)}", text)
 
 
-def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
+def _rows(
+    network: StreetNetwork, cars: int, share: float, random: np.random.Generator
+) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
-    for index in sorted(random.permutation(len(exits))[: (len(exits) + 1) // 2].tolist()):
+    for index in sorted(random.permutation(len(exits))[: math.ceil(share * len(exits))].tolist()):
         lane = exits[index].of(DRIVING)[0]
         first = _FIRST_BAY + float(random.uniform(0.0, _BAY_LENGTH))
-        for place in first + _BAY_LENGTH * np.arange(_CARS_AT_KERB):
+        for place in first + _BAY_LENGTH * np.arange(cars):
             if place < lane.length - _BAY_LENGTH:
                 yield exits[index], lane, float(place)
 
@@ -272,6 +330,8 @@ def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, d
         begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
         yield _Departure(
             depart,
-            f'<person id="pedestrian-{number}" type="{_pick(MODELS["pedestrian"], random)}" depart="{depart}" '
+            f"pedestrian-{number}",
+            _pick(MODELS["pedestrian"], random),
+            f'<person id="pedestrian-{number}" type="{{type}}" depart="{depart}" '
             f'departPos="{begin:.1f}"><walk from="{origin.id}" to="{target.id}" arrivalPos="{end:.1f}"/></person>',
         )

@@ -43,6 +43,7 @@ HEADER_OFFSET = "seip_header_offset"
 PLACES = "seip_places"
 CATEGORY = "seip_category"
 PAINT = "seip_paint"
+SHAPE = "seip_shape"
 
 NUMBER = re.compile(r"\.\d{3,}$")
 

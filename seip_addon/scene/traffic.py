@@ -15,7 +15,7 @@ from ..core.errors import SeipError
 from ..core.progress import Progress
 from ..core.streetscape.street_furniture import Solid
 from ..core.traffic.bodies import Body, colour_of, fitted_body
-from ..core.traffic.trajectories import CATEGORIES, RoadUser, Trajectories
+from ..core.traffic.trajectories import CATEGORIES, MAX_BEND, RoadUser, Trajectories, is_shape
 from . import contract
 from .meshes import mesh_of
 from .read import origin_of
@@ -32,8 +32,8 @@ ROUNDED_TO = 4  # decimals of a size in metres: Blender's coordinates are single
 def animate(scene: bpy.types.Scene, trajectories: Trajectories) -> tuple[bpy.types.Object, ...]:
     """Put road users into the scene as animated objects, in place of those of an earlier call.
 
-    They stand in the collection ``SEIP Traffic``; those of one category, size
-    and colour share a mesh. Time 0 is frame 0 at the scene's own frame rate;
+    They stand in the collection ``SEIP Traffic``; those of one category, size,
+    shape and colour share a mesh. Time 0 is frame 0 at the scene's own frame rate;
     every sample is a keyframe where it falls, between two frames as well, with
     straight lines from one to the next. Before its first and after its last
     sample a road user is hidden. The scene's frame range becomes the
@@ -175,7 +175,7 @@ def _show_span(scene: bpy.types.Scene, frames: Float) -> None:
 
 def _shared_mesh(meshes: dict[tuple[object, ...], bpy.types.Mesh], user: RoadUser, body: Body) -> bpy.types.Mesh:
     """Return the mesh of a body, made where no road user before has had it."""
-    shape = (user.category, user.length, user.width, user.height, colour_of(user.paint))
+    shape = (user.category, user.length, user.width, user.height, colour_of(user.paint), user.shape)
     if shape not in meshes:
         vertices, corners = np.unique(body.triangles.reshape(-1, 3), axis=0, return_inverse=True)
         faces = tuple(map(tuple, corners.reshape(-1, 3).tolist()))
@@ -190,6 +190,8 @@ def _road_user(user: RoadUser, mesh: bpy.types.Mesh) -> bpy.types.Object:
     obj[MARK] = True
     obj[contract.CATEGORY] = user.category
     obj[contract.PAINT] = user.paint
+    if any(user.shape):
+        obj[contract.SHAPE] = user.shape
     return obj
 
 
@@ -297,7 +299,21 @@ def _rotation(matrix: Float) -> Float:
 def _described(root: bpy.types.Object, category: str, box: Float, number: int) -> RoadUser:
     length, width, height = np.round(box[1] - box[0], ROUNDED_TO).tolist()
     name = root.name if number == 1 else f"{root.name} ({number})"
-    return RoadUser(name, category, length, width, height, float(root.get(contract.PAINT, RoadUser.paint)))
+    paint = float(root.get(contract.PAINT, RoadUser.paint))
+    return RoadUser(name, category, length, width, height, paint, _shape(root))
+
+
+def _shape(root: bpy.types.Object) -> tuple[float, float, float, float]:
+    given = root.get(contract.SHAPE)
+    if given is None:
+        return RoadUser.shape
+    values = given.to_list() if hasattr(given, "to_list") else [given]
+    if not is_shape(values):
+        raise SeipError(
+            f"object {root.name!r} has {str(values)[:80]} as its custom property {contract.SHAPE!r}: set it to four "
+            f"numbers whose first two and last two add up to {MAX_BEND:g} at most, or remove it"
+        )
+    return tuple(values)
 
 
 def _motion(run: _Run, box: Float, rate: float) -> tuple[Float, ...]:

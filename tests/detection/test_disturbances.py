@@ -14,6 +14,7 @@ from headless.lab.detector.disturbances import (
     ClockOffset,
     Disturbance,
     DropOff,
+    OtherSizes,
     PositionError,
     Rain,
     RangeNoise,
@@ -32,7 +33,7 @@ from seip_addon.core.progress import finish
 from seip_addon.core.scans import ScanSettings, prepare
 from seip_addon.core.traffic.bodies import fitted_body
 
-ALL = (RangeNoise, DropOff, Rain, PositionError, YawError, TiltError, ClockOffset, Thinned)
+ALL = (RangeNoise, DropOff, Rain, PositionError, YawError, TiltError, ClockOffset, Thinned, OtherSizes)
 TIME = 1.0
 
 
@@ -178,6 +179,16 @@ def test_thinner_traffic_leaves_whole_road_users_out():
     assert len(left.time) == left.first[-1] == 2 * len(left)
     assert {user.name for user in Thinned(0.6).disturbed_traffic(many).users} < {user.name for user in left.users}
     np.testing.assert_array_equal(left.at(1.0).position, many.at(1.0).position[: len(left)])
+
+
+def test_other_sizes_keep_the_motion_and_the_look():
+    _, trajectories = road()
+    other = OtherSizes(0.15).disturbed_traffic(trajectories)
+    np.testing.assert_array_equal(other.position, trajectories.position)
+    for user, own in zip(other.users, trajectories.users, strict=True):
+        assert (user.name, user.category, user.paint) == (own.name, own.category, own.paint)
+        assert 0.849 <= user.length / own.length <= 1.151
+    assert [user.length for user in other.users] != [user.length for user in trajectories.users]
 
 
 def test_a_capped_detector_has_the_same_weights():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -121,6 +123,26 @@ def test_objects_have_bodies_names_and_properties(scene):
         assert slots == [f"SEIP {name}" for name in body.material.tolist()]
         assert obj["seip_category"] == user.category
         assert obj["seip_paint"] == user.paint
+
+
+def test_shapes_come_back_from_a_scene(scene):
+    trajectories = traffic()
+    shape = (0.2, -0.1, 0.05, 0.0)
+    bent = replace(trajectories, users=(replace(trajectories.users[0], shape=shape), *trajectories.users[1:]))
+    objects = animate(scene, bent)
+    assert np.allclose(
+        np.sort([v.co.x for v in objects[0].data.vertices]),
+        np.sort(np.unique(fitted_body(bent.users[0]).triangles.reshape(-1, 3), axis=0)[:, 0]),
+        atol=1e-5,
+    )
+    objects[0]["seip_shape"] = shape
+    assert [user.shape for user in finish(read_traffic(scene)).users[:2]] == [shape, (0.0, 0.0, 0.0, 0.0)]
+    objects[0]["seip_shape"] = (0.5, 0.5, 0.0, 0.0)
+    with pytest.raises(SeipError, match="as its custom property 'seip_shape': set it to four numbers"):
+        finish(read_traffic(scene))
+    objects[0]["seip_shape"] = "long"
+    with pytest.raises(SeipError, match="as its custom property 'seip_shape'"):
+        finish(read_traffic(scene))
 
 
 def test_every_material_of_every_body_has_a_colour():

@@ -20,9 +20,11 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.lidar import LidarModel
+from seip_addon.core.progress import finish
 from seip_addon.core.scans import Frame, MountedSensor, Simulation
 from seip_addon.core.scans.frame import STATIC_INSTANCE
 from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.varied_bodies import resized
 
 ERROR_AXIS = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
 """Unit vector of position and tilt errors, along no street."""
@@ -265,6 +267,19 @@ class Thinned(Disturbance):
             first=np.concatenate([[0], np.cumsum(counts[stays])]).astype(np.int64),
             **{name: getattr(trajectories, name)[samples] for name in ("time", "position", "yaw", "pitch", "speed")},
         )
+
+
+@dataclass(frozen=True)
+class OtherSizes(Disturbance):
+    """Every dimension of every road user is another, by a share of its own up to this, and its clouds with it."""
+
+    seed: int = 0
+    name: ClassVar[str] = "other sizes"
+    unit: ClassVar[str] = "of each dimension at most"
+
+    def disturbed_traffic(self, trajectories: Trajectories) -> Trajectories:
+        """Return the same motion of road users of other sizes."""
+        return finish(resized(trajectories, self.size, self.seed))
 
 
 @dataclass(frozen=True)

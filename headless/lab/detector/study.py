@@ -30,6 +30,7 @@ from .disturbances import (
     ClockOffset,
     Disturbance,
     DropOff,
+    OtherSizes,
     PositionError,
     Rain,
     RangeNoise,
@@ -61,6 +62,7 @@ def full_series(sensor: int) -> tuple[Series, ...]:
         tuple(TiltError(size, sensor) for size in (0.1, 0.2, 0.5, 1.0, 2.0)),
         tuple(ClockOffset(size, sensor) for size in (0.02, 0.05, 0.1, 0.2, 0.4)),
         tuple(Thinned(size) for size in (0.25, 0.5, 0.75)),
+        tuple(OtherSizes(size) for size in (0.05, 0.15)),
         tuple(CappedPillars(size) for size in (8.0, 4.0, 2.0, 1.0)),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Float, Text
 from ..errors import SeipError
-from .trajectories import CATEGORIES, RoadUser
+from .trajectories import CATEGORIES, RoadUser, bent
 
 MESHES = Path(__file__).parent / "body_meshes"
 """Wavefront OBJ files, ``CATEGORY.obj`` or ``CATEGORY.MODEL.obj``; the README there says what they may hold."""
@@ -34,6 +34,8 @@ PAINT_COLOURS = (
     (1.00, "white"),
 )
 """Up to which reflectivity paint and clothes are shown in which colour."""
+
+KEPT_BODIES = 4096  # bodies that memory keeps for road users of one size, shape and paint
 
 PAINTED_MATERIALS = ("paint", "cloth")  # have the road user's reflectivity; in a body a colour follows: ``paint red``
 
@@ -65,8 +67,8 @@ class Body:
 def fitted_body(user: RoadUser) -> Body:
     """Return the body of a road user, whose bounding box is exactly its length × width × height.
 
-    Road users of one category, size and paint get the same object, and those
-    of one category and size the same array of triangles.
+    Road users of one category, size, shape and paint get the same object, and
+    those of one category, size and shape the same array of triangles.
 
     Raises
     ------
@@ -83,7 +85,7 @@ def fitted_body(user: RoadUser) -> Body:
             f"road user {user.name!r} is {' × '.join(f'{side:g}' for side in size)} m large; "
             "give its type a length, width and height above zero"
         )
-    return _painted(user.category, *size, user.paint)
+    return _painted(user.category, size, user.shape, user.paint)
 
 
 def colour_of(paint: float) -> str:
@@ -91,9 +93,9 @@ def colour_of(paint: float) -> str:
     return next((name for limit, name in PAINT_COLOURS if paint <= limit), PAINT_COLOURS[-1][1])
 
 
-@functools.cache
-def _painted(category: str, length: float, width: float, height: float, paint: float) -> Body:
-    triangles, material = _stretched(category, length, width, height)
+@functools.lru_cache(KEPT_BODIES)
+def _painted(category: str, size: tuple[float, ...], shape: tuple[float, ...], paint: float) -> Body:
+    triangles, material = _shaped(category, size, shape)
     painted = np.isin(material, PAINTED_MATERIALS)
     reflectivity = np.array([paint if own else REFLECTIVITY[name] for name, own in zip(material, painted, strict=True)])
     named = np.where(painted, np.char.add(material, f" {colour_of(paint)}"), material)
@@ -102,18 +104,20 @@ def _painted(category: str, length: float, width: float, height: float, paint: f
     return Body(triangles, reflectivity, named)
 
 
-@functools.cache
-def _stretched(category: str, length: float, width: float, height: float) -> tuple[Float, Text]:
-    """Return the mesh of the model nearest in size, stretched to a size over the middle of its underside.
+@functools.lru_cache(KEPT_BODIES)
+def _shaped(category: str, size: tuple[float, ...], shape: tuple[float, ...]) -> tuple[Float, Text]:
+    """Return the mesh of the model nearest in size, bent to a shape and stretched over the middle of its underside.
 
     The nearest is that whose length, width and height have to be stretched least, by the sum of squared logarithms.
     """
-    size = np.array([length, width, height])
     triangles, material = min(
         _models(category), key=lambda model: float((np.log(size / np.ptp(model[0], axis=(0, 1))) ** 2).sum())
     )
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     share = (triangles - low) / (high - low)
+    if any(shape):
+        share[..., 0] = bent(share[..., 0], *shape[:2])
+        share[..., 2] = bent(share[..., 2], *shape[2:])
     stretched: Float = (share - [0.5, 0.5, 0.0]) * size
     stretched.flags.writeable = False
     return stretched, material

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from ..storage.files import digest
 
 MAX_USER_SIZE = 100.0  # metres of length, width or height of a road user at most
 MAX_DURATION = 30.0 * 86400.0  # seconds from the first sample of trajectories to the last at most: 30 days
+MAX_BEND = 0.6  # of the lines of a body along one axis
 MAX_EXTENT = 1e6  # metres from one sample to another at most, along each axis
 
 _ARRAYS = {
@@ -46,6 +49,9 @@ class RoadUser:
     length, width, height : float, metres
     paint : float, 0 to 1
         Reflectivity of its painted parts, or of its clothes.
+    shape : (4,) float
+        How the lines of its body differ from those of its model: see `bent`. First two for the length, then two for
+        the height; the absolute values of each two add up to `MAX_BEND` at most.
     """
 
     name: str
@@ -54,6 +60,24 @@ class RoadUser:
     width: float
     height: float
     paint: float = 0.5
+    shape: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+def bent(share: Float, shift: float, spread: float) -> Float:
+    """Return shares, 0 to 1, of a length moved along it: a cubic that keeps both ends and the order of all.
+
+    Its slope is 1 − |shift| − |spread| at least.
+
+    Parameters
+    ----------
+    shift : float
+        Moves all shares forward, the middle by a quarter of this.
+    spread : float
+        Moves shares below the middle back and those above it forward.
+    """
+    middle = 2.0 * share - 1.0
+    moved: Float = share + share * (1.0 - share) * (shift + spread * middle)
+    return moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +148,7 @@ class Trajectories:
     @cached_property
     def key(self) -> str:
         """Digest of who moves how, whatever the road users and the source are called."""
-        sizes = [(user.category, user.length, user.width, user.height, user.paint) for user in self.users]
+        sizes = [_look(user) for user in self.users]
         return digest(repr(sizes), self.first, self.time, self.position, self.yaw, self.pitch, self.speed)
 
     @property
@@ -175,7 +199,7 @@ class Trajectories:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectories as npz: the arrays by their names, and the text ``header`` (JSON)."""
-        header = {"source": self.source, "users": [asdict(user) for user in self.users]}
+        header = {"source": self.source, "users": [_as_record(user) for user in self.users]}
         FILE.save(path, header, {name: getattr(self, name) for name in _ARRAYS})
 
     @classmethod
@@ -188,7 +212,7 @@ class Trajectories:
             The file is not there, damaged, or something else.
         """
         with FILE.reading(path) as (header, arrays):
-            users = tuple(RoadUser(**user) for user in header["users"])
+            users = tuple(_from_record(user) for user in header["users"])
             read = cls(users=users, source=str(header["source"]), **{name: arrays[name] for name in _ARRAYS})
             _check_users(users)
             _check_samples(read)
@@ -203,6 +227,24 @@ class LoadedTraffic:
     warnings: tuple[str, ...]
 
 
+def _look(user: RoadUser) -> tuple[object, ...]:
+    """Return what a road user looks like, its shape where that is not its model's own."""
+    look = (user.category, user.length, user.width, user.height, user.paint)
+    return (*look, user.shape) if any(user.shape) else look
+
+
+def _as_record(user: RoadUser) -> dict[str, Any]:
+    """Return a road user for a header; its shape where that is not its model's own."""
+    record = asdict(user)
+    if not any(user.shape):
+        del record["shape"]
+    return record
+
+
+def _from_record(record: dict[str, Any]) -> RoadUser:
+    return RoadUser(**{**record, "shape": tuple(record.get("shape", RoadUser.shape))})
+
+
 def _check_users(users: tuple[RoadUser, ...]) -> None:
     """Raise `ContentError` where a road user is none."""
     for user in users:
@@ -213,6 +255,14 @@ def _check_users(users: tuple[RoadUser, ...]) -> None:
             raise ContentError(f"road user {user.name[:40]!r} is {str(sizes)[:80]} m large")
         if not (isinstance(user.paint, int | float) and 0.0 <= user.paint <= 1.0):
             raise ContentError(f"the paint of road user {user.name[:40]!r} reflects {str(user.paint)[:40]}")
+        if not is_shape(user.shape):
+            raise ContentError(f"the shape of road user {user.name[:40]!r} is {str(user.shape)[:80]}")
+
+
+def is_shape(values: Sequence[object]) -> bool:
+    """Return whether values are a shape of a road user."""
+    bends = [abs(value) for value in values if isinstance(value, int | float)]
+    return len(bends) == len(values) == 4 and sum(bends[:2]) <= MAX_BEND and sum(bends[2:]) <= MAX_BEND
 
 
 def _check_samples(read: Trajectories) -> None:

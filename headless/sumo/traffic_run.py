@@ -1,0 +1,75 @@
+"""A run of simulated traffic on the road of a scene."""
+
+import math
+import tempfile
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.traffic.floating_car_data import Extent
+from seip_addon.core.traffic.overlaps import without_overlaps
+from seip_addon.core.traffic.road_fit import fit_to_road
+from seip_addon.core.traffic.smooth_walks import smooth_walks
+from seip_addon.core.traffic.source import ROAD_MARGIN, read_sumo, road_bounds
+
+from .simulation import Scenario, simulate
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRun:
+    """A run of traffic: its trajectories from time 0 on, and how it was made.
+
+    Parameters
+    ----------
+    simulated : int
+        Number of road users before those that ran into others were left out.
+    collided : tuple of str
+        Names of those.
+    warnings : tuple of str
+    """
+
+    trajectories: Trajectories
+    simulated: int
+    collided: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def simulate_run(
+    map_path: Path, scenario: Scenario, warm_up: float, geometry: SceneGeometry
+) -> Generator[Progress, None, SimulatedRun]:
+    """Simulate traffic on a scene's map and fit it to the road of the scene.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its duration includes the warm-up.
+    warm_up : float, seconds
+        What is simulated before the run begins.
+
+    Raises
+    ------
+    SeipError
+        The times are none, SUMO is missing or refuses the map, or nobody is on the road.
+    """
+    if not 0.0 <= warm_up < math.inf or not warm_up < scenario.duration < math.inf:
+        raise SeipError("--duration must be above 0 s, and --warm-up not below 0 s")
+    demand = scenario.demand
+    with tempfile.TemporaryDirectory() as folder:
+        files = yield from simulate(map_path, Path(folder), scenario, road_bounds(geometry, 0.0))
+        source = f"SUMO on {map_path.name}, {demand.flow:g} vehicles per hour and arm, seed {scenario.seed}"
+        window = Extent(warm_up, scenario.duration, road_bounds(geometry, ROAD_MARGIN))
+        read = yield from read_sumo(files, window, geometry, source)
+    fit = fit_to_road(smooth_walks(read.trajectories), geometry)
+    apart, collided = yield from without_overlaps(fit.trajectories)
+    return SimulatedRun(
+        trajectories=replace(apart, time=np.round(apart.time - warm_up, 3)),
+        simulated=len(fit.trajectories),
+        collided=collided,
+        warnings=(*read.warnings, *fit.warnings),
+    )

@@ -1,0 +1,42 @@
+"""Traffic of a training site: volumes, mix and signals drawn anew for each run."""
+
+from headless.sumo.demand import VEHICLE_SHARES, Demand
+from headless.sumo.simulation import SignalPlan
+
+import numpy as np
+
+from .street_plan import StreetPlan
+
+Random = np.random.Generator
+
+FLOW = {1: (300.0, 700.0), 2: (300.0, 950.0), 3: (400.0, 1100.0)}
+"""Vehicles per hour that come in on each arm, at least and at most, by the lanes of the widest."""
+MIX_SPREAD = 0.45  # standard deviation of the logarithm by which each share of the mix differs from the usual
+LEAST_SHARES = {"truck": 0.08, "bus": 0.06, "motorcycle": 0.05, "bicycle": 0.08}  # of vehicles at least
+PEDESTRIANS = (60.0, 260.0)  # persons per hour and arm
+PARKED_ROW = (2, 9)  # cars in a row at the kerb
+
+
+def draw_demand(plan: StreetPlan, random: Random) -> Demand:
+    """Draw the demand of a run."""
+    widest = max(arm.lanes_in for arm in plan.arms)
+    logarithms = MIX_SPREAD * random.standard_normal(len(VEHICLE_SHARES))
+    mix = {
+        name: share * float(np.exp(step))
+        for (name, share), step in zip(VEHICLE_SHARES.items(), logarithms, strict=True)
+    }
+    whole = sum(mix.values())
+    least = {name: max(share / whole, LEAST_SHARES.get(name, 0.0)) for name, share in mix.items()}
+    return Demand(
+        flow=round(float(random.uniform(*FLOW[widest])), 0),
+        turns=tuple(random.dirichlet([4.0, 10.0, 4.0]).round(3).tolist()),
+        pedestrians=round(float(random.uniform(*PEDESTRIANS)), 0),
+        shares={name: round(share / sum(least.values()), 4) for name, share in least.items()},
+        own_sizes=True,
+        kerbside=(int(random.integers(*PARKED_ROW)), float(random.uniform(0.3, 1.0))),
+    )
+
+
+def draw_signals(random: Random) -> SignalPlan:
+    """Draw the plan of the signals of a run."""
+    return SignalPlan(green=int(random.integers(12, 32)))

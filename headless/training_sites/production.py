@@ -1,0 +1,244 @@
+"""Making of training sites: each from its seed to a scene, its map and its runs of traffic."""
+
+import json
+import math
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from headless.sumo.simulation import Scenario
+from headless.sumo.traffic_run import simulate_run
+
+import bpy
+import numpy as np
+
+from seip_addon.core.elevation.at_place import AskedTerrain
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress, within
+from seip_addon.core.results.placement_record import versions
+from seip_addon.core.site.check import check_site
+from seip_addon.core.site.scene_geometry import SceneGeometry
+from seip_addon.core.site.site import Site
+from seip_addon.core.storage.files import digest, save_json
+from seip_addon.core.storage.source_digest import source_digest
+from seip_addon.core.traffic.source import describe_categories
+from seip_addon.core.traffic.sumo_programs import find_sumo
+from seip_addon.core.traffic.varied_bodies import shaped
+from seip_addon.core.workflows.site_building import AskedSite, build_site, save_map
+from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.core.workflows.traffic import traffic_folder
+from seip_addon.scene.blend_file import new_file, save_blend
+from seip_addon.scene.build import build_scene
+from seip_addon.scene.check import contents_of
+
+from .demand_draw import draw_demand, draw_signals
+from .extract_text import LATITUDE, LONGITUDE, write_extract, write_terrain
+from .street_plan import StreetPlan, draw_plan
+
+SCHEMA, VERSION = "seip.training_site", 1
+MAX_ATTEMPTS = 8  # plans that are drawn for a site until one passes the check
+_PLAN, _RUN = 0, 1  # streams of random numbers of a site
+
+
+@dataclass(frozen=True)
+class SiteSettings:
+    """What is asked for of every site.
+
+    Parameters
+    ----------
+    seed : int
+        Of all sites together.
+    runs : int
+        Of traffic, on each site.
+    duration, warm_up : float, seconds
+        Of each run, and of the simulation before it.
+    approaches : float, metres
+        How far the region of interest follows the streets.
+    """
+
+    seed: int = 0
+    runs: int = 4
+    duration: float = 40.0
+    warm_up: float = 80.0
+    approaches: float = 60.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.seed < 2**31:
+            raise SeipError(f"--seed must be a whole number from 0 to {2**31 - 1}, not {self.seed}")
+        if self.runs < 1:
+            raise SeipError(f"ask for one run of traffic or more on each site, not {self.runs}")
+        if not 3.0 <= self.duration <= 3600.0 or not 0.0 <= self.warm_up <= 3600.0:
+            raise SeipError("a run lasts 3 to 3600 s (--duration), after a warm-up of 0 to 3600 s (--warm-up)")
+        if not 30.0 <= self.approaches <= 100.0:
+            raise SeipError(f"the region follows the streets for 30 to 100 m, not {self.approaches:g} (--approaches)")
+
+
+@dataclass(frozen=True, eq=False)
+class MadeSite:
+    """A site that is done.
+
+    Parameters
+    ----------
+    record : mapping
+        Content of its ``site.json``.
+    kept : bool
+        Whether it was there before.
+    """
+
+    folder: Path
+    record: Mapping[str, Any]
+    kept: bool
+
+
+def site_key(settings: SiteSettings, number: int) -> str:
+    """Return a digest of all that a site follows from."""
+    return digest(repr(settings), number, bpy.app.version_string, source_digest(__name__))
+
+
+def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Progress, None, MadeSite]:
+    """Make a site in a folder, or keep the one that is there and was made with the same settings.
+
+    Its files are ``site.osm``, ``site.tif``, ``site.xodr``, ``site.blend``, ``site_traffic/run-*.npz`` and, when all
+    others are there, ``site.json``.
+
+    Raises
+    ------
+    SeipError
+        SUMO is missing, or the folder cannot be written.
+    """
+    find_sumo()
+    record_path = folder / "site.json"
+    key = site_key(settings, number)
+    kept = _finished(record_path, key, settings)
+    if kept is not None:
+        return MadeSite(folder, kept, kept=True)
+    record_path.unlink(missing_ok=True)
+    plan, geometry, attempt = yield from _built(folder, settings, number)
+    runs = []
+    for run in range(1, settings.runs + 1):
+        steps = _run_of_traffic(folder, settings, [number, attempt, run], plan, geometry)
+        runs.append((yield from within(Progress(run, settings.runs + 1, f"run {run}"), steps)))
+    record = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "key": key,
+        "number": number,
+        "settings": asdict(settings),
+        "plan": _plan_record(plan),
+        "runs": runs,
+        "versions": versions(blender=bpy.app.version_string),
+    }
+    save_json(record_path, record)
+    return MadeSite(folder, record, kept=False)
+
+
+def _finished(path: Path, key: str, settings: SiteSettings) -> dict[str, Any] | None:
+    """Return the record of a site that is there with all of its files and has this key."""
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    runs = [run_path(path.parent, run) for run in range(1, settings.runs + 1)]
+    files = [path.parent / "site.blend", path.parent / "site.xodr", *runs]
+    there = all(file.is_file() for file in files)
+    return record if there and isinstance(record, dict) and record.get("key") == key else None
+
+
+def run_path(folder: Path, run: int) -> Path:
+    """Return where a site's run of traffic lies; runs count from 1."""
+    return traffic_folder(folder / "site.blend") / f"run-{run}.npz"
+
+
+def _built(
+    folder: Path, settings: SiteSettings, number: int
+) -> Generator[Progress, None, tuple[StreetPlan, SceneGeometry, int]]:
+    """Write map and scene of the first plan that passes the check; return it, its scene, and how many did not."""
+    whole = Progress(0, settings.runs + 1, "streets")
+    problems = ""
+    for attempt in range(MAX_ATTEMPTS):
+        plan = draw_plan(np.random.default_rng([settings.seed, number, attempt, _PLAN]))
+        try:
+            geometry = yield from within(whole, _build(folder, plan, settings))
+        except _UnusableError as error:
+            problems = str(error)
+            continue
+        return plan, geometry, attempt
+    raise SeipError(
+        f"{MAX_ATTEMPTS} plans of site {number} did not pass the check of sites, the last as {problems}; "
+        "choose another --seed"
+    )
+
+
+class _UnusableError(Exception):
+    """A plan cannot be used: why."""
+
+
+def _build(folder: Path, plan: StreetPlan, settings: SiteSettings) -> Generator[Progress, None, SceneGeometry]:
+    extract, terrain = folder / "site.osm", folder / "site.tif"
+    write_extract(extract, plan)
+    write_terrain(terrain, plan)
+    asked = AskedSite(
+        near_latlon=(LATITUDE, LONGITUDE),
+        approaches=settings.approaches,
+        terrain=AskedTerrain(terrain),
+        left_hand=plan.left_hand,
+    )
+    built = yield from build_site(extract, asked)
+    scene = new_file()
+    yield from build_scene(scene, built.model, built.map_name)
+    contents = contents_of(scene)
+    check = yield from check_site(contents, _laid_out)
+    if check.problems or contents.geometry is None:
+        raise _UnusableError("; ".join(problem.text for problem in check.problems) or contents.complaint)
+    save_map(built, folder / "site.xodr")
+    save_blend(folder / "site.blend")
+    return contents.geometry
+
+
+def _laid_out(geometry: SceneGeometry) -> tuple[Site, Sequence[str]]:
+    return lay_out(geometry, SurveySettings()).site, ()
+
+
+def _run_of_traffic(
+    folder: Path, settings: SiteSettings, streams: Sequence[int], plan: StreetPlan, geometry: SceneGeometry
+) -> Generator[Progress, None, dict[str, Any]]:
+    """Simulate and save a run; return what is recorded of it."""
+    random = np.random.default_rng([settings.seed, *streams, _RUN])
+    demand, signals = draw_demand(plan, random), draw_signals(random)
+    seed = int(random.integers(2**31))
+    scenario = Scenario(demand, signals, seed, settings.warm_up + settings.duration)
+    simulated = yield from simulate_run(folder / "site.xodr", scenario, settings.warm_up, geometry)
+    trajectories = shaped(simulated.trajectories, seed)
+    path = run_path(folder, streams[-1])
+    trajectories.save(path)
+    return {
+        "file": path.relative_to(folder).as_posix(),
+        "demand": asdict(demand),
+        "green_s": signals.green,
+        "seed": seed,
+        "road_users": describe_categories(trajectories),
+        "warnings": list(simulated.warnings),
+    }
+
+
+def _plan_record(plan: StreetPlan) -> dict[str, Any]:
+    return {
+        "roundabout_m": plan.roundabout,
+        "signals": plan.signals,
+        "left_hand": plan.left_hand,
+        "things": len(plan.things),
+        "arms": [
+            {
+                "name": arm.name,
+                "angle_deg": round(math.degrees(arm.angle) % 360.0, 1),
+                "lanes_in": arm.lanes_in,
+                "lanes_out": arm.lanes_out,
+                "lane_width_m": arm.lane_width,
+                "turn_lane": arm.turn_lane,
+                "cycle_lanes": arm.cycle_lanes,
+                "slope": round(arm.slope, 4),
+            }
+            for arm in plan.arms
+        ],
+    }
