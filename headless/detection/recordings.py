@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import dataclass
+from typing import Protocol
 
 from headless.coverage_study.cells import Case
 
@@ -40,6 +41,25 @@ class SampledRun:
         return digest(self.trajectories.first, self.trajectories.time, self.trajectories.position)
 
 
+class Placement(Protocol):
+    """Sensors that recordings are made with."""
+
+    @property
+    def name(self) -> str:
+        """For people."""
+
+    @property
+    def sensors(self) -> tuple[MountedSensor, ...]:
+        """The sensors where they hang."""
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Catalogue keys of the sensors' types."""
+
+    def __hash__(self) -> int:
+        """Tell it from others."""
+
+
 @dataclass(frozen=True, eq=False)
 class SensorConfiguration:
     """A number of sensors of one type, placed where they cover most."""
@@ -58,6 +78,11 @@ class SensorConfiguration:
             MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
             for sensor in self.case.deployment.sensors
         )
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Catalogue keys of the sensors' types."""
+        return (self.case.sensor,)
 
     @property
     def places(self) -> Float:
@@ -82,16 +107,16 @@ class Simulator:
         self.area = functools.cache(functools.partial(area_of, geometry))
         self._simulation = functools.lru_cache(maxsize=1)(self._prepared)
 
-    def record(self, configuration: SensorConfiguration, run: SampledRun) -> Recording:
+    def record(self, configuration: Placement, run: SampledRun) -> Recording:
         """Return the frames of a run, to be simulated when they are asked for."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
-        return Recording(name, run.key, frames, (configuration.case.sensor,), self.site)
+        return Recording(name, run.key, frames, configuration.types, self.site)
 
-    def frame(self, configuration: SensorConfiguration, run: SampledRun, number: int) -> Frame:
+    def frame(self, configuration: Placement, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
 
-    def _prepared(self, configuration: SensorConfiguration, run: SampledRun) -> Simulation:
+    def _prepared(self, configuration: Placement, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]
         return finish(prepare(self.static, configuration.sensors, run.trajectories, bodies, self.settings))

@@ -34,6 +34,7 @@ VALIDATION_FRAMES = 18  # frames of each validation, spread over the recordings 
 LOSS_MARGIN = 1.6  # metres at the border of a window for which no loss is computed: much of what is there lies outside
 MAX_CROP_SHIFT = 0.25  # share of a window that it lies beside its road user at most
 MAX_ROTATION, MAX_STRETCH = math.radians(8.0), 0.05  # of what is learnt from; the turn is beyond quarter turns
+MAX_LIFT = 0.15  # metres by which all of a window is raised or lowered at most: a road is not known exactly
 MAX_GRADIENT_NORM = 10.0  # norm beyond which a gradient is cut, as published
 
 
@@ -256,17 +257,23 @@ def _with_frames(recordings: Sequence[SampledRecording]) -> list[SampledRecordin
 def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator) -> TrainingSample:
     """Return what a window about a random road user shows, moved to the window and varied.
 
-    It is turned by quarters of a circle and a little more, mirrored and
-    stretched: streets may run anywhere, and vehicles are of all sizes.
+    Half of the windows are about any road user, half about one of a class that
+    is as likely as the others there are: trucks and buses are rare. It is turned
+    by quarters of a circle and a little more, mirrored, stretched and lifted:
+    streets may run anywhere, and vehicles are of all sizes.
     """
     size = window.columns * window.pillar
     focus = np.array(window.centre)
     if len(sample.boxes):
-        focus = sample.boxes[int(random.integers(len(sample.boxes))), :2]
+        any_of = np.arange(len(sample.boxes))
+        if random.integers(2):
+            any_of = np.flatnonzero(sample.category == random.choice(np.unique(sample.category)))
+        focus = sample.boxes[random.choice(any_of), :2]
     focus = focus + random.uniform(-MAX_CROP_SHIFT, MAX_CROP_SHIFT, 2) * size
     angle = random.integers(4) * math.pi / 2 + random.uniform(-MAX_ROTATION, MAX_ROTATION)
     mirrored = bool(random.integers(2))
     scale = float(random.uniform(1 - MAX_STRETCH, 1 + MAX_STRETCH))
+    lift = float(random.uniform(-MAX_LIFT, MAX_LIFT))
 
     matrix = scale * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     if mirrored:
@@ -277,11 +284,12 @@ def vary(sample: TrainingSample, window: PillarGrid, random: np.random.Generator
     points = points[np.abs(points[:, 1] - focus[1]) <= reach]
     middle = np.array(window.centre)
     points[:, :2] = (points[:, :2] - focus) @ matrix.T + middle
-    points[:, 2] *= scale
+    points[:, 2] = points[:, 2] * scale + lift
 
     boxes = sample.boxes.copy()
     boxes[:, :2] = (boxes[:, :2] - focus) @ matrix.T + middle
     boxes[:, 2:6] *= scale
+    boxes[:, 2] += lift
     boxes[:, 6] = angle + (-boxes[:, 6] if mirrored else boxes[:, 6])
     seen = (np.abs(boxes[:, :2] - middle) <= size / 2).all(axis=1)
     return TrainingSample(points, boxes[seen], sample.category[seen], sample.returns[seen])

@@ -6,7 +6,8 @@ import numpy as np
 import shapely
 
 from seip_addon.core.lidar import CarlaDropoff, load_catalogue
-from seip_addon.core.scans import MountedSensor, StaticScene, level_orientation
+from seip_addon.core.scans import MountedSensor, level_orientation
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.trajectories import RoadUser
 
@@ -15,7 +16,8 @@ def road():
     """A level square of 80 m, a car and a van that drive east, one behind the other, and four parked cars."""
     corners = np.array([[-40.0, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]])
     triangles = corners[[[0, 1, 2], [0, 2, 3]]]
-    static = StaticScene(triangles, np.full(2, 0.3), shapely.box(-30, -30, 30, 30))
+    surface = Mesh("road", triangles, np.full(2, 0.3))
+    geometry = SceneGeometry("Square", np.zeros(3), (surface,), (), (), shapely.box(-30, -30, 30, 30))
     parked = tuple(RoadUser(f"parked {number}", "car", 4.5, 1.8, 1.5) for number in range(4))
     users = (RoadUser("one", "car", 4.5, 1.8, 1.5), RoadUser("other", "van", 5.5, 2.0, 2.2), *parked)
     driving = [[-20.0, 2, 0], [20, 2, 0], [-30, 2, 0], [10, 2, 0]]
@@ -30,7 +32,7 @@ def road():
         pitch=np.zeros(12),
         speed=np.repeat([10.0, 0.0], [4, 8]),
     )
-    return static, trajectories
+    return geometry, trajectories
 
 
 def sensors():

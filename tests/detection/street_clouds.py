@@ -1,5 +1,7 @@
 """Small merged clouds of made-up streets: the sides of road users that roadside sensors see, and the ground."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from seip_addon.core.scans.frame import STATIC_INSTANCE, Frame, Labels
@@ -83,3 +85,18 @@ def _surface(random, box, rays):
         up = random.uniform(0.1, np.where(along > 0.2 * length, 0.6 * height, height), count)
         found.append(np.column_stack((box[:2] + along[:, None] * ahead + aside[:, None] * left, z - height / 2 + up)))
     return np.concatenate(found)
+
+
+def cloud_frame(cloud):
+    """Return a frame with some foreground points (n, 4) and nobody in it."""
+    empty = street_frame(0, users=0)
+    count = len(cloud)
+    return replace(
+        empty,
+        points=cloud[:, :3],
+        intensity=cloud[:, 3],
+        sensor=np.zeros(count, dtype=np.int16),
+        delay=np.zeros(count, dtype=np.float32),
+        instance=np.full(count, -1, dtype=np.int32),
+        foreground=np.ones(count, dtype=np.bool_),
+    )

@@ -2,8 +2,7 @@
 
 import math
 
-from headless.detection.detector import Detector, TrainingRecord
-from headless.detection.pillars import grid_over
+from headless.detection.detector import Detector, TrainingRecord, save_state
 from headless.detection.settings import NetworkSettings
 
 import numpy as np
@@ -13,23 +12,22 @@ import torch
 from seip_addon.core.errors import SeipError
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
-GRID = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), NETWORK.pillar)
 
 
 @pytest.fixture
 def stored(tmp_path):
     path = tmp_path / "detector.pt"
-    Detector(NETWORK, GRID, seed=1, training_record=TrainingRecord(("type1",), ("Junction",))).save(path)
+    Detector(NETWORK, seed=1, training_record=TrainingRecord(("type1",), ("Junction",))).save(path)
     return path
 
 
 def written(path, change):
-    """Change a file's content, as a file of the version that has no digest."""
+    """Change a file's content, with a digest that fits."""
     state = torch.load(path, weights_only=True)
-    del state["digest"]
-    state["version"] = 1
+    for name in ("digest", "schema", "version"):
+        del state[name]
     change(state)
-    torch.save(state, path)
+    save_state(path, state)
     return path
 
 
@@ -54,27 +52,15 @@ def _experience(value):
     return change
 
 
-def _expanded(state):
-    name = next(iter(state["weights"]))
-    state["weights"][name] = torch.zeros(1).expand(2**34)
-
-
 CHANGES = {
     "a weight that is no number": (_first(math.nan), "weights are not finite"),
     "an endless weight": (_first(math.inf), "weights are not finite"),
-    "columns below zero": (_set("grid", "columns", -5), "no or too many pillars"),
-    "half a row": (_set("grid", "rows", 2.5), "no or too many pillars"),
-    "rows without end": (_set("grid", "rows", 10**9), "no or too many pillars"),
-    "a grid at no place": (_set("grid", "west", math.nan), "grid is nowhere"),
-    "a grid upside down": (_set("grid", "top", -1.0), "grid is nowhere"),
-    "pillars of its own": (_set("grid", "pillar", 0.5), "pillars of 0.5 m"),
     "a width out of range": (_set("settings", "width", 10**6), "width must lie between"),
     "a width in halves": (_set("settings", "width", 8.5), "width must lie between"),
     "a setting that nobody knows": (_set("settings", "depth", 3), "damaged"),
     "a number for what it has learnt from": (_experience(3), "damaged"),
     "numbers for sensors": (_experience({"sensors": [1, 2]}), "no names"),
     "letters for sensors": (_experience({"sensors": "type1"}), "no names"),
-    "tensors larger than the file": (_expanded, "larger than itself"),
 }
 
 
@@ -86,8 +72,19 @@ def test_detectors_that_make_no_sense_are_refused(stored, change, sentence):
     assert "\n" not in str(refusal.value)
 
 
-def test_a_file_of_the_version_without_a_digest_is_read(stored):
-    assert Detector.load(written(stored, lambda _state: None)).grid == GRID
+def test_tensors_larger_than_the_file_are_refused(stored):
+    state = torch.load(stored, weights_only=True)
+    state["weights"][next(iter(state["weights"]))] = torch.zeros(1).expand(2**34)
+    torch.save(state, stored)
+    with pytest.raises(SeipError, match="larger than itself"):
+        Detector.load(stored)
+
+
+def test_a_file_of_another_version_is_refused(stored):
+    state = torch.load(stored, weights_only=True) | {"version": 2}
+    torch.save(state, stored)
+    with pytest.raises(SeipError, match="no detector of this version; train it again"):
+        Detector.load(stored)
 
 
 def test_other_weights_than_were_written_are_noticed(stored):

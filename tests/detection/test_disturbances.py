@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 from headless.detection.detector import Detector, keeping_at_most
-from headless.detection.pillars import grid_over
 from headless.detection.settings import NetworkSettings
 from headless.lab.detector.disturbances import (
     DROP_INTENSITY,
@@ -30,7 +29,7 @@ import pytest
 from square_by_hand import road, sensors
 
 from seip_addon.core.progress import finish
-from seip_addon.core.scans import ScanSettings, prepare
+from seip_addon.core.scans import ScanSettings, prepare, static_scene
 from seip_addon.core.traffic.bodies import fitted_body
 
 ALL = (RangeNoise, DropOff, Rain, PositionError, YawError, TiltError, ClockOffset, Thinned, OtherSizes)
@@ -38,10 +37,10 @@ TIME = 1.0
 
 
 def frame_under(disturbance, *, time=TIME):
-    static, trajectories = road()
+    geometry, trajectories = road()
     hung, driving = disturbance.disturbed_sensors(sensors()), disturbance.disturbed_traffic(trajectories)
     bodies = [fitted_body(user) for user in driving.users]
-    simulation = finish(prepare(static, hung, driving, bodies, ScanSettings(seed=3)))
+    simulation = finish(prepare(static_scene(geometry), hung, driving, bodies, ScanSettings(seed=3)))
     taken = disturbance.disturbed_scan(simulation, 7, time)
     return disturbance.disturbed_frame(taken, hung, np.random.default_rng([3, 7]))
 
@@ -52,7 +51,7 @@ def plain():
 
 
 def same(one, other):
-    for name in ("points", "sensor", "delay", "intensity", "instance"):
+    for name in ("points", "sensor", "delay", "intensity", "instance", "foreground"):
         assert getattr(one, name).dtype == getattr(other, name).dtype
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     for name, value in vars(one.labels).items():
@@ -65,7 +64,7 @@ def test_size_0_changes_nothing_bit_for_bit(kind, plain):
 
 
 def test_no_cap_leaves_the_detector_alone():
-    detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4))
+    detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)))
     assert CappedPillars(0.0).disturbed_detector(detector) is detector
 
 
@@ -192,7 +191,7 @@ def test_other_sizes_keep_the_motion_and_the_look():
 
 
 def test_a_capped_detector_has_the_same_weights():
-    detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), grid_over((0, 0, 16, 16), (0, 4), 0.4), seed=5)
+    detector = Detector(NetworkSettings(width=8, blocks=(0, 0, 0)), seed=5)
     capped = CappedPillars(2.0).disturbed_detector(detector)
     assert capped.settings == replace(detector.settings, most_points=2)
     for name, value in keeping_at_most(detector, 2).state_dict().items():

@@ -4,7 +4,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from headless.detection.detector import Detector
-from headless.detection.pillars import grid_over
 from headless.detection.recordings import SampledRun, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
 from headless.lab.detector import study as study_module
@@ -32,7 +31,6 @@ from seip_addon.core.progress import finish
 from seip_addon.core.scans import ScanSettings
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
-GRID = grid_over((-32.0, -32.0, 32.0, 32.0), (-1.0, 4.5), NETWORK.pillar)
 
 
 class Hung:
@@ -44,13 +42,13 @@ class Hung:
 
 
 def ground(name="home", seed=3):
-    static, trajectories = road()
+    geometry, trajectories = road()
     run = SampledRun("run", trajectories, np.array([1.0, 1.5]))
-    return TrialSite(name, Simulator(static, ScanSettings(seed=seed), "Square"), (run,))
+    return TrialSite(name, Simulator(geometry, ScanSettings(seed=seed)), (run,))
 
 
 def one_tested(seed, network=NETWORK):
-    return EvaluatedDetector(f"detector-{seed}", Detector(network, GRID, seed))
+    return EvaluatedDetector(f"detector-{seed}", Detector(network, seed))
 
 
 @pytest.fixture(scope="module")

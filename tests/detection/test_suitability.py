@@ -1,6 +1,7 @@
 """A detector says what it has learnt from, and what speaks against using it beyond."""
 
-from headless.detection.detector import Detector, TrainingRecord, on_grid
+from headless.detection.detection_area import DetectionArea
+from headless.detection.detector import Detector, TrainingRecord
 from headless.detection.frames import Recording, training_record_of
 from headless.detection.pillars import filling, grid_over
 from headless.detection.settings import NetworkSettings
@@ -8,18 +9,19 @@ from headless.detection.suitability import MAX_OVERFULL_SHARE, suitability_warni
 
 import numpy as np
 import pytest
-import torch
+from street_clouds import cloud_frame
 
-from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.height_raster import HeightRaster
 
 NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0), most_points=2)
 GRID = grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), NETWORK.pillar)
 KNOWN = TrainingRecord(("type1", "type2"), ("Junction",))
+AREA = DetectionArea(GRID, HeightRaster(np.zeros(2), 16.0, np.zeros((2, 2))))
 NOTHING = np.zeros((0, 4), dtype=np.float32)
 
 
 def detector(training_record=KNOWN):
-    return Detector(NETWORK, GRID, seed=1, training_record=training_record)
+    return Detector(NETWORK, seed=1, training_record=training_record)
 
 
 def heaps(*sizes):
@@ -31,17 +33,12 @@ def heaps(*sizes):
 
 
 def test_it_is_quiet_at_home():
-    assert suitability_warnings(detector(), ["type1", "type1"], "Junction", heaps(1, 2, 2)) == ()
+    assert suitability_warnings(detector(), ["type1", "type1"], AREA, cloud_frame(heaps(1, 2, 2))) == ()
 
 
 def test_other_sensor_types_are_named():
-    (sentence,) = suitability_warnings(detector(), ["type3", "type1"], "Junction", NOTHING)
+    (sentence,) = suitability_warnings(detector(), ["type3", "type1"], AREA, cloud_frame(NOTHING))
     assert "learnt from clouds of type1 and type2, not of type3:" in sentence
-
-
-def test_another_site_is_named():
-    (sentence,) = suitability_warnings(detector(), ["type1"], "Corridor", NOTHING)
-    assert "learnt at Junction, not at Corridor:" in sentence
 
 
 def test_over_full_pillars_are_counted():
@@ -52,29 +49,17 @@ def test_over_full_pillars_are_counted():
     assert filling(NOTHING, GRID, 2).empty == 1.0
     crowded = heaps(5, 5, 5, 1)
     assert filling(crowded, GRID, 2).over_full > MAX_OVERFULL_SHARE
-    (sentence,) = suitability_warnings(detector(), ["type1"], "Junction", crowded)
+    (sentence,) = suitability_warnings(detector(), ["type1"], AREA, cloud_frame(crowded))
     assert sentence.startswith("75% of the pillars with points have more than the 2 that are kept, and 56% of all")
 
 
 def test_what_is_not_known_is_not_held_against_it():
-    assert suitability_warnings(detector(TrainingRecord()), ["type9"], "Nowhere", NOTHING) == ()
-    assert suitability_warnings(detector(), ["type1"], "", NOTHING) == ()
+    assert suitability_warnings(detector(TrainingRecord()), ["type9"], AREA, cloud_frame(NOTHING)) == ()
 
 
 def test_the_file_keeps_what_was_learnt_from(tmp_path):
     detector().save(tmp_path / "detector.pt")
     assert Detector.load(tmp_path / "detector.pt").training_record == KNOWN
-    assert on_grid(detector(), GRID).training_record == KNOWN
-
-
-def test_files_from_before_can_be_read(tmp_path):
-    one = detector()
-    one.save(tmp_path / "detector.pt")
-    state = torch.load(tmp_path / "detector.pt", weights_only=True)
-    del state["experience"], state["digest"]
-    state["version"] = 1
-    torch.save(state, tmp_path / "old.pt")
-    assert Detector.load(tmp_path / "old.pt").training_record == TrainingRecord()
 
 
 def test_experience_is_that_of_all_recordings():
@@ -85,12 +70,3 @@ def test_experience_is_that_of_all_recordings():
     ]
     assert training_record_of(recordings) == KNOWN
     assert training_record_of(recordings[2:]) == TrainingRecord()
-
-
-def test_a_detector_moves_to_another_grid_of_the_same_pillars():
-    there = grid_over((100.0, 0.0, 132.0, 16.0), (2.0, 6.0), NETWORK.pillar)
-    moved = on_grid(detector(), there)
-    assert moved.grid == there
-    assert all((value == detector().state_dict()[name]).all() for name, value in moved.state_dict().items())
-    with pytest.raises(SeipError, match=r"pillars of 0.4 m sees nothing in those of 0.5 m"):
-        on_grid(detector(), grid_over((0.0, 0.0, 16.0, 16.0), (0.0, 4.0), 0.5))

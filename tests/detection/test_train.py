@@ -66,7 +66,6 @@ def test_a_detector_its_curve_and_its_figures_are_written(folder, capsys):
     train.main(arguments(folder, "detector"))
     detector = Detector.load(folder / "detector" / "detector.pt")
     assert detector.settings.width == 8
-    assert detector.grid.columns % 8 == 0
     assert (folder / "detector" / "training.png").read_bytes().startswith(b"\x89PNG")
     figures = json.loads((folder / "detector" / "evaluation.json").read_text(encoding="utf-8"))
     assert list(figures) == [str(folder / "third")]

@@ -4,9 +4,10 @@ import hashlib
 from dataclasses import replace
 
 from headless.detection.average_precision import evaluate
+from headless.detection.detection_area import DetectionArea
 from headless.detection.detector import Detector
 from headless.detection.frames import LazyFrames, Recording, SampledRecording, require_separate, sample_of, spread
-from headless.detection.inference import detect
+from headless.detection.inference import detect, detect_on_level
 from headless.detection.matching import Rule
 from headless.detection.pillars import fill_pillars, grid_over
 from headless.detection.settings import CLASSES, NetworkSettings, TrainingSettings
@@ -18,16 +19,18 @@ import torch
 from street_clouds import street_frame
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.height_raster import HeightRaster
 from seip_addon.core.progress import finish
 from seip_addon.core.scans.frame import Frame
 
 SMALL = NetworkSettings(width=16, blocks=(1, 1, 1), most_points=8)
 BRIEF = TrainingSettings(steps=6, batch=2, window=12.8, validate_every=3, threads=1)
 GRID = grid_over((-16.0, -16.0, 16.0, 16.0), (-1.0, 4.5), SMALL.pillar)
+AREA = DetectionArea(GRID, HeightRaster(np.full(2, -16.0), 32.0, np.zeros((2, 2))))
 
 
 def sampled(name, traffic, frames, network=SMALL):
-    return SampledRecording(Recording(name, traffic, frames), GRID, network.most_points)
+    return SampledRecording(Recording(name, traffic, frames), AREA, network.most_points)
 
 
 def recording(name, traffic, *seeds):
@@ -59,7 +62,7 @@ def test_a_frame_can_be_learnt_by_heart(head, steps):
     network = replace(SMALL, head=head, width=24)
     settings = replace(BRIEF, steps=steps, batch=4, window=25.6, learning_rate=1e-2, validate_every=100)
     result = trained([same], [again], settings, network)
-    found = result_of_sample(result.detector, sample_of(frame, GRID, network.most_points))
+    found = result_of_sample(result.detector, AREA, sample_of(frame, AREA, network.most_points))
     assert evaluate([found], Rule(iou=0.7)).average_precision == pytest.approx(1.0)
     assert result.curve.loss[-1] < 0.3 * result.curve.loss[0]
 
@@ -91,7 +94,7 @@ def test_a_training_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, lea
 def test_another_training_is_not_continued(tmp_path, learning, aside):
     path = tmp_path / "state.pt"
     trained(learning, aside, store=path)
-    with pytest.raises(SeipError, match="other settings, another grid or other recordings"):
+    with pytest.raises(SeipError, match="other settings or other recordings"):
         trained(learning, aside, replace(BRIEF, seed=9), store=path)
     with pytest.raises(SeipError, match="other recordings"):
         trained(learning[:1], aside, store=path)
@@ -128,7 +131,9 @@ def test_there_must_be_something_to_learn_from(aside):
 
 def test_frames_without_road_users_and_without_points_are_learnt_from_too(aside):
     empty = street_frame(5, users=0)
-    blind = replace(empty, **{name: getattr(empty, name)[:0] for name in ("points", "intensity", "instance")})
+    blind = replace(
+        empty, **{name: getattr(empty, name)[:0] for name in ("points", "intensity", "instance", "foreground")}
+    )
     blind = replace(blind, sensor=blind.sensor[:0], delay=blind.delay[:0])
     assert len(empty.labels) == 0
     result = trained([sampled("quiet", "run 1", [empty, blind])], aside)
@@ -136,8 +141,8 @@ def test_frames_without_road_users_and_without_points_are_learnt_from_too(aside)
 
 
 def test_an_empty_cloud_has_nobody_in_it():
-    detector = Detector(SMALL, GRID, seed=1)
-    found = detect(detector, np.zeros((0, 3), dtype=np.float32), np.zeros(0, dtype=np.float32), least_score=0.5)
+    detector = Detector(SMALL, seed=1)
+    found = detect_on_level(detector, GRID, np.zeros((0, 4), dtype=np.float32), least_score=0.5)
     assert len(found) == 0
     assert found.boxes.shape == (0, 7)
 
@@ -146,8 +151,9 @@ def test_detections_do_not_depend_on_the_order_of_points(learning, aside):
     detector = trained(learning, aside).detector
     frame = street_frame(6)
     order = np.random.default_rng(0).permutation(len(frame))
-    one = detect(detector, frame.points, frame.intensity, least_score=0.0)
-    other = detect(detector, frame.points[order], frame.intensity[order], least_score=0.0)
+    one = detect(detector, AREA, frame, least_score=0.0)
+    shuffled = {name: getattr(frame, name)[order] for name in ("points", "intensity", "foreground")}
+    other = detect(detector, AREA, replace(frame, **shuffled), least_score=0.0)
     assert len(one) > 0
     np.testing.assert_array_equal(one.boxes, other.boxes)
     np.testing.assert_array_equal(one.score, other.score)
@@ -157,19 +163,19 @@ def test_detections_do_not_depend_on_the_order_of_points(learning, aside):
 def test_samples_lose_nothing_that_a_detector_would_see(learning, aside):
     detector = trained(learning, aside).detector
     frame = street_frame(6)
-    sample = sample_of(frame, GRID, SMALL.most_points)
+    sample = sample_of(frame, AREA, SMALL.most_points)
     assert len(sample.points) < len(frame)
-    whole = fill_pillars(np.column_stack((frame.points, frame.intensity)), GRID, SMALL.most_points)
+    whole = fill_pillars(AREA.cloud(frame), GRID, SMALL.most_points)
     thinned = fill_pillars(sample.points, GRID, SMALL.most_points)
     np.testing.assert_array_equal(whole.features, thinned.features)
-    one = detect(detector, frame.points, frame.intensity, least_score=0.0)
-    other = detect(detector, sample.points[:, :3], sample.points[:, 3], least_score=0.0)
+    one = detect(detector, AREA, frame, least_score=0.0)
+    other = detect_on_level(detector, GRID, sample.points, least_score=0.0)
     np.testing.assert_array_equal(one.boxes, other.boxes)
 
 
 def test_windows_keep_points_on_their_road_users():
     frame = street_frame(12, users=8)
-    sample = sample_of(frame, GRID, 32)
+    sample = sample_of(frame, AREA, 32)
     window = GRID.window(*GRID.centre, 48)
     for seed in range(20):
         varied = vary(sample, window, np.random.default_rng(seed))
@@ -194,9 +200,9 @@ def test_a_detector_is_read_back_as_it_was(tmp_path, learning, aside):
     detector.save(path)
     again = Detector.load(path)
     frame = street_frame(6)
-    one, other = (detect(d, frame.points, frame.intensity, least_score=0.0) for d in (detector, again))
+    one, other = (detect(d, AREA, frame, least_score=0.0) for d in (detector, again))
     np.testing.assert_array_equal(one.boxes, other.boxes)
-    assert (again.settings, again.grid) == (SMALL, GRID)
+    assert again.settings == SMALL
 
 
 @pytest.mark.parametrize("content", [b"", b"PK nothing", b"\x80\x02."])

@@ -322,7 +322,7 @@ def _moved(frame: Frame, sensor: int, about: Float, turn: Float, by: Float) -> F
     return replace(frame, points=points)
 
 
-POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance")
+POINT_FIELDS = ("points", "sensor", "delay", "intensity", "instance", "foreground")
 
 
 def _some(frame: Frame, kept: Boolean) -> Frame:

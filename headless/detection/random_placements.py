@@ -1,0 +1,67 @@
+"""Random placements, for detectors that are to work with any placement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from seip_addon.core.arrays import Float
+from seip_addon.core.errors import SeipError
+from seip_addon.core.geometry.orientation import orientation
+from seip_addon.core.lidar import LidarModel
+from seip_addon.core.scans import MountedSensor
+from seip_addon.core.site.candidates import Candidates
+
+MAX_SENSORS = 5  # of a random placement
+
+
+@dataclass(frozen=True, eq=False)
+class RandomPlacement:
+    """Sensors of any types, heights and tilts at random positions of a site."""
+
+    name: str
+    sensors: tuple[MountedSensor, ...]
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Catalogue keys of the sensors' types, in alphabetical order."""
+        return tuple(sorted({sensor.model.key for sensor in self.sensors}))
+
+    @property
+    def places(self) -> Float:
+        """Positions of the sensors, (s, 3) in metres."""
+        return np.array([sensor.xyz for sensor in self.sensors])
+
+
+def random_placement(
+    name: str, candidates: Candidates, models: Mapping[str, LidarModel], random: np.random.Generator
+) -> RandomPlacement:
+    """Return 1 to `MAX_SENSORS` sensors at different positions; positions, and then their poses, are equally likely.
+
+    One in two placements has sensors of one type alone.
+
+    Raises
+    ------
+    SeipError
+        There is no candidate.
+    """
+    positions = np.unique(candidates.position_of)
+    if not len(positions):
+        raise SeipError("there is no candidate position to put a random sensor at: see the warnings of the site")
+    count = int(random.integers(1, min(MAX_SENSORS, len(positions)) + 1))
+    types = sorted(models)
+    if random.integers(2):
+        types = [types[int(random.integers(len(types)))]]
+    sensors = []
+    for number, position in enumerate(random.choice(positions, count, replace=False).tolist(), 1):
+        wanted = types[int(random.integers(len(types)))]
+        here = candidates.position_of == position
+        poses = np.flatnonzero(here & (candidates.sensor == wanted))
+        if not len(poses):
+            poses = np.flatnonzero(here)
+        pose = int(poses[int(random.integers(len(poses)))])
+        turn = orientation(float(candidates.yaw[pose]), float(candidates.tilt[pose]))
+        sensors.append(MountedSensor(f"S{number}", models[str(candidates.sensor[pose])], candidates.xyz[pose], turn))
+    return RandomPlacement(name, tuple(sensors))

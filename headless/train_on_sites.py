@@ -1,0 +1,154 @@
+"""Train a detector on random placements at several sites, so that it works with any placement at others.
+
+python -m headless.generate_sites -o out/sites --sites 16
+python -m headless.train_on_sites out/sites/*/site.blend -o out/detector
+
+Each scene comes with its runs of traffic in the folder SCENE_traffic beside it. The last sites are set aside, to see
+when to stop. A training that was stopped goes on where it was.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+if not __package__:  # run as a file by `blender -P`
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import runtime, survey
+from headless.charts.detection import save_training_chart
+from headless.detection.case_study import read_runs
+from headless.detection.detector import check_device
+from headless.detection.frames import SampledRecording
+from headless.detection.random_placements import random_placement
+from headless.detection.recordings import Simulator
+from headless.detection.settings import NetworkSettings, TrainingSettings
+from headless.detection.training import train
+from headless.options import add_settings, new_parser, read_settings
+
+import bpy
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.progress import Progress
+from seip_addon.core.scans import ScanSettings
+from seip_addon.core.site.candidates import CandidateSettings
+from seip_addon.core.workflows.survey import SurveySettings, lay_out
+from seip_addon.scene.read import read_scene
+
+HEIGHTS = (3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)  # metres
+TILTS = (0.0, math.radians(5.0), math.radians(10.0), math.radians(15.0))
+TYPES = (
+    "type1",
+    "type2",
+    "type3",
+    "vlp16",
+    "vlp32c",
+    "hdl64e",
+    "os0_128",
+    "os1_64_rev7",
+    "os1_128",
+    "pandar64",
+    "xt32",
+    "ruby_plus",
+    "helios_5515",
+    "at128",
+)
+ASIDE = 8  # one site in so many is set aside
+
+
+def main(argv: list[str]) -> None:
+    """Simulate scans of random placements at every site, and train a detector on them."""
+    options = _parser().parse_args(argv)
+    network, training = read_settings(NetworkSettings, options), read_settings(TrainingSettings, options)
+    learning = LearningSettings(tuple(options.sensor), options.placements, options.every, training.seed)
+    if len(options.scenes) < 2:
+        raise SeipError("name two sites or more: the last is set aside, to see when to stop")
+    check_device(options.device)
+    runtime.check_folder(options.output)
+    recordings: list[list[SampledRecording]] = []
+    for number, scene in enumerate(options.scenes):
+        recordings.append(runtime.finish_with_bar(_recordings(scene, number, network, learning)))
+    aside = max(1, len(recordings) // ASIDE)
+    learnt, validation = ([one for site in some for one in site] for some in (recordings[:-aside], recordings[-aside:]))
+    path = options.output / "detector.pt"
+    trained = runtime.finish_with_bar(train(learnt, validation, network, training, device=options.device, store=path))
+    best = trained.curve.best
+    trained.detector.save(path)
+    save_training_chart(options.output / "training.png", trained.curve.loss, trained.curve.validation, "training")
+    runtime.print_line(
+        f"best after {best:,} steps: average precision {trained.curve.validation[best]:.1%} at sites set aside"
+    )
+    runtime.print_line(f"written to {options.output}/")
+
+
+@dataclass(frozen=True)
+class LearningSettings:
+    """What detectors learn from at each site.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Catalogue keys of the types.
+    placements : int
+        Random ones for each run of traffic.
+    every : float, seconds
+        From frame to frame.
+    """
+
+    sensors: tuple[str, ...]
+    placements: int
+    every: float
+    seed: int
+
+
+def _recordings(
+    scene: Path, site: int, network: NetworkSettings, learning: LearningSettings
+) -> Generator[Progress, None, list[SampledRecording]]:
+    """Simulate scans of random placements in all runs of a site."""
+    runtime.open_scene(scene)
+    reading = read_scene(bpy.context.scene)
+    candidates = CandidateSettings(sensors=learning.sensors, heights=HEIGHTS, tilts=TILTS)
+    layout = lay_out(reading.geometry, SurveySettings(candidates=candidates), ())
+    runs = read_runs(survey.runs_beside(scene), layout.geometry.origin, learning.every)
+    if not runs:
+        raise SeipError(f"{scene} has no runs of traffic beside it: simulate some with headless/traffic.py")
+    simulator = Simulator(layout.geometry, ScanSettings(seed=learning.seed))
+    area = simulator.area(network.pillar)
+    random = np.random.default_rng([learning.seed, site])
+    recordings = []
+    total = len(runs) * learning.placements * len(runs[0].times)
+    done = 0
+    for run in runs:
+        for number in range(learning.placements):
+            placement = random_placement(f"placement {number + 1}", layout.site.candidates, layout.models, random)
+            sampled = SampledRecording(simulator.record(placement, run), area, network.most_points)
+            for frame in range(len(sampled)):
+                yield Progress(done, total, f"simulate {scene.parent.name}/{scene.stem}")
+                done += 1
+                sampled.get(frame)
+            recordings.append(sampled)
+    return recordings
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = new_parser("train_on_sites", "Train a detector on random placements at several sites.")
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="each with its traffic beside it")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the detector")
+    learning = parser.add_argument_group("what is learnt from")
+    learning.add_argument("--sensor", nargs="+", default=list(TYPES), metavar="KEY", help="types in the placements")
+    learning.add_argument("--placements", type=int, default=1, metavar="N", help="random ones for each run of traffic")
+    learning.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
+    net = parser.add_argument_group("network")
+    add_settings(net, NetworkSettings, "head", "pillar", "most_points", "width", "blocks")
+    work = parser.add_argument_group("training")
+    add_settings(work, TrainingSettings, "steps", "batch", "seed")
+    work.add_argument("--device", default="cpu", help="of torch: cpu, cuda")
+    add_settings(work, TrainingSettings, "threads")
+    return parser
+
+
+if __name__ == "__main__":
+    runtime.run(main)

@@ -1,0 +1,85 @@
+"""Where a detector looks: the foreground, with heights above the road."""
+
+from dataclasses import replace
+
+from headless.detection.detection_area import area_of
+from headless.detection.detector import Detector
+from headless.detection.inference import detect
+from headless.detection.settings import NetworkSettings
+
+import numpy as np
+import pytest
+import shapely
+from street_clouds import cloud_frame, street_frame
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.site.scene_geometry import Mesh, SceneGeometry
+
+NETWORK = NetworkSettings(width=8, blocks=(0, 0, 0))
+
+
+def hill(slope=0.06, across=0.02, base=100.0, half=24.0):
+    """A square road that rises to the east and a little to the north."""
+    corners = np.array([[x, y, base + slope * x + across * y] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    corners[:, :2] *= half
+    corners[:, 2] = base + slope * corners[:, 0] + across * corners[:, 1]
+    road = Mesh("road", corners[[[0, 1, 2], [0, 2, 3]]])
+    return SceneGeometry("Hill", np.zeros(3), (road,), (), (), shapely.box(-16, -16, 16, 16))
+
+
+def test_heights_are_those_above_the_road():
+    area = area_of(hill(), 0.4)
+    random = np.random.default_rng(1)
+    xy = random.uniform(-15.9, 15.9, (500, 2))
+    above = random.uniform(-0.9, 4.4, 500)
+    z = 100 + 0.06 * xy[:, 0] + 0.02 * xy[:, 1] + above
+    cloud = area.cloud(cloud_frame(np.column_stack((xy, z, np.full(500, 0.5))).astype(np.float32)))
+    np.testing.assert_allclose(cloud[:, 2], above, atol=1e-4)
+    np.testing.assert_array_equal(cloud[:, 3], np.float32(0.5))
+
+
+def test_boxes_come_back_to_where_they_were():
+    area = area_of(hill(), 0.4)
+    boxes = np.column_stack([np.random.default_rng(2).uniform(-15, 15, (50, 3)), np.ones((50, 4))])
+    np.testing.assert_allclose(area.raised(area.levelled(boxes)), boxes, atol=1e-12)
+    assert not np.allclose(area.levelled(boxes), boxes)
+
+
+def test_the_background_is_left_out():
+    area = area_of(hill(0.0, 0.0, 0.0), 0.4)
+    frame = street_frame(3)
+    assert 0 < len(area.cloud(frame)) <= np.count_nonzero(frame.instance >= 0)
+    assert len(area.cloud(replace(frame, foreground=np.zeros(len(frame), dtype=np.bool_)))) == 0
+
+
+def test_a_hill_changes_no_detection():
+    detector = Detector(NETWORK, seed=4)
+    flat, steep = area_of(hill(0.0, 0.0, 0.0), 0.4), area_of(hill(), 0.4)
+    frame = street_frame(5)
+    rise = (100 + frame.points[:, :2] @ [0.06, 0.02]).astype(np.float32)
+    raised = replace(frame, points=frame.points + rise[:, None] * np.array([0, 0, 1], dtype=np.float32))
+    one = detect(detector, flat, frame, least_score=0.0)
+    other = detect(detector, steep, raised, least_score=0.0)
+    assert len(one) > 10
+    np.testing.assert_allclose(other.score, one.score, atol=0.02)
+
+
+def test_the_road_goes_on_beyond_its_edges():
+    geometry = hill()
+    narrow = replace(geometry, roads=(Mesh("lane", geometry.roads[0].triangles * [1, 0.1, 1]),))
+    area = area_of(narrow, 0.4)
+    assert np.isfinite(area.road.heights).all()
+    beside = area.road.at(np.array([[0.0, 12.0]]))[0]
+    assert beside == pytest.approx(100.0, abs=0.5)
+
+
+def test_a_site_without_road_or_region_is_refused():
+    with pytest.raises(SeipError, match="no road in the region of interest"):
+        area_of(replace(hill(), roads=()), 0.4)
+    with pytest.raises(SeipError, match="region of interest with an area"):
+        area_of(replace(hill(), region=shapely.box(3, 0, 3, 0)), 0.4)
+
+
+def test_a_grid_of_other_pillars_is_refused():
+    with pytest.raises(SeipError, match=r"pillars of 0.4 m sees nothing in those of 0.5 m"):
+        detect(Detector(NETWORK), area_of(hill(), 0.5), street_frame(1))
