@@ -137,7 +137,8 @@ class Demand:
             raise SeipError(f"--pedestrians must be 0 to 3000 per hour and arm, not {self.pedestrians:g}")
         if min(self.turns) < 0.0 or not 0.0 < sum(self.turns) < np.inf:
             raise SeipError(f"--turns must be three shares of which one is above 0, not {self.turns}")
-        if not self.shares.keys() <= MODELS.keys() or min(self.shares.values()) < 0.0 or not sum(self.shares.values()):
+        given = self.shares.values()
+        if not self.shares.keys() <= VEHICLE_SHARES.keys() or min(given, default=0.0) < 0.0 or not sum(given):
             raise SeipError(f"shares of vehicles are of {', '.join(VEHICLE_SHARES)}, and one is above 0: {self.shares}")
 
 

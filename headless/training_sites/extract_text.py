@@ -13,11 +13,12 @@ from seip_addon.core.storage.files import whole_file
 
 from .street_plan import TURN_LANE_LENGTH, Arm, StreetPlan, Tags
 
-LATITUDE, LONGITUDE = 54.2, 7.2
-"""The middle of every plan, degrees: in the North Sea, where no street is."""
+LATITUDE, LONGITUDE = 54.2, 3.0
+"""The middle of every plan, degrees: in the North Sea, where no street is, and north is up on the map (UTM zone 31)."""
 TERRAIN_REACH, TERRAIN_STEP = 420.0, 2.0  # metres from the middle, and between two heights
 _SCALE, _TIE_POINT, _KEYS = 33550, 33922, 34735  # GeoTIFF's tags
 _WGS84 = 4326
+_STRAIGHT_ENTRY = 15.0  # metres that a street runs straight into a roundabout
 
 
 def write_extract(path: Path, plan: StreetPlan) -> None:
@@ -93,10 +94,10 @@ def _add_streets(text: _Extract, plan: StreetPlan) -> None:
     else:
         begins = _add_roundabout(text, plan, plan.roundabout)
     for arm in plan.arms:
-        reach = 0.0 if plan.roundabout is None else plan.roundabout
+        first = 1.0 if plan.roundabout is None else plan.roundabout + _STRAIGHT_ENTRY
         along = np.hypot(*arm.line.T)
-        nodes = [begins[id(arm)], *(text.node(place) for place in arm.line[along > reach + 1.0])]
-        along = np.concatenate([[0.0], along[along > reach + 1.0]])
+        nodes = [begins[id(arm)], *(text.node(place) for place in arm.line[along > first])]
+        along = np.concatenate([[0.0], along[along > first]])
         near = int(np.searchsorted(along, TURN_LANE_LENGTH)) if arm.turn_lane else 0
         if near:
             text.way(nodes[: near + 1], _street_tags(arm, turning=True, left_hand=plan.left_hand))
