@@ -22,7 +22,6 @@ _STOP_SECONDS = (20.0, 60.0)  # seconds
 _PARKED_GAP = 0.5  # metres between parked cars at least
 _BAY_LENGTH = 6.5  # metres of kerb for a parked car
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
-_CARS_AT_KERB = 3  # cars at the kerb of a street without parking lane
 _FIRST_BAY = 35.0  # metres from where the street begins
 _PARKING_SECONDS = 1e6  # seconds
 
@@ -83,6 +82,28 @@ VEHICLE_SHARES = {"car": 0.58, "van": 0.13, "truck": 0.10, "bus": 0.06, "motorcy
 
 
 @dataclass(frozen=True)
+class KerbParking:
+    """Rows of parked cars in the outer of several lanes of streets on which vehicles leave the network.
+
+    Parameters
+    ----------
+    bays : int
+        Of a row.
+    occupied : float
+        Share of the bays that hold a car.
+    streets : float
+        Share of the streets with room for a row that have one.
+    first : float, metres
+        From where the street begins to the first bay.
+    """
+
+    bays: int = 3
+    occupied: float = 1.0
+    streets: float = 0.5
+    first: float = _FIRST_BAY
+
+
+@dataclass(frozen=True)
 class Demand:
     """Traffic volumes by kind of road user.
 
@@ -98,8 +119,8 @@ class Demand:
         Shares of the vehicles by category.
     own_sizes : bool
         Whether each road user has a size of its own, drawn as `varied_bodies` draws it, in place of a model's.
-    kerbside : (int, float)
-        Where no street has parking lanes: cars of a row at the kerb at most, and share of the streets with room for one.
+    kerb : KerbParking
+        Where no street has parking lanes.
     """
 
     flow: float = 600.0
@@ -107,7 +128,7 @@ class Demand:
     pedestrians: float = 200.0
     shares: Mapping[str, float] = field(default_factory=VEHICLE_SHARES.copy)
     own_sizes: bool = False
-    kerbside: tuple[int, float] = (_CARS_AT_KERB, 0.5)
+    kerb: KerbParking = KerbParking()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.flow <= 3000.0:
@@ -116,7 +137,8 @@ class Demand:
             raise SeipError(f"--pedestrians must be 0 to 3000 per hour and arm, not {self.pedestrians:g}")
         if min(self.turns) < 0.0 or not 0.0 < sum(self.turns) < np.inf:
             raise SeipError(f"--turns must be three shares of which one is above 0, not {self.turns}")
-        if not self.shares.keys() <= MODELS.keys() or min(self.shares.values()) < 0.0 or not sum(self.shares.values()):
+        given = self.shares.values()
+        if not self.shares.keys() <= VEHICLE_SHARES.keys() or min(given, default=0.0) < 0.0 or not sum(given):
             raise SeipError(f"shares of vehicles are of {', '.join(VEHICLE_SHARES)}, and one is above 0: {self.shares}")
 
 
@@ -136,7 +158,7 @@ def write_routes(
             "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
         )
     random = np.random.default_rng([seed, 0])
-    bays = _bays(network, demand.kerbside, random)
+    bays = _bays(network, demand.kerb, random)
     entries = list(_parked(bays, random))
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
@@ -267,16 +289,11 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
 
 
 def _bays(
-    network: StreetNetwork, kerbside: tuple[int, float], random: np.random.Generator
+    network: StreetNetwork, kerb: KerbParking, random: np.random.Generator
 ) -> list[tuple[NetworkEdge, NetworkLane, float]]:
     """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
 
     A row stands in the outer of several lanes of some of the streets on which vehicles leave the network.
-
-    Parameters
-    ----------
-    kerbside : (int, float)
-        Cars of a row, and share of the streets that have one.
     """
     bays = [
         (edge, lane, float(place))
@@ -285,7 +302,7 @@ def _bays(
         for place in np.arange(_BAY_LENGTH + 2.0, lane.length - 2.0, _BAY_LENGTH)
         if random.random() < _OCCUPIED_SHARE
     ]
-    return bays or list(_rows(network, *kerbside, random))
+    return bays or list(_rows(network, kerb, random))
 
 
 def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.random.Generator) -> Iterator[_Departure]:
@@ -300,14 +317,15 @@ def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.rando
 
 
 def _rows(
-    network: StreetNetwork, cars: int, share: float, random: np.random.Generator
+    network: StreetNetwork, kerb: KerbParking, random: np.random.Generator
 ) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
-    for index in sorted(random.permutation(len(exits))[: math.ceil(share * len(exits))].tolist()):
+    for index in sorted(random.permutation(len(exits))[: math.ceil(kerb.streets * len(exits))].tolist()):
         lane = exits[index].of(DRIVING)[0]
-        first = _FIRST_BAY + float(random.uniform(0.0, _BAY_LENGTH))
-        for place in first + _BAY_LENGTH * np.arange(cars):
-            if place < lane.length - _BAY_LENGTH:
+        first = kerb.first + float(random.uniform(0.0, _BAY_LENGTH))
+        for place in first + _BAY_LENGTH * np.arange(kerb.bays):
+            held = kerb.occupied >= 1.0 or random.random() < kerb.occupied
+            if held and place < lane.length - _BAY_LENGTH:
                 yield exits[index], lane, float(place)
 
 

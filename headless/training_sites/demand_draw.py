@@ -1,6 +1,6 @@
 """Traffic of a training site: volumes, mix and signals drawn anew for each run."""
 
-from headless.sumo.demand import VEHICLE_SHARES, Demand
+from headless.sumo.demand import VEHICLE_SHARES, Demand, KerbParking
 from headless.sumo.simulation import SignalPlan
 
 import numpy as np
@@ -14,7 +14,8 @@ FLOW = {1: (300.0, 700.0), 2: (300.0, 950.0), 3: (400.0, 1100.0)}
 MIX_SPREAD = 0.45  # standard deviation of the logarithm by which each share of the mix differs from the usual
 LEAST_SHARES = {"truck": 0.08, "bus": 0.06, "motorcycle": 0.05, "bicycle": 0.08}  # of vehicles at least
 PEDESTRIANS = (60.0, 260.0)  # persons per hour and arm
-PARKED_ROW = (2, 9)  # cars in a row at the kerb
+BAYS = (3, 9)  # in a row at the kerb, the last one excluded
+FIRST_BAY = (18.0, 40.0)  # metres from the junction
 
 
 def draw_demand(plan: StreetPlan, random: Random) -> Demand:
@@ -33,7 +34,12 @@ def draw_demand(plan: StreetPlan, random: Random) -> Demand:
         pedestrians=round(float(random.uniform(*PEDESTRIANS)), 0),
         shares={name: round(share / sum(least.values()), 4) for name, share in least.items()},
         own_sizes=True,
-        kerbside=(int(random.integers(*PARKED_ROW)), float(random.uniform(0.3, 1.0))),
+        kerb=KerbParking(
+            bays=int(random.integers(*BAYS)),
+            occupied=round(float(random.uniform(0.5, 1.0)), 2),
+            streets=round(float(random.uniform(0.5, 1.0)), 2),
+            first=round(float(random.uniform(*FIRST_BAY)), 1),
+        ),
     )
 
 

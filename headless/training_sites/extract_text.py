@@ -8,16 +8,17 @@ import numpy as np
 from PIL import Image, TiffImagePlugin
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.openstreetmap.extract import EARTH_RADIUS
+from seip_addon.core.openstreetmap.crossings import EARTH_RADIUS
 from seip_addon.core.storage.files import whole_file
 
 from .street_plan import TURN_LANE_LENGTH, Arm, StreetPlan, Tags
 
-LATITUDE, LONGITUDE = 54.2, 7.2
-"""The middle of every plan, degrees: in the North Sea, where no street is."""
+LATITUDE, LONGITUDE = 54.2, 3.0
+"""The middle of every plan, degrees: in the North Sea, where no street is, and north is up on the map (UTM zone 31)."""
 TERRAIN_REACH, TERRAIN_STEP = 420.0, 2.0  # metres from the middle, and between two heights
 _SCALE, _TIE_POINT, _KEYS = 33550, 33922, 34735  # GeoTIFF's tags
 _WGS84 = 4326
+_STRAIGHT_ENTRY = 15.0  # metres that a street runs straight into a roundabout
 
 
 def write_extract(path: Path, plan: StreetPlan) -> None:
@@ -93,14 +94,14 @@ def _add_streets(text: _Extract, plan: StreetPlan) -> None:
     else:
         begins = _add_roundabout(text, plan, plan.roundabout)
     for arm in plan.arms:
-        reach = 0.0 if plan.roundabout is None else plan.roundabout
+        first = 1.0 if plan.roundabout is None else plan.roundabout + _STRAIGHT_ENTRY
         along = np.hypot(*arm.line.T)
-        nodes = [begins[id(arm)], *(text.node(place) for place in arm.line[along > reach + 1.0])]
-        along = np.concatenate([[0.0], along[along > reach + 1.0]])
+        nodes = [begins[id(arm)], *(text.node(place) for place in arm.line[along > first])]
+        along = np.concatenate([[0.0], along[along > first]])
         near = int(np.searchsorted(along, TURN_LANE_LENGTH)) if arm.turn_lane else 0
         if near:
-            text.way(nodes[: near + 1], _street_tags(arm, turning=True))
-        text.way(nodes[near:], _street_tags(arm, turning=False))
+            text.way(nodes[: near + 1], _street_tags(arm, turning=True, left_hand=plan.left_hand))
+        text.way(nodes[near:], _street_tags(arm, turning=False, left_hand=plan.left_hand))
 
 
 def _add_roundabout(text: _Extract, plan: StreetPlan, radius: float) -> dict[int, int]:
@@ -119,21 +120,25 @@ def _add_roundabout(text: _Extract, plan: StreetPlan, radius: float) -> dict[int
     return {id(arm): node for node, (_, arm) in zip(nodes, places, strict=True) if arm is not None}
 
 
-def _street_tags(arm: Arm, *, turning: bool) -> dict[str, str]:
+def _street_tags(arm: Arm, *, turning: bool, left_hand: bool) -> dict[str, str]:
     inwards = arm.lanes_in + turning
+    outwards = [f"{arm.lane_width}"] * arm.lanes_out  # from left to right
+    if arm.kerb_lane:
+        outwards.insert(0 if left_hand else len(outwards), f"{arm.kerb_lane}")
     tags = {
         "highway": arm.kind,
         "name": arm.name,
-        "lanes": str(inwards + arm.lanes_out),
-        "lanes:forward": str(arm.lanes_out),
+        "lanes": str(inwards + len(outwards)),
+        "lanes:forward": str(len(outwards)),
         "lanes:backward": str(inwards),
-        "width:lanes:forward": "|".join([f"{arm.lane_width}"] * arm.lanes_out),
+        "width:lanes:forward": "|".join(outwards),
         "width:lanes:backward": "|".join([f"{arm.lane_width}"] * inwards),
         "sidewalk": "both",
         "maxspeed": "50",
     }
     if turning:
-        tags["turn:lanes:backward"] = "|".join(["left", *["through;right"] * (inwards - 1)])
+        other = ["through;right"] * (inwards - 1) if not left_hand else ["through;left"] * (inwards - 1)
+        tags["turn:lanes:backward"] = "|".join([*other, "right"] if left_hand else ["left", *other])
     if arm.cycle_lanes:
         tags["cycleway:both"] = "lane"
     return tags

@@ -125,6 +125,7 @@ def make_site(folder: Path, settings: SiteSettings, number: int) -> Generator[Pr
         "key": key,
         "number": number,
         "settings": asdict(settings),
+        "attempts": attempt + 1,
         "plan": _plan_record(plan),
         "runs": runs,
         "versions": versions(blender=bpy.app.version_string),
@@ -236,6 +237,7 @@ def _plan_record(plan: StreetPlan) -> dict[str, Any]:
                 "lanes_out": arm.lanes_out,
                 "lane_width_m": arm.lane_width,
                 "turn_lane": arm.turn_lane,
+                "kerb_lane_m": arm.kerb_lane,
                 "cycle_lanes": arm.cycle_lanes,
                 "slope": round(arm.slope, 4),
             }

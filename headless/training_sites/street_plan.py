@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -20,7 +20,8 @@ Tags = Mapping[str, str]
 ARM_SHARES = {3: 0.3, 4: 0.5, 5: 0.2}  # of junctions with so many arms
 MIN_ANGLES = {3: 70.0, 4: 58.0, 5: 52.0}  # degrees between two arms at least
 ARM_LENGTH = (150.0, 200.0)  # metres from the middle
-MAX_BEND = 18.0  # degrees by which the end of an arm lies beside the direction in which it begins
+MAX_BEND = 12.0  # degrees by which the end of an arm lies beside the direction in which it begins
+STRAIGHT, NODE_SPACING = 25.0, 2.5  # metres of an arm before it bends, and between its nodes: few show as kinks
 MAX_SLOPE = 0.06
 FLAT_RADIUS = 16.0  # metres about the middle within which the ground is level
 RAMP = 24.0  # metres beyond that over which arms reach their slope
@@ -28,8 +29,9 @@ ROUNDABOUT_SHARE, LEFT_HAND_SHARE, LEVEL_SHARE = 0.18, 0.35, 0.25
 SIGNALS_SHARE = 0.6  # of junctions that are no roundabouts
 TURN_LANE_SHARE, CYCLE_LANE_SHARE = 0.4, 0.3  # of arms
 TURN_LANE_LENGTH = 45.0  # metres from the middle
-LANES = {1: 0.55, 2: 0.35, 3: 0.10}  # shares of lanes in each direction
-LANE_WIDTH = (2.9, 3.6)  # metres
+LANES = {1: 0.5, 2: 0.37, 3: 0.13}  # shares of lanes in each direction
+LANE_WIDTH, KERB_LANE = (2.9, 3.6), (2.4, 2.9)  # metres
+KERB_LANE_SHARE = 0.6  # of arms
 SIDEWALK, CYCLE_LANE = 2.5, 1.5  # metres, as the builder lays them
 CLEARANCE = 0.6  # metres between pavements and what stands behind them
 BUILT_REACH = 125.0  # metres from the middle within which something stands beside the streets
@@ -48,6 +50,8 @@ class Arm:
     lane_width : float, metres
     turn_lane : bool
         Whether one more lane towards the junction begins `TURN_LANE_LENGTH` before it.
+    kerb_lane : float, metres
+        Width of one more lane away from the junction, at whose kerb cars may stand; 0 where there is none.
     cycle_lanes : bool
     slope : float
         Rise per metre, away from the junction.
@@ -60,14 +64,16 @@ class Arm:
     lanes_out: int
     lane_width: float
     turn_lane: bool
+    kerb_lane: float
     cycle_lanes: bool
     slope: float
 
     @property
     def half_width(self) -> float:
         """Half of its width with pavements where it is widest, metres."""
-        lanes = max(self.lanes_in + self.turn_lane, self.lanes_out)
-        return lanes * self.lane_width + CYCLE_LANE * self.cycle_lanes + SIDEWALK
+        inwards = (self.lanes_in + self.turn_lane) * self.lane_width
+        outwards = self.lanes_out * self.lane_width + self.kerb_lane
+        return max(inwards, outwards) + CYCLE_LANE * self.cycle_lanes + SIDEWALK
 
     @property
     def angle(self) -> float:
@@ -165,6 +171,7 @@ def _draw_arms(random: Random) -> tuple[Arm, ...]:
                 lanes_in=lanes,
                 lanes_out=lanes if random.random() < _SAME_LANES else max(lanes - 1, 1),
                 lane_width=round(float(random.uniform(*LANE_WIDTH)), 2),
+                kerb_lane=round(float(random.uniform(*KERB_LANE)), 2) if random.random() < KERB_LANE_SHARE else 0.0,
                 turn_lane=lanes < max(LANES) and random.random() < TURN_LANE_SHARE,
                 cycle_lanes=random.random() < CYCLE_LANE_SHARE,
                 slope=slope,
@@ -185,15 +192,15 @@ def _draw_line(angle: float, random: Random) -> Float:
     """Return the middle of an arm: straight at first, then bending to one side."""
     length = float(random.uniform(*ARM_LENGTH))
     bend = math.radians(MAX_BEND) * float(random.uniform(-1.0, 1.0))
-    along = np.array([0.0, 30.0, TURN_LANE_LENGTH, 70.0, 95.0, 120.0, length])
-    turned = angle + bend * np.clip((along - 30.0) / (length - 30.0), 0.0, 1.0) ** 2
+    along = np.concatenate([np.arange(0.0, length, NODE_SPACING), [length]])
+    turned = angle + bend * np.clip((along - STRAIGHT) / (length - STRAIGHT), 0.0, 1.0) ** 2
     line: Float = along[:, None] * np.column_stack([np.cos(turned), np.sin(turned)])
     return line
 
 
 def _at_roundabout(arm: Arm) -> Arm:
     """Return an arm with one lane in each direction, as roundabouts have."""
-    return Arm(arm.name, arm.kind, arm.line, 1, 1, arm.lane_width, False, arm.cycle_lanes, arm.slope)  # noqa: FBT003
+    return replace(arm, lanes_in=1, lanes_out=1, turn_lane=False)
 
 
 def _draw_things(plan: StreetPlan, random: Random) -> Iterator[Thing]:
@@ -282,7 +289,8 @@ def _draw_walls(plan: StreetPlan, taken: BaseGeometry, random: Random) -> Iterat
         if random.random() > _WALLED_SHARE:
             continue
         distance = side * (arm.half_width + CLEARANCE + float(random.uniform(0.2, 1.0)))
-        line = shapely.LineString(arm.line).offset_curve(distance)
+        parallel = shapely.get_parts(shapely.LineString(arm.line).offset_curve(distance))
+        line = max(parallel, key=lambda part: part.length)
         begin = float(random.uniform(20.0, 60.0))
         stretch = substring(line, begin, begin + float(random.uniform(15.0, 60.0)))
         for part in shapely.get_parts(shapely.difference(stretch, taken)):

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from headless.sumo import simulation as sumo
-from headless.sumo.demand import MODELS, VEHICLE_SHARES, Demand, write_routes
+from headless.sumo.demand import MODELS, VEHICLE_SHARES, Demand, KerbParking, write_routes
 from headless.sumo.street_network import DRIVING, PARKING, WALKING, read_network
 
 import numpy as np
@@ -113,6 +113,42 @@ def test_rows_of_parked_cars_leave_a_lane_and_deliveries_keep_clear(tmp_path):
     assert others
     assert not parked & set(others)
     assert not any(lane.startswith("in") for lane in others)  # it has one lane: nobody could pass
+
+
+def test_rows_at_the_kerb_are_as_asked_for(tmp_path):
+    def stops(**kerb):
+        root, _ = routes(tmp_path, three_ways(tmp_path), kerb=KerbParking(**kerb))
+        return [vehicle.find("stop") for vehicle in root.iter("vehicle") if vehicle.get("id").startswith("parked")]
+
+    assert len({stop.get("lane") for stop in stops(streets=1.0)}) == 3
+    assert not stops(bays=0)
+    assert not stops(occupied=0.0)
+    assert 0 < len(stops(bays=8, occupied=0.5, streets=1.0)) < len(stops(bays=8, streets=1.0))
+    assert min(float(stop.get("endPos")) for stop in stops(first=10.0)) < 17.0
+
+
+def test_own_sizes_are_drawn_for_each_road_user(tmp_path):
+    root, text = routes(tmp_path, three_ways(tmp_path), flow=1500.0, own_sizes=True)
+    types = finish(read_vehicle_types([tmp_path / "r.rou.xml"]))
+    moving = [entry for entry in root if entry.tag in ("vehicle", "person")]
+    assert all(entry.get("type") == entry.get("id") for entry in moving)
+    for entry in moving:
+        category, own = entry.get("id").partition("-")[0], types[entry.get("id")]
+        assert own.category in ({"car", "van"} if category == "parked" else {category})
+        assert category != "parked" or own.length <= 6.0
+    cars = [types[entry.get("id")] for entry in moving if entry.get("id").startswith("car")]
+    assert len({(car.length, car.width, car.height) for car in cars}) > 0.9 * len(cars) > 50
+    assert all(3.6 <= car.length <= 5.2 for car in cars)
+    assert text == routes(tmp_path, three_ways(tmp_path), flow=1500.0, own_sizes=True)[1]
+    _, plain = routes(tmp_path, three_ways(tmp_path), flow=1500.0)
+    drives = [line.partition('depart="')[2] for line in plain.decode().splitlines() if "<vehicle " in line]
+    assert drives == [line.partition('depart="')[2] for line in text.decode().splitlines() if "<vehicle " in line]
+
+
+@pytest.mark.parametrize("shares", [{"tram": 1.0}, {"car": 0.0}, {"car": 1.0, "bus": -0.1}, {}])
+def test_no_mix_of_vehicles_is_one_sentence(shares):
+    with pytest.raises(SeipError, match="shares of vehicles are of car, van"):
+        Demand(shares=shares)
 
 
 def test_parking_lanes_are_used_where_there_are_any(tmp_path):
