@@ -21,6 +21,8 @@ _BAY_LENGTH = 6.5  # metres of kerb for a parked car
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
 _CARS_AT_KERB = 3  # cars at the kerb of a street without parking lane
 _FIRST_BAY = 35.0  # metres from where the street begins
+_ROWS_ALONG = 2  # places for a row of cars along the kerb of a street, one behind the other
+_SHIFT = 0.26  # of a bay from seed to seed: four in turn are 1.4 m apart, and after many all places have been taken
 _PARKING_SECONDS = 1e6  # seconds
 
 
@@ -111,6 +113,9 @@ def write_routes(
 ) -> None:
     """Write the routes of all road users from 0 to ``duration`` seconds; the same for the same seed.
 
+    All is drawn anew for each seed: who comes when, on what way, in which vehicle, and where which cars are parked. The
+    seed is in the names of all, as paint goes by the name.
+
     Raises
     ------
     SeipError
@@ -122,15 +127,15 @@ def write_routes(
             "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
         )
     random = np.random.default_rng([seed, 0])
-    bays = _bays(network, random)
-    entries = list(_parked(bays, random))
+    bays = _bays(network, seed, random)
+    entries = list(_parked(bays, seed, random))
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
         random = np.random.default_rng([seed, 1, number])
         for depart in _departures(demand.flow, random, duration):
             route = _route(network, arm, demand.turns, random)
-            entries.append(_vehicle(f"{arm.id}.{len(entries)}", depart, route, free, random))
-    entries += _walkers(network, demand.pedestrians * len(arms), np.random.default_rng([seed, 2]), duration)
+            entries.append(_vehicle(f"{seed}.{arm.id}.{len(entries)}", depart, route, free, random))
+    entries += _walkers(network, demand.pedestrians * len(arms), seed, duration)
     entries.sort(key=lambda entry: entry.depart)
     lines = ["<routes>", *_type_lines(), *(entry.text for entry in entries), "</routes>"]
     with whole_file(path) as temporary:
@@ -217,43 +222,56 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
     return f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{random.uniform(*_STOP_SECONDS):.0f}"/>'
 
 
-def _bays(network: StreetNetwork, random: np.random.Generator) -> list[tuple[NetworkEdge, NetworkLane, float]]:
-    """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
+def _bays(
+    network: StreetNetwork, seed: int, random: np.random.Generator
+) -> list[tuple[NetworkEdge, NetworkLane, float]]:
+    """Return the middles of the bays where cars stand all the time: in parking lanes, or else in rows at the kerb.
 
-    A row stands in the outer of several lanes of every second street on which vehicles leave the network.
+    A row stands in the outer of several lanes of every second street on which vehicles leave the network. Bays are not
+    marked on the road: those of one seed lie between those of the others, so that no run has cars where another has.
     """
+    shift = _BAY_LENGTH * (seed * _SHIFT % 1.0)
     bays = [
         (edge, lane, float(place))
         for edge in network.edges.values()
         for lane in edge.of(PARKING)
-        for place in np.arange(_BAY_LENGTH + 2.0, lane.length - 2.0, _BAY_LENGTH)
+        for place in np.arange(_BAY_LENGTH + shift, lane.length - _BAY_LENGTH / 2.0 - 1.0, _BAY_LENGTH)
         if random.random() < _OCCUPIED_SHARE
     ]
-    return bays or list(_rows(network, random))
+    return bays or list(_rows(network, seed))
 
 
-def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.random.Generator) -> Iterator[_Departure]:
+def _parked(
+    bays: list[tuple[NetworkEdge, NetworkLane, float]], seed: int, random: np.random.Generator
+) -> Iterator[_Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
-    for number, (edge, lane, place) in enumerate(bays):
+    for number, (edge, lane, middle) in enumerate(bays):
+        model = _pick(models, random)
+        front = middle + models[model].length / 2.0
         text = (
-            f'<vehicle id="parked-{number}" type="parked_{_pick(models, random)}" depart="0" departLane="{lane.index}" '
-            f'departPos="{place:.1f}" departSpeed="0"><route edges="{edge.id}"/>'
-            f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
+            f'<vehicle id="parked-{seed}.{number}" type="parked_{model}" depart="0" departLane="{lane.index}" '
+            f'departPos="{front:.2f}" departSpeed="0"><route edges="{edge.id}"/>'
+            f'<stop lane="{edge.id}_{lane.index}" endPos="{front:.2f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
         )
         yield _Departure(0.0, text)
 
 
-def _rows(network: StreetNetwork, random: np.random.Generator) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
+def _rows(network: StreetNetwork, seed: int) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
+    """Yield the bays of rows of cars: from seed to seed they go round the streets, then along them, then by a shift."""
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
-    for index in sorted(random.permutation(len(exits))[: (len(exits) + 1) // 2].tolist()):
-        lane = exits[index].of(DRIVING)[0]
-        first = _FIRST_BAY + float(random.uniform(0.0, _BAY_LENGTH))
+    rows = (len(exits) + 1) // 2
+    for number in range(seed * rows, (seed + 1) * rows):
+        edge = exits[number % len(exits)]
+        lane = edge.of(DRIVING)[0]
+        along, turn = number // len(exits) % _ROWS_ALONG, number // len(exits) // _ROWS_ALONG
+        first = _FIRST_BAY + _BAY_LENGTH * (along * _CARS_AT_KERB + turn * _SHIFT % 1.0)
         for place in first + _BAY_LENGTH * np.arange(_CARS_AT_KERB):
             if place < lane.length - _BAY_LENGTH:
-                yield exits[index], lane, float(place)
+                yield edge, lane, float(place)
 
 
-def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, duration: float) -> Iterator[_Departure]:
+def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[_Departure]:
+    random = np.random.default_rng([seed, 2])
     pavements = [
         (edge, lane) for edge in network.edges.values() for lane in edge.of(WALKING) if lane.length > _MIN_PAVEMENT
     ]
@@ -272,6 +290,7 @@ def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, d
         begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
         yield _Departure(
             depart,
-            f'<person id="pedestrian-{number}" type="{_pick(MODELS["pedestrian"], random)}" depart="{depart}" '
-            f'departPos="{begin:.1f}"><walk from="{origin.id}" to="{target.id}" arrivalPos="{end:.1f}"/></person>',
+            f'<person id="pedestrian-{seed}.{number}" type="{_pick(MODELS["pedestrian"], random)}" '
+            f'depart="{depart}" departPos="{begin:.1f}">'
+            f'<walk from="{origin.id}" to="{target.id}" arrivalPos="{end:.1f}"/></person>',
         )
