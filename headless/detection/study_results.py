@@ -21,7 +21,7 @@ from headless.claims import Claim
 
 import numpy as np
 
-from seip_addon.core.estimates import Interval, rank_correlation, rank_correlation_interval
+from seip_addon.core.estimates import SHARE, Interval, mean_interval, rank_correlation, rank_correlation_interval
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .breakdown import (
@@ -239,9 +239,8 @@ def save_record(
 def in_words(results: StudyResults) -> Iterator[str]:
     """Yield a line for each configuration, and one on whether coverage foretells detection."""
     for cell in cells([outcome.seed_result for outcome in results.masked]):
-        between = "" if cell.interval is None else f" ({cell.interval[0]:.1%} to {cell.interval[1]:.1%})"
         yield (
-            f"{cell.name}: AP {cell.mean:.1%}{between} of vehicles at an overlap of 0.7 in plan, "
+            f"{cell.name}: AP {cell.mean:.1%}{_between(cell.interval)} of vehicles at an overlap of 0.7 in plan, "
             f"coverage {cell.coverage:.1%}, ${cell.price:,.0f}"
         )
         yield f"  {_by_rules(results, cell.name)}"
@@ -254,5 +253,17 @@ def in_words(results: StudyResults) -> Iterator[str]:
 def _by_rules(results: StudyResults, name: str) -> str:
     """Return the average precision of one configuration by the other rules, the mean over trainings, in words."""
     tables = [one.precisions for one in results.masked if one.configuration.name == name]
-    others = [rule for rule in RULES if RULES[rule] is not MAIN_RULE and tables[0][rule].road_users]
-    return ", ".join(f"{rule} {np.mean([table[rule].value for table in tables]):.1%}" for rule in others)
+    words = []
+    for rule in RULES:
+        values = [table[rule].value for table in tables]
+        if RULES[rule] is not MAIN_RULE and tables[0][rule].road_users:
+            interval = mean_interval(values, SHARE) if len(values) > 1 else None
+            words.append(f"{rule} {np.mean(values):.1%}{_between(interval)}")
+    over_traffic = tables[0][next(iter(RULES))].interval
+    if over_traffic is not None:
+        words.append(f"of the first training over other traffic {over_traffic[0]:.1%} to {over_traffic[1]:.1%}")
+    return ", ".join(words)
+
+
+def _between(interval: Interval | None) -> str:
+    return "" if interval is None else f" ({interval[0]:.1%} to {interval[1]:.1%})"

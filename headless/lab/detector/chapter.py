@@ -121,7 +121,8 @@ def _on_other_scene(
 
 
 def _studio(layout: Layout) -> Simulator:
-    return Simulator(static_scene(layout.geometry), ScanSettings(engine=layout.settings.engine), layout.site.name)
+    scans = ScanSettings(rolling_shutter=True, engine=layout.settings.engine)
+    return Simulator(static_scene(layout.geometry), scans, layout.site.name)
 
 
 def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:
