@@ -18,14 +18,13 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.parked import shared_bays
 from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
 
-from .average_precision import ADVISED_TEST_RUNS, Evaluation, average_precision_interval, balanced_score, evaluate
+from .average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
 from .breakdown import false_positives
 from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
@@ -42,7 +41,7 @@ from .suitability import suitability_warnings
 from .training import TrainedDetector, deterministic, train
 
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
-TEST_SHARE, VALIDATION_SHARE = 2, 8  # every second run is for tests, every eighth for validation
+RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
 
 SPLIT = "the last half for tests, an eighth before it (one at least) for validation, the others to learn from"
 """How runs are split, in words."""
@@ -107,11 +106,11 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     if len(paths) < MIN_RUNS:
         raise SeipError(
             f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, better "
-            f"{TEST_SHARE * ADVISED_TEST_RUNS}, made by headless/traffic.py with a seed each: {SPLIT}"
+            f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by headless/traffic.py with a seed each: {SPLIT}"
         )
     runs = read_runs(paths, origin, every)
-    tested = len(runs) // TEST_SHARE
-    learnt = len(runs) - tested - max(1, len(runs) // VALIDATION_SHARE)
+    tested = len(runs) // RUNS_PER_TEST
+    learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
     return Traffic(runs[:learnt], runs[learnt:-tested], runs[-tested:])
 
 
@@ -187,11 +186,6 @@ class DetectorOutcome:
     def kitti(self) -> Kitti:
         """KITTI's figures by the study's own rule."""
         return kitti(self.frames, MAIN_RULE)
-
-    @cached_property
-    def interval(self) -> Interval | None:
-        """95 % interval of the average precision over other traffic like this."""
-        return average_precision_interval(self.evaluation)
 
 
 def model_configurations(

@@ -102,23 +102,20 @@ def _decided(claim: Claim, results: Sequence[SeedResult]) -> Claim:
 
 
 def _doubts(results: Sequence[SeedResult]) -> Iterator[str]:
-    cells = dict.fromkeys((result.sensor, result.count) for result in results if not result.padded)
-    precision = [
-        _mean(_by_seed([one for one in results if not one.padded], *cell, lambda one: one.average_precision)).value
-        for cell in cells
-    ]
-    best = max((value for value in precision if not np.isnan(value)), default=0.0)
+    masked = [one for one in results if not one.padded]
+    cells = {(one.sensor, one.count) for one in masked}
+    reached = (_mean(_by_seed(masked, *cell, lambda one: one.average_precision)).value for cell in cells)
+    best = max(reached, default=0.0)
     if best < LEAST_PRECISION:
         yield (
             f"the detectors reach an AP of {best:.1%} with the best of these placements, and below "
             f"{LEAST_PRECISION:.0%} they say nothing about sensors"
         )
-    trainings = {(one.seed, one.padded, one.sensor, one.count): one.still_rising for one in results}
-    seeds = {(seed, padded) for seed, padded, _, _ in trainings}
-    rising = {(seed, padded) for (seed, padded, _, _), rises in trainings.items() if rises}
+    trainings = {(one.seed, one.padded) for one in results}
+    rising = {(one.seed, one.padded) for one in results if one.still_rising}
     if rising:
         yield (
-            f"validation AP was still rising when {len(rising)} of {len(seeds)} trainings ended: train longer, "
+            f"validation AP was still rising when {len(rising)} of {len(trainings)} trainings ended: train longer, "
             "with --steps"
         )
 

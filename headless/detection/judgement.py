@@ -13,7 +13,7 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
 from seip_addon.core.traffic.bodies import fitted_body
 
-from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
+from .average_precision import Evaluation, balanced_score, evaluate
 from .cloud_in_plan import CloudInPlan
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
@@ -45,11 +45,6 @@ class Judgement:
     fullest: int
     cloud: NDArray[np.float32]
     score: float
-
-    @property
-    def interval(self) -> Interval | None:
-        """95 % interval of the average precision over other traffic like this."""
-        return average_precision_interval(self.evaluation)
 
     def precisions(self) -> Iterator[tuple[str, float, Interval | None, int]]:
         """Yield name, average precision, interval and number of road users by each rule by which there are any."""
