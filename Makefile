@@ -63,17 +63,18 @@ test-traffic: sumo
 	$(PY) -m pytest tests/core/opendrive/test_shipped_maps.py tests/headless/test_traffic_simulation.py tests/headless/test_traffic.py \
 	  tests/core/openstreetmap/test_sites.py tests/headless/test_training_sites.py
 
-# Runs of one scene differ by their seed alone; dense ones have twice the vehicles.
+# Runs of one scene differ by their seed, and by the second of the signals' cycle of 60 s at which they begin; dense ones
+# have twice the vehicles. They are many and short, as whole runs alone are independent of each other.
 traffic: sumo
-	for seed in 1 2 3 4 5 6; do \
-	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 550 --pedestrians 120 \
-	    --duration 75 --seed $$seed -o scenes/junction_traffic/run-$$seed.npz || exit; done
-	for seed in 11 13; do \
+	for seed in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16; do \
+	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 500 --pedestrians 120 \
+	    --duration 40 --warm-up $$((120 + 37 * seed % 60)) --seed $$seed -o scenes/junction_traffic/run-$$seed.npz || exit; done
+	for seed in 21 22 23 24; do \
 	  $(PY) -m headless.traffic scenes/junction.blend --simulate scenes/junction.xodr --flow 1100 --pedestrians 120 \
-	    --duration 75 --seed $$seed -o scenes/junction_traffic_dense/run-$$seed.npz || exit; done
-	for seed in 1 2; do \
+	    --duration 40 --warm-up $$((120 + 37 * seed % 60)) --seed $$seed -o scenes/junction_traffic_dense/run-$$seed.npz || exit; done
+	for seed in 7 8 9 10; do \
 	  $(PY) -m headless.traffic scenes/corridor.blend --simulate scenes/corridor.xodr --flow 450 --pedestrians 100 \
-	    --duration 75 --seed $$seed -o scenes/corridor_traffic/run-$$seed.npz || exit; done
+	    --duration 40 --warm-up $$((120 + 37 * seed % 60)) --seed $$seed -o scenes/corridor_traffic/run-$$seed.npz || exit; done
 
 # PyTorch: 200 MB for the CPU alone, several GB where pip finds builds for graphics cards first.
 detection: environment

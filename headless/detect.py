@@ -18,15 +18,16 @@ if not __package__:  # run as a file by `blender -P`
 from headless import runtime, survey
 from headless.charts.detection import PrecisionRecallLine, save_parts_chart, save_precision_recall_chart
 from headless.charts.error_view import save_error_view
-from headless.detection.average_precision import precision_recall
+from headless.detection.average_precision import precision_recall, too_few_runs
 from headless.detection.breakdown import DISTANCE_EDGES, POINT_EDGES, average_precision_by, recall_by
-from headless.detection.case_study import MAIN_RULE, read_runs
+from headless.detection.case_study import read_runs
 from headless.detection.chart_data import error_view, parts
 from headless.detection.detection_area import area_of
 from headless.detection.detector import Detector, check_device
 from headless.detection.judgement import Judgement, figures, judge
+from headless.detection.rules import MAIN_RULE
 from headless.detection.suitability import suitability_warnings
-from headless.options import add_settings, new_parser, read_settings
+from headless.options import add_rolling_shutter, add_settings, new_parser, read_settings
 
 import bpy
 import numpy as np
@@ -35,6 +36,7 @@ from seip_addon.core.datasets.detection_files import kitti_results, openpcdet_re
 from seip_addon.core.errors import SeipError
 from seip_addon.core.lidar import load_catalogue
 from seip_addon.core.results.placement_record import versions
+from seip_addon.core.robustness.traffic_instants import check_runs
 from seip_addon.core.scans import MountedSensor, ScanSettings, static_scene
 from seip_addon.core.scans.static_scene import StaticScene
 from seip_addon.core.site.weather import weather_of
@@ -70,6 +72,7 @@ def main(argv: list[str]) -> None:
         moved = [vehicle_positions(run.name, run.trajectories) for run in runs]
         runtime.LOG.info(require_independent(combinations(moved, 2)))
     static = static_scene(geometry, sensors)
+    check_runs([run.trajectories for run in runs], static.region)
     scans = read_settings(
         ScanSettings, options, weather=tuple(options.weather), reflectivity=tuple(options.reflectivity)
     )
@@ -78,6 +81,7 @@ def main(argv: list[str]) -> None:
     judgement = runtime.finish_with_bar(steps)
     types = sorted({sensor.model.key for sensor in sensors})
     doubts = suitability_warnings(detector, types, area, judgement.scan)
+    doubts = (*doubts, *filter(None, [too_few_runs(len(runs))]))
     runtime.warn(doubts)
     with runtime.incomplete_if_interrupted(options.output):
         _save(options.output, judgement, static, sensors, geometry.name)
@@ -138,7 +142,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--threads", type=int, default=1, help="of torch")
     add_settings(parser, SurveySettings, "catalogue")
     how = parser.add_argument_group("measurement")
-    add_settings(how, ScanSettings, "seed", "rolling_shutter")
+    add_settings(how, ScanSettings, "seed")
+    add_rolling_shutter(how)
     survey.add_optics(how)
     add_settings(how, ScanSettings, "engine")
     return parser

@@ -18,17 +18,19 @@ from headless import runtime, survey
 from headless.claims import save_claims
 from headless.coverage_study.cells import COUNTS
 from headless.detection import case_study, study_results
+from headless.detection.average_precision import too_few_runs
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
 from headless.detection.recordings import SensorConfiguration, Simulator
 from headless.detection.settings import NetworkSettings, TrainingSettings
-from headless.options import new_parser
+from headless.options import add_rolling_shutter, new_parser
 
 import bpy
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.placement.objective import Objective, check_objective
 from seip_addon.core.results.placement_record import versions
+from seip_addon.core.robustness.traffic_instants import check_runs
 from seip_addon.core.scans import ScanSettings
 from seip_addon.core.workflows.survey import Survey
 
@@ -57,11 +59,10 @@ def main(argv: list[str]) -> None:
     for name, sentences in case_study.suitability_by_configuration(simulator, models, detectors, study.traffic).items():
         runtime.warn(f"{name}: {sentence}" for sentence in sentences)
     outcomes = watch.run("evaluation", case_study.evaluate_all(simulator, models, detectors, study.traffic))
-    claims = detection_claims([outcome.seed_result for outcome in outcomes])
-
-    site = study.surveyed.site
+    site, curves = study.surveyed.site, tuple(one.curve for one in trained)
+    results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes), curves)
+    claims = detection_claims(results.seed_results)
     with runtime.incomplete_if_interrupted(folder):
-        results = study_results.StudyResults(site.name, simulator, study.traffic, tuple(models), tuple(outcomes))
         study_results.save_charts(folder, results, trained)
         study_results.save_table(folder / "detection.csv", results)
         settings = study.surveyed.settings.as_record() | {"seeds": options.seeds, "frames_every_s": options.every}
@@ -104,9 +105,12 @@ def prepare_study(options: argparse.Namespace) -> DetectionStudy:
     )
     paths = options.traffic or survey.runs_beside(options.scene)
     traffic = case_study.read_traffic(paths, surveyed.geometry.origin, options.every)
+    check_runs([run.trajectories for runs in vars(traffic).values() for run in runs], surveyed.site.region)
     runtime.LOG.info(traffic.overlap())
+    runtime.LOG.info(traffic.shared_bays())
+    runtime.warn(filter(None, [too_few_runs(len(traffic.test))]))
     configurations = watch.run("placements", case_study.place_all(surveyed))
-    scans = ScanSettings(seed=options.scan_seed, engine=options.engine)
+    scans = ScanSettings(seed=options.scan_seed, rolling_shutter=options.rolling_shutter, engine=options.engine)
     simulator = Simulator(surveyed.geometry, scans)
     return DetectionStudy(surveyed, watch, traffic, configurations, simulator)
 
@@ -121,12 +125,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="NPZ",
-        help="runs of traffic: the last two for tests, the one before for validation, the others to learn from "
-        "(those in the folder SCENE_traffic beside the scene)",
+        help=f"runs of traffic: {case_study.SPLIT} (those in the folder SCENE_traffic beside the scene)",
     )
     detection.add_argument("--every", type=float, default=2.5, metavar="S", help="time from frame to frame")
     detection.add_argument("--steps", type=int, default=TrainingSettings().steps, help="of each training")
     detection.add_argument("--scan-seed", type=int, default=0, help="of noise and lost returns")
+    add_rolling_shutter(detection)
     detection.add_argument("--device", default="cpu", help="of torch: cpu or cuda")
 
 

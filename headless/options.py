@@ -67,6 +67,16 @@ def add_settings(group: argparse._ActionsContainer, kind: type, *names: str) -> 
         group.add_argument(_option(name, about), help=about.help, **_arguments(hints[name], default, about))
 
 
+def add_rolling_shutter(group: argparse._ActionsContainer) -> None:
+    """Add the option that lets traffic stand still while sensors turn, to a command for which it moves."""
+    group.add_argument(
+        "--rolling-shutter",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="traffic moves while a sensor turns, and boxes are where their points are from (on)",
+    )
+
+
 def name_only(group: argparse._ArgumentGroup, reference: str) -> None:
     """Have help name the options of a group alone, and refer to where they are explained."""
     names = (action.option_strings[-1] for action in group._group_actions)  # noqa: SLF001 -- argparse has no other way

@@ -22,7 +22,7 @@ Examples
 >>> traffic = seip.load_traffic("scenes/junction_traffic/run-1.npz", geometry)
 >>> frame = seip.scan(geometry, solution, traffic, time=30.0)
 >>> frame.points.dtype, frame.points.shape[1], len(frame.labels.category)
-(dtype('float32'), 3, 50)
+(dtype('float32'), 3, 54)
 """
 
 import os

@@ -8,15 +8,13 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Integer, Text
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval, percentiles
+from seip_addon.core.estimates import Interval, share_interval
 
 from .frame_results import FrameResult
 from .matching import Match, Rule, match
 
-BLOCK_SECONDS = 10.0  # seconds of a run whose frames are drawn together: they show much the same vehicles
-MIN_BLOCKS = 5  # blocks below which an interval would say more about chance than about the traffic
-
-RESAMPLES, RESAMPLES_AT_ONCE = 1000, 50
+MIN_TEST_RUNS = 4  # runs below which there is no interval: of three it would leave nearly everything open
+ADVISED_TEST_RUNS = 8
 
 Table = TypeVar("Table", "EvaluatedDetections", "CountedTruth")
 
@@ -96,14 +94,14 @@ class Evaluation:
 
     Parameters
     ----------
-    block : (f,) int64
-        The block of each frame; frames of one block are drawn together.
+    run : (f,) int64
+        The run of traffic of each frame, counted from 0.
     """
 
     rule: Rule
     detections: EvaluatedDetections
     wanted: CountedTruth
-    block: Integer
+    run: Integer
 
     @property
     def average_precision(self) -> float:
@@ -130,7 +128,8 @@ def evaluate(frames: Sequence[FrameResult], rule: Rule) -> Evaluation:
             f"{rule.fewest_points} returns or more: there is no average precision without one, so evaluate on frames "
             "with traffic"
         )
-    return Evaluation(rule, _evaluated(frames, matches), _wanted(frames, matches), _blocks(frames))
+    run = np.unique([frame.run for frame in frames], return_inverse=True)[1]
+    return Evaluation(rule, _evaluated(frames, matches), _wanted(frames, matches), run)
 
 
 def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
@@ -141,37 +140,41 @@ def precision_recall(evaluation: Evaluation) -> PrecisionRecall:
     return PrecisionRecall(detections.score[last], hits / (last + 1), hits / max(len(evaluation.wanted), 1))
 
 
-def average_precision_interval(evaluation: Evaluation, seed: int) -> Interval | None:
-    """Return the 95 % interval of the average precision over other traffic like this, or None on too few blocks.
+def average_precision_interval(evaluation: Evaluation) -> Interval | None:
+    """Return the 95 % interval of the average precision over other traffic like this, or None on too few runs.
 
-    Bootstrap (Efron 1979) over blocks of `BLOCK_SECONDS` seconds of each run: frames that follow each other are nearly
-    the same, and drawn one by one they would feign certainty. It says nothing about another training.
-
-    Parameters
-    ----------
-    seed : int
-        The same seed draws the same blocks.
+    Runs alone are independent: what is seen now is seen again ten seconds later, and frames or stretches of a run drawn
+    one by one would feign certainty. See `share_interval`. It says nothing about another training.
     """
-    if int(evaluation.block.max()) + 1 < MIN_BLOCKS:
+    left_out = average_precisions_without_each_run(evaluation)
+    if left_out is None:
         return None
-    return percentiles(resampled_average_precisions(evaluation, seed))
+    return share_interval(evaluation.average_precision, left_out, len(evaluation.wanted))
 
 
-def resampled_average_precisions(evaluation: Evaluation, seed: int, resamples: int = RESAMPLES) -> Float:
-    """Return the average precision in resamples of the blocks of traffic, (resamples,).
+def average_precisions_without_each_run(evaluation: Evaluation) -> Float | None:
+    """Return the average precision of all runs but one, for each of the r runs, (r,), or None on too few runs.
 
-    Two evaluations of the same frames draw the same blocks with the same seed:
-    the differences of what is returned are those of pairs.
+    Too few are below `MIN_TEST_RUNS` with road users that count. Two evaluations of the same frames leave out the same
+    runs: the differences of what is returned are those of pairs.
     """
-    count = int(evaluation.block.max()) + 1
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=resamples)
-    of_detection = evaluation.block[evaluation.detections.frame]
-    of_wanted = np.bincount(evaluation.block[evaluation.wanted.frame], minlength=count)
-    areas = [
-        _areas(evaluation, times[:, of_detection], times @ of_wanted)
-        for times in np.split(drawn, range(RESAMPLES_AT_ONCE, resamples, RESAMPLES_AT_ONCE))
-    ]
-    return np.concatenate(areas)
+    count = int(evaluation.run.max()) + 1
+    of_detection = evaluation.run[evaluation.detections.frame]
+    wanted = np.bincount(evaluation.run[evaluation.wanted.frame], minlength=count)
+    if np.count_nonzero(wanted) < MIN_TEST_RUNS:
+        return None
+    kept = 1.0 - np.eye(count)
+    return _areas(evaluation, kept[:, of_detection], kept @ wanted)
+
+
+def too_few_runs(count: int) -> str:
+    """Return a sentence on why so many test runs give no interval, and how many would; empty where they are enough."""
+    if count >= MIN_TEST_RUNS:
+        return ""
+    return (
+        f"{count} test run{'' if count == 1 else 's'} of traffic give no interval over traffic: whole runs alone are "
+        f"independent of each other, so test on {MIN_TEST_RUNS} or more, better {ADVISED_TEST_RUNS}"
+    )
 
 
 def balanced_score(evaluation: Evaluation) -> float:
@@ -235,17 +238,6 @@ def _evaluated(frames: Sequence[FrameResult], matches: Sequence[Match]) -> Evalu
 
 def _rows(table: Table, rows: Boolean | Integer) -> Table:
     return replace(table, **{column.name: getattr(table, column.name)[rows] for column in fields(table)})
-
-
-def _blocks(frames: Sequence[FrameResult]) -> Integer:
-    """Return the number of each frame's block, counted through all runs."""
-    runs = np.array([frame.run for frame in frames])
-    times = np.array([frame.time for frame in frames])
-    names, run = np.unique(runs, return_inverse=True)
-    start = np.array([times[runs == name].min() for name in names])
-    keys = np.column_stack([run, (times - start[run]) // BLOCK_SECONDS])
-    block: Integer = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
-    return block
 
 
 def _areas(evaluation: Evaluation, times: Float | Integer, wanted: Float | Integer) -> Float:

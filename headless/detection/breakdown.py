@@ -85,7 +85,7 @@ def false_by(evaluation: Evaluation, quantity: str, edges: Sequence[float], scor
     edges : sequence of float
         Ascending.
     """
-    values, frames = getattr(evaluation.detections, quantity)[_is_false(evaluation, score)], len(evaluation.block)
+    values, frames = getattr(evaluation.detections, quantity)[_is_false(evaluation, score)], len(evaluation.run)
     bins = pairwise(edges)
     return tuple(Bin(low, high, 0, float(_between(values, low, high).sum()) / frames) for low, high in bins)
 
@@ -112,7 +112,7 @@ def false_positives(evaluation: Evaluation, score: float) -> FalsePositives:
     hits = detections.density[detections.hit & (detections.score >= score)]
     known = false.any() and len(hits)
     sparse = float((detections.density[false] < np.median(hits)).mean()) if known else np.nan
-    return FalsePositives(float(false.sum()) / len(evaluation.block), sparse)
+    return FalsePositives(float(false.sum()) / len(evaluation.run), sparse)
 
 
 def _is_false(evaluation: Evaluation, score: float) -> Boolean:

@@ -18,13 +18,13 @@ import numpy as np
 
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
-from seip_addon.core.estimates import Interval
 from seip_addon.core.progress import Progress, side_by_side, within
 from seip_addon.core.traffic import Trajectories
-from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
+from seip_addon.core.traffic.parked import shared_bays
+from seip_addon.core.traffic.run_overlap import MATCH_RADIUS, require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
 
-from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
+from .average_precision import ADVISED_TEST_RUNS, Evaluation, balanced_score, evaluate
 from .breakdown import false_positives
 from .claims import SeedResult
 from .cloud_in_plan import CloudInPlan
@@ -32,24 +32,19 @@ from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .frames import SampledRecording
 from .inference import detect
-from .kitti_precision import kitti
-from .matching import Rule
+from .kitti_precision import Kitti, kitti
 from .recordings import SampledRun, SensorConfiguration, Simulator
+from .rules import MAIN_RULE, Precision, precisions
 from .settings import CLASS_CATEGORIES, NetworkSettings, TrainingSettings
 from .suitability import suitability_warnings
 from .training import TrainedDetector, deterministic, train
 
-RULES = {
-    "bev_0.7": Rule(),
-    "bev_0.5": Rule(iou=0.5),
-    "3d_0.7": Rule(in_space=True),
-    "bev_0.7_from_5_points": Rule(fewest_points=5),
-}
-"""How average precision is taken; the first is the study's own."""
-
-MAIN_RULE = next(iter(RULES.values()))
-
 MIN_RUNS = 4  # one to learn from, one for validation, two for tests
+RUNS_PER_TEST, RUNS_PER_VALIDATION = 2, 8  # of all runs one half is for tests, and one eighth for validation
+
+SPLIT = "the last half for tests, an eighth before it (one at least) for validation, the others to learn from"
+"""How runs are split, in words."""
+
 WARM_UP = 2.0  # seconds from the first sample of a run to its first frame
 PARALLEL_TRAININGS = (os.cpu_count() or 1) + 1  # at once on the CPU: one more than cores, as each also waits
 
@@ -81,9 +76,20 @@ class Traffic:
         runs = (*self.training, *self.validation, *self.test)
         return require_independent(combinations([vehicle_positions(run.name, run.trajectories) for run in runs], 2))
 
+    def shared_bays(self) -> str:
+        """Return a sentence on how many of the parked of a test run stand where others of another split do."""
+        others = (*self.training, *self.validation)
+        most = max(
+            shared_bays(one.trajectories, other.trajectories, MATCH_RADIUS) for one in self.test for other in others
+        )
+        return (
+            f"of the parked road users of a test run and of a run that was learnt from, at most {most:.0%} stand "
+            f"within {MATCH_RADIUS:g} m of one of the other's"
+        )
+
 
 def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
-    """Read runs: the last two are for tests, the one before for validation, the others to learn from.
+    """Read runs, and split them: the last half (rounded down) for tests, an eighth before it for validation.
 
     Parameters
     ----------
@@ -98,11 +104,13 @@ def read_traffic(paths: Sequence[Path], origin: Float, every: float) -> Traffic:
     """
     if len(paths) < MIN_RUNS:
         raise SeipError(
-            f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, made by "
-            "headless/traffic.py with a seed each; the last two are for tests, the one before for validation"
+            f"{len(paths)} runs of traffic are too few: name {MIN_RUNS} or more with --traffic, better "
+            f"{RUNS_PER_TEST * ADVISED_TEST_RUNS}, made by headless/traffic.py with a seed each: {SPLIT}"
         )
     runs = read_runs(paths, origin, every)
-    return Traffic(runs[:-3], runs[-3:-2], runs[-2:])
+    tested = len(runs) // RUNS_PER_TEST
+    learnt = len(runs) - tested - max(1, len(runs) // RUNS_PER_VALIDATION)
+    return Traffic(runs[:learnt], runs[learnt:-tested], runs[-tested:])
 
 
 def read_runs(paths: Sequence[Path], origin: Float, every: float) -> tuple[SampledRun, ...]:
@@ -169,16 +177,14 @@ class DetectorOutcome:
         )
 
     @cached_property
-    def precisions(self) -> dict[str, float]:
-        """Average precision by every rule, and KITTI's figures for the study's own."""
-        by_rule = {name: evaluate(self.frames, rule).average_precision for name, rule in RULES.items()}
-        figures = kitti(self.frames, MAIN_RULE)
-        return by_rule | {"kitti_ap40": figures.ap40, "kitti_ap11": figures.ap11}
+    def precisions(self) -> dict[str, Precision]:
+        """Average precision by every rule."""
+        return precisions(self.frames)
 
     @cached_property
-    def interval(self) -> Interval | None:
-        """95 % interval of the average precision over other traffic like this."""
-        return average_precision_interval(self.evaluation, seed=0)
+    def kitti(self) -> Kitti:
+        """KITTI's figures by the study's own rule."""
+        return kitti(self.frames, MAIN_RULE)
 
 
 def model_configurations(
@@ -312,7 +318,7 @@ def evaluate_all(
                     for model, detector in asked:
                         with deterministic(model.training.threads):
                             found = detect(detector, simulator.area(detector.settings.pillar), frame)
-                        result = frame_result(frame, cloud, found, run=run.name, **known)
+                        result = frame_result(frame, cloud, found, run=run.name, parked=run.parked, **known)
                         results.setdefault((model.name, configuration.name), []).append(result)
     yield Progress(total, total, "evaluated")
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]

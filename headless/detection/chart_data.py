@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import mean_interval
+from seip_addon.core.estimates import SHARE, mean_interval
 
 from .average_precision import Evaluation, precision_recall
 from .breakdown import Bin
@@ -30,7 +30,7 @@ def cells(trials: Sequence[SeedResult]) -> tuple[PrecisionCell, ...]:
     made = []
     for (sensor, count), own in grouped.items():
         values = tuple(trial.average_precision for trial in own)
-        interval = mean_interval(values) if len(values) > 1 else None
+        interval = mean_interval(values, SHARE) if len(values) > 1 else None
         made.append(PrecisionCell(sensor, count, own[0].price, own[0].coverage, values, interval))
     return tuple(made)
 

@@ -3,21 +3,23 @@
 Gains are in points of average precision. All figures are means over the seeds of the training with Student's 95 %
 interval; seeds are compared pair by pair. A claim holds where the interval lies within what is claimed, does not hold
 where it lies outside, and is undecided between the two. Where the study says "about", from half to twice its figure is
-meant.
+meant. Nothing is decided, whatever the intervals say, while the detectors find next to nothing (`LEAST_PRECISION`) or
+were still learning when their training ended.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from headless.claims import UNDECIDED, Claim, verdict_above, verdict_within, worst_verdict
 from headless.coverage_study.cells import COUNTS
 
 import numpy as np
 
-from seip_addon.core.estimates import Interval, mean_interval
+from seip_addon.core.estimates import ANYTHING, CHANGE_OF_SHARE, COUNT, SHARE, Interval, mean_interval
 
 FACTOR = 2.0  # factor up to which a figure is about another
 MIN_SEEDS = 3  # seeds below which nothing is decided
+LEAST_PRECISION = 0.3  # average precision that the detectors must reach with the best of a claim's placements
 
 PUBLISHED_GAINS = ((0.20, 0.07), (0.10, 0.05))
 """What the study gained from one to two and from two to four sensors, of the simplest type and the next."""
@@ -46,6 +48,8 @@ class SeedResult:
         Share of these where the cloud is sparser than around half of the hits; NaN where there are none.
     padded : bool
         Whether empty places in pillars were fed to the network as points, and not masked: the ablation of claim 9.
+    still_rising : bool
+        Whether the average precision on validation frames was still rising when the training ended.
     """
 
     sensor: str
@@ -57,6 +61,7 @@ class SeedResult:
     false_positives: float
     sparse: float
     padded: bool = False
+    still_rising: bool = False
 
 
 def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
@@ -72,21 +77,52 @@ def detection_claims(results: Sequence[SeedResult]) -> tuple[Claim, ...]:
     masked = [result for result in results if not result.padded]
     sensors = list(dict.fromkeys(result.sensor for result in masked))
     claims = [
-        _gains(number, masked, sensor, published)
+        _decided(_gains(number, masked, sensor, published), _of(masked, sensor))
         for number, sensor, published in zip((5, 6), sensors, PUBLISHED_GAINS, strict=False)  # a study may have one
     ]
     if len(sensors) > 1:
-        claims.append(_simple_sensors_gain_more(masked, sensors))
+        claims.append(_decided(_simple_sensors_gain_more(masked, sensors), masked))
     if sensors:
-        claims.append(_false_where_sparse(masked, sensors[0]))
+        claims.append(_decided(_false_where_sparse(masked, sensors[0]), _of(masked, sensors[0])))
     if len(masked) < len(results):
-        claims.append(_padding(results))
+        claims.append(_decided(_padding(results), results))
     return tuple(claims)
+
+
+def _of(results: Sequence[SeedResult], sensor: str) -> list[SeedResult]:
+    return [result for result in results if result.sensor == sensor]
+
+
+def _decided(claim: Claim, results: Sequence[SeedResult]) -> Claim:
+    """Return a claim without its verdict, and with the reason, where the trainings that it goes by say nothing yet."""
+    doubts = list(_doubts(results))
+    if not doubts:
+        return claim
+    return replace(claim, verdict=UNDECIDED, evidence=f"no verdict, as {' and '.join(doubts)}; {claim.evidence}")
+
+
+def _doubts(results: Sequence[SeedResult]) -> Iterator[str]:
+    masked = [one for one in results if not one.padded]
+    cells = {(one.sensor, one.count) for one in masked}
+    reached = (_mean(_by_seed(masked, *cell, lambda one: one.average_precision)).value for cell in cells)
+    best = max(reached, default=0.0)
+    if best < LEAST_PRECISION:
+        yield (
+            f"the detectors reach an AP of {best:.1%} with the best of these placements, and below "
+            f"{LEAST_PRECISION:.0%} they say nothing about sensors"
+        )
+    trainings = {(one.seed, one.padded) for one in results}
+    rising = {(one.seed, one.padded) for one in results if one.still_rising}
+    if rising:
+        yield (
+            f"validation AP was still rising when {len(rising)} of {len(trainings)} trainings ended: train longer, "
+            "with --steps"
+        )
 
 
 def _gains(number: int, results: Sequence[SeedResult], sensor: str, published: tuple[float, float]) -> Claim:
     steps = ((FEW, SOME), (SOME, MANY))
-    gains = [_mean(_gain(results, sensor, *step)) for step in steps]
+    gains = [_mean(_gain(results, sensor, *step), CHANGE_OF_SHARE) for step in steps]
     verdicts = [_about(gain, expected) for gain, expected in zip(gains, published, strict=True)]
     figures = [f"{a} to {b}: {gain.points()}" for (a, b), gain in zip(steps, gains, strict=True)]
     return Claim(
@@ -102,7 +138,9 @@ def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[s
     simple, *better = sensors
     gains = {sensor: _gain(results, sensor, FEW, MANY) for sensor in sensors}
     leads = [_mean(_differences(gains[simple], gains[other])) for other in better]
-    rows = [f"{sensor} {_mean(gains[sensor]).points()}{_per_price(results, sensor)}" for sensor in sensors]
+    rows = [
+        f"{sensor} {_mean(gains[sensor], CHANGE_OF_SHARE).points()}{_per_price(results, sensor)}" for sensor in sensors
+    ]
     ahead = [f"{lead.points()} more than {other}" for other, lead in zip(better, leads, strict=True)]
     return Claim(
         7,
@@ -115,8 +153,8 @@ def _simple_sensors_gain_more(results: Sequence[SeedResult], sensors: Sequence[s
 def _false_where_sparse(results: Sequence[SeedResult], sensor: str) -> Claim:
     false = {count: _by_seed(results, sensor, count, lambda result: result.false_positives) for count in COUNTS}
     more = [_mean(_differences(false[count], false[MANY])) for count in (FEW, SOME)]
-    sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse)) for count in (FEW, SOME)]
-    rows = [f"N = {count} {_mean(false[count]).plain()}" for count in COUNTS]
+    sparse = [_mean(_by_seed(results, sensor, count, lambda result: result.sparse), SHARE) for count in (FEW, SOME)]
+    rows = [f"N = {count} {_mean(false[count], COUNT).plain()}" for count in COUNTS]
     shares = [f"N = {count} {share.share()}" for count, share in zip((FEW, SOME), sparse, strict=True)]
     return Claim(
         8,
@@ -136,7 +174,9 @@ def _padding(results: Sequence[SeedResult]) -> Claim:
         )
         more = _mean(_differences(padded, masked))
         verdicts.append(_above(more))
-        rows.append(f"{sensor}, N = {count}: {_mean(padded).plain()} padded, {_mean(masked).plain()} masked")
+        rows.append(
+            f"{sensor}, N = {count}: {_mean(padded, COUNT).plain()} padded, {_mean(masked, COUNT).plain()} masked"
+        )
     return Claim(
         9,
         "zero-padded pillars cause false positives where the cloud is sparse",
@@ -172,11 +212,11 @@ class _Mean:
 BySeed = dict[int, float]
 
 
-def _mean(of: BySeed) -> _Mean:
+def _mean(of: BySeed, possible: Interval = ANYTHING) -> _Mean:
     values = list(of.values())
     if not values:
         return _Mean(np.nan, 0, None)
-    interval = mean_interval(values) if len(values) >= MIN_SEEDS else None
+    interval = mean_interval(values, possible) if len(values) >= MIN_SEEDS else None
     return _Mean(float(np.mean(values)), len(values), interval)
 
 

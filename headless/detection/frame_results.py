@@ -53,6 +53,8 @@ class GroundTruth:
         Whether its middle is in the region of interest.
     distance : (g,) float64, metres
         From its middle to the nearest sensor.
+    parked : (g,) bool
+        Whether it stands in all of its run; false where that is not known.
     """
 
     boxes: Float
@@ -61,6 +63,7 @@ class GroundTruth:
     visibility: Float
     inside: Boolean
     distance: Float
+    parked: Boolean
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -122,6 +125,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
     region: BaseGeometry,
     sensors: Float,
     run: str,
+    parked: Boolean | None = None,
 ) -> FrameResult:
     """Set detections beside the road users of a frame.
 
@@ -133,6 +137,8 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
         Categories of road users in each of the detector's classes.
     region : shapely geometry, metres
     sensors : (s, 3) float64, metres
+    parked : (u,) bool, optional
+        Which of the trajectories' road users stand in all of the run.
     """
     labels, boxes = frame.labels, detections.boxes
     first = np.array([members[0] for members in classes], dtype=np.str_)
@@ -147,6 +153,7 @@ def frame_result(  # noqa: PLR0913  # a frame, what was made of it, and what err
             visibility=labels.visibility,
             inside=labels.inside,
             distance=_nearest(labels.centre, sensors),
+            parked=np.zeros(len(labels), dtype=np.bool_) if parked is None else parked[labels.user],
         ),
         detected=EvaluatedBoxes(
             boxes=boxes,

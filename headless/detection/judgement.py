@@ -12,20 +12,16 @@ from seip_addon.core.progress import Progress, finish
 from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
 from seip_addon.core.traffic.bodies import fitted_body
 
-from .average_precision import Evaluation, average_precision_interval, balanced_score, evaluate
-from .case_study import MAIN_RULE, RULES
+from .average_precision import Evaluation, balanced_score, evaluate
 from .cloud_in_plan import CloudInPlan
 from .detection_area import DetectionArea
 from .detector import Detector
 from .frame_results import FrameResult, frame_result
 from .inference import detect
-from .matching import Rule
 from .recordings import SampledRun
+from .rules import MAIN_RULE, precisions
 from .settings import CLASS_CATEGORIES
 from .training import deterministic
-
-SMALL_OVERLAP = 0.5  # at which classes of small road users are evaluated, as KITTI does
-SMALL_CLASSES = ("cycle", "pedestrian")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,23 +46,11 @@ class Judgement:
     scan: Frame
     score: float
 
-    @property
-    def interval(self) -> Interval | None:
-        """95 % interval of the average precision over other traffic like this."""
-        return average_precision_interval(self.evaluation, seed=0)
-
     def precisions(self) -> Iterator[tuple[str, float, Interval | None, int]]:
-        """Yield name, average precision, interval and number of road users by each rule and of each class."""
-        rules = dict(RULES)
-        for name, categories in CLASS_CATEGORIES.items():
-            overlap = SMALL_OVERLAP if name in SMALL_CLASSES else MAIN_RULE.iou
-            rules[f"{'_'.join(categories)}_{overlap:g}"] = Rule(iou=overlap, categories=categories)
-        for name, rule in rules.items():
-            try:
-                found = evaluate(self.frames, rule)
-            except SeipError:  # of this class there is none
-                continue
-            yield name, found.average_precision, average_precision_interval(found, seed=0), len(found.wanted)
+        """Yield name, average precision, interval and number of road users by each rule by which there are any."""
+        for name, found in precisions(self.frames).items():
+            if found.road_users:
+                yield name, found.value, found.interval, found.road_users
 
 
 def judge(  # noqa: PLR0913  # a detector, where it looks, what measures there, and how
@@ -109,7 +93,7 @@ def judge(  # noqa: PLR0913  # a detector, where it looks, what measures there, 
             frame = simulation.frame(number, float(time))
             with deterministic(threads):
                 found = detect(detector, area, frame)
-            result = frame_result(frame, CloudInPlan(frame.points), found, run=run.name, **known)
+            result = frame_result(frame, CloudInPlan(frame.points), found, run=run.name, parked=run.parked, **known)
             if result.truth.inside.sum() > most:
                 most, fullest, scan = int(result.truth.inside.sum()), len(frames), frame
             frames.append(result)

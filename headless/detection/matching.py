@@ -40,12 +40,15 @@ class Rule:
         Of the road users that count and of the detections that are evaluated.
     fewest_points : int
         Returns from a road user below which it does not count; 0 counts those that no sensor sees as well.
+    parked : bool or None
+        Whether those that stand in all of their run count alone, or those that do not; None counts both.
     """
 
     iou: float = 0.7
     in_space: bool = False
     categories: tuple[str, ...] = VEHICLES
     fewest_points: int = 0
+    parked: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +107,9 @@ def must_be_found(frame: FrameResult, rule: Rule) -> Boolean:
     """Return which road users count, (g,) bool."""
     truth = frame.truth
     counts: Boolean = np.isin(truth.category, rule.categories) & truth.inside & (truth.points >= rule.fewest_points)
-    return counts
+    if rule.parked is None:
+        return counts
+    return counts & (truth.parked if rule.parked else ~truth.parked)
 
 
 def of_its_kind(frame: FrameResult, rule: Rule) -> Boolean:

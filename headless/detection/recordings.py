@@ -8,13 +8,14 @@ from headless.coverage_study.cells import Case
 
 import numpy as np
 
-from seip_addon.core.arrays import Float
+from seip_addon.core.arrays import Boolean, Float
 from seip_addon.core.progress import finish
 from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, prepare, static_scene
 from seip_addon.core.site.scene_geometry import SceneGeometry
 from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
+from seip_addon.core.traffic.parked import parked_users
 
 from .detection_area import area_of
 from .frames import LazyFrames, Recording
@@ -34,6 +35,11 @@ class SampledRun:
     name: str
     trajectories: Trajectories
     times: Float
+
+    @functools.cached_property
+    def parked(self) -> Boolean:
+        """Whether each of the road users stands in all of the run, (u,) bool."""
+        return parked_users(self.trajectories)
 
     @property
     def key(self) -> str:

@@ -3,7 +3,7 @@
 import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from headless.claims import Claim
 
 import numpy as np
 
-from seip_addon.core.estimates import Interval, rank_correlation, rank_correlation_interval
+from seip_addon.core.estimates import SHARE, Interval, mean_interval, rank_correlation, rank_correlation_interval
 from seip_addon.core.storage.files import save_json, whole_file
 
 from .breakdown import (
@@ -34,23 +34,34 @@ from .breakdown import (
     false_by,
     recall_by,
 )
-from .case_study import MAIN_RULE, DetectorOutcome, ModelConfiguration, Traffic
+from .case_study import DetectorOutcome, ModelConfiguration, Traffic
 from .chart_data import cells, curve, error_view, parts
+from .claims import SeedResult
 from .recordings import Simulator
-from .training import TrainedDetector
+from .rules import MAIN_RULE, RULES
+from .training import LearningCurve, TrainedDetector
 
-SCHEMA = "seip-evaluation/1"
+SCHEMA = "seip-evaluation/2"
+
+_NO_ENDS = (math.nan, math.nan)
 
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """All that was found on one site."""
+    """All that was found on one site; models and the curves of their trainings in the same order."""
 
     name: str
     simulator: Simulator
     traffic: Traffic
     models: tuple[ModelConfiguration, ...]
     outcomes: tuple[DetectorOutcome, ...]
+    curves: tuple[LearningCurve, ...]
+
+    @property
+    def seed_results(self) -> list[SeedResult]:
+        """The figures of all outcomes, with how their trainings went."""
+        rising = {model.name: curve.still_rises for model, curve in zip(self.models, self.curves, strict=True)}
+        return [replace(one.seed_result, still_rising=rising[one.model.name]) for one in self.outcomes]
 
     @property
     def masked(self) -> list[DetectorOutcome]:
@@ -151,8 +162,7 @@ def save_table(path: Path, results: StudyResults) -> None:
 
 
 def _row(outcome: DetectorOutcome) -> dict[str, str]:
-    seed_result, interval = outcome.seed_result, outcome.interval
-    low, high = ("", "") if interval is None else (f"{end:.4f}" for end in interval)
+    seed_result, by_kitti = outcome.seed_result, outcome.kitti
     return {
         "detector": outcome.model.name,
         "sensor": seed_result.sensor,
@@ -161,14 +171,18 @@ def _row(outcome: DetectorOutcome) -> dict[str, str]:
         "padded": f"{seed_result.padded}".lower(),
         "price_usd": f"{seed_result.price:.2f}",
         "coverage": f"{seed_result.coverage:.4f}",
-        **{f"ap_{name}": f"{value:.4f}" for name, value in outcome.precisions.items()},
-        "ap_low": low,
-        "ap_high": high,
+        **{
+            f"ap_{name}{end}": "" if math.isnan(value) else f"{value:.4f}"
+            for name, found in outcome.precisions.items()
+            for end, value in zip(("", "_low", "_high"), (found.value, *(found.interval or _NO_ENDS)), strict=True)
+        },
+        **{f"road_users_{name}": f"{found.road_users}" for name, found in outcome.precisions.items()},
+        "ap_kitti_ap40": f"{by_kitti.ap40:.4f}",
+        "ap_kitti_ap11": f"{by_kitti.ap11:.4f}",
         "score": f"{outcome.score:.4f}",
         "false_positives_per_frame": f"{seed_result.false_positives:.4f}",
         "false_positives_in_sparse_places": "" if np.isnan(seed_result.sparse) else f"{seed_result.sparse:.4f}",
         "frames": f"{len(outcome.frames)}",
-        "vehicles": f"{len(outcome.evaluation.wanted)}",
     }
 
 
@@ -189,8 +203,14 @@ def save_record(
                 for what, runs in vars(results.traffic).items()
             },
             "detectors": [
-                {"name": one.name, "network": asdict(one.network), "training": asdict(one.training)}
-                for one in results.models
+                {
+                    "name": one.name,
+                    "network": asdict(one.network),
+                    "training": asdict(one.training),
+                    "validation": {str(step): value for step, value in curve.validation.items()},
+                    "still_rising": curve.still_rises,
+                }
+                for one, curve in zip(results.models, results.curves, strict=True)
             ],
             "configurations": [
                 {
@@ -219,12 +239,31 @@ def save_record(
 def in_words(results: StudyResults) -> Iterator[str]:
     """Yield a line for each configuration, and one on whether coverage foretells detection."""
     for cell in cells([outcome.seed_result for outcome in results.masked]):
-        between = "" if cell.interval is None else f" ({cell.interval[0]:.1%} to {cell.interval[1]:.1%})"
         yield (
-            f"{cell.name}: AP {cell.mean:.1%}{between} of vehicles at an overlap of 0.7 in plan, "
+            f"{cell.name}: AP {cell.mean:.1%}{_between(cell.interval)} of vehicles at an overlap of 0.7 in plan, "
             f"coverage {cell.coverage:.1%}, ${cell.price:,.0f}"
         )
+        yield f"  {_by_rules(results, cell.name)}"
     correlation, interval = results.correlation
     between = "" if interval is None else f" ({interval[0]:.2f} to {interval[1]:.2f})"
     found = f"{correlation:.2f}{between}" if math.isfinite(correlation) else "none, where all have the same"
     yield f"rank correlation of coverage and AP: {found}"
+
+
+def _by_rules(results: StudyResults, name: str) -> str:
+    """Return the average precision of one configuration by the other rules, the mean over trainings, in words."""
+    tables = [one.precisions for one in results.masked if one.configuration.name == name]
+    words = []
+    for rule in RULES:
+        values = [table[rule].value for table in tables]
+        if RULES[rule] is not MAIN_RULE and tables[0][rule].road_users:
+            interval = mean_interval(values, SHARE) if len(values) > 1 else None
+            words.append(f"{rule} {np.mean(values):.1%}{_between(interval)}")
+    over_traffic = tables[0][next(iter(RULES))].interval
+    if over_traffic is not None:
+        words.append(f"of the first training over other traffic {over_traffic[0]:.1%} to {over_traffic[1]:.1%}")
+    return ", ".join(words)
+
+
+def _between(interval: Interval | None) -> str:
+    return "" if interval is None else f" ({interval[0]:.1%} to {interval[1]:.1%})"

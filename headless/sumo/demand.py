@@ -23,6 +23,8 @@ _PARKED_GAP = 0.5  # metres between parked cars at least
 _BAY_LENGTH = 6.5  # metres of kerb for a parked car
 _OCCUPIED_SHARE = 0.6  # of the bays in parking lanes
 _FIRST_BAY = 35.0  # metres from where the street begins
+_ROWS_ALONG = 2  # places for a row of cars along the kerb of a street, one behind the other
+_SHIFT = 0.26  # of a bay from seed to seed: four in turn are 1.4 m apart, and after many all places have been taken
 _PARKING_SECONDS = 1e6  # seconds
 
 
@@ -147,6 +149,9 @@ def write_routes(
 ) -> None:
     """Write the routes of all road users from 0 to ``duration`` seconds; the same for the same seed.
 
+    All is drawn anew for each seed: who comes when, on what way, in which vehicle, and where which cars are parked. The
+    seed is in the names of all, as paint goes by the name.
+
     Raises
     ------
     SeipError
@@ -158,15 +163,15 @@ def write_routes(
             "no road leads into the map from outside, so no traffic can come in; name a scene that cuts one"
         )
     random = np.random.default_rng([seed, 0])
-    bays = _bays(network, demand.kerb, random)
-    entries = list(_parked(bays, random))
+    bays = _bays(network, demand.kerb, seed, random)
+    entries = list(_parked(bays, seed, random))
     free = set(network.edges) - {edge.id for edge, lane, _ in bays if lane.use == DRIVING}
     for number, arm in enumerate(arms, start=1):
         random = np.random.default_rng([seed, 1, number])
         for depart in _departures(demand.flow, random, duration):
             route = _route(network, arm, demand.turns, random)
-            entries.append(_vehicle(f"{arm.id}.{len(entries)}", depart, route, demand.shares, free, random))
-    entries += _walkers(network, demand.pedestrians * len(arms), np.random.default_rng([seed, 2]), duration)
+            entries.append(_vehicle(f"{seed}.{arm.id}.{len(entries)}", depart, route, demand.shares, free, random))
+    entries += _walkers(network, demand.pedestrians * len(arms), seed, duration)
     entries.sort(key=lambda entry: entry.depart)
     own = _own_type_lines(entries, np.random.default_rng([seed, 3])) if demand.own_sizes else ()
     texts = (entry.text.format(type=entry.name if demand.own_sizes else entry.type) for entry in entries)
@@ -289,47 +294,58 @@ def _delivery(streets: list[NetworkEdge], random: np.random.Generator) -> str:
 
 
 def _bays(
-    network: StreetNetwork, kerb: KerbParking, random: np.random.Generator
+    network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
 ) -> list[tuple[NetworkEdge, NetworkLane, float]]:
-    """Return where cars stand all the time: in parking lanes, or where there are none in rows at the kerb.
+    """Return the middles of the bays where cars stand all the time: in parking lanes, or else in rows at the kerb.
 
-    A row stands in the outer of several lanes of some of the streets on which vehicles leave the network.
+    A row stands in the outer of several lanes of some of the streets on which vehicles leave the network. Bays are not
+    marked on the road: those of one seed lie between those of the others, so that no run has cars where another has.
     """
+    shift = _BAY_LENGTH * (seed * _SHIFT % 1.0)
     bays = [
         (edge, lane, float(place))
         for edge in network.edges.values()
         for lane in edge.of(PARKING)
-        for place in np.arange(_BAY_LENGTH + 2.0, lane.length - 2.0, _BAY_LENGTH)
+        for place in np.arange(_BAY_LENGTH + shift, lane.length - _BAY_LENGTH / 2.0 - 1.0, _BAY_LENGTH)
         if random.random() < _OCCUPIED_SHARE
     ]
-    return bays or list(_rows(network, kerb, random))
+    return bays or list(_rows(network, kerb, seed, random))
 
 
-def _parked(bays: list[tuple[NetworkEdge, NetworkLane, float]], random: np.random.Generator) -> Iterator[_Departure]:
+def _parked(
+    bays: list[tuple[NetworkEdge, NetworkLane, float]], seed: int, random: np.random.Generator
+) -> Iterator[_Departure]:
     models = MODELS["car"] | {"small_van": MODELS["van"]["small_van"]}
-    for number, (edge, lane, place) in enumerate(bays):
+    for number, (edge, lane, middle) in enumerate(bays):
+        model = _pick(models, random)
+        front = middle + models[model].length / 2.0
         text = (
-            f'<vehicle id="parked-{number}" type="{{type}}" depart="0" departLane="{lane.index}" '
-            f'departPos="{place:.1f}" departSpeed="0"><route edges="{edge.id}"/>'
-            f'<stop lane="{edge.id}_{lane.index}" endPos="{place:.1f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
+            f'<vehicle id="parked-{seed}.{number}" type="{{type}}" depart="0" departLane="{lane.index}" '
+            f'departPos="{front:.2f}" departSpeed="0"><route edges="{edge.id}"/>'
+            f'<stop lane="{edge.id}_{lane.index}" endPos="{front:.2f}" duration="{_PARKING_SECONDS:.0f}"/></vehicle>'
         )
-        yield _Departure(0.0, f"parked-{number}", f"{_PARKED}{_pick(models, random)}", text)
+        yield _Departure(0.0, f"parked-{seed}.{number}", f"{_PARKED}{model}", text)
 
 
 def _rows(
-    network: StreetNetwork, kerb: KerbParking, random: np.random.Generator
+    network: StreetNetwork, kerb: KerbParking, seed: int, random: np.random.Generator
 ) -> Iterator[tuple[NetworkEdge, NetworkLane, float]]:
+    """Yield the bays of rows of cars: from seed to seed they go round the streets, then along them, then by a shift."""
     exits = [edge for edge in network.edges.values() if len(edge.of(DRIVING)) > 1 and not network.leads_on(edge)]
-    for index in sorted(random.permutation(len(exits))[: math.ceil(kerb.streets * len(exits))].tolist()):
-        lane = exits[index].of(DRIVING)[0]
-        first = kerb.first + float(random.uniform(0.0, _BAY_LENGTH))
+    rows = math.ceil(kerb.streets * len(exits))
+    for number in range(seed * rows, (seed + 1) * rows):
+        edge = exits[number % len(exits)]
+        lane = edge.of(DRIVING)[0]
+        along, turn = number // len(exits) % _ROWS_ALONG, number // len(exits) // _ROWS_ALONG
+        first = kerb.first + _BAY_LENGTH * (along * kerb.bays + turn * _SHIFT % 1.0)
         for place in first + _BAY_LENGTH * np.arange(kerb.bays):
             held = kerb.occupied >= 1.0 or random.random() < kerb.occupied
             if held and place < lane.length - _BAY_LENGTH:
-                yield exits[index], lane, float(place)
+                yield edge, lane, float(place)
 
 
-def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, duration: float) -> Iterator[_Departure]:
+def _walkers(network: StreetNetwork, rate: float, seed: int, duration: float) -> Iterator[_Departure]:
+    random = np.random.default_rng([seed, 2])
     pavements = [
         (edge, lane) for edge in network.edges.values() for lane in edge.of(WALKING) if lane.length > _MIN_PAVEMENT
     ]
@@ -348,8 +364,8 @@ def _walkers(network: StreetNetwork, rate: float, random: np.random.Generator, d
         begin, end = random.uniform(2.0, first.length - 2.0), random.uniform(2.0, last.length - 2.0)
         yield _Departure(
             depart,
-            f"pedestrian-{number}",
+            f"pedestrian-{seed}.{number}",
             _pick(MODELS["pedestrian"], random),
-            f'<person id="pedestrian-{number}" type="{{type}}" depart="{depart}" '
+            f'<person id="pedestrian-{seed}.{number}" type="{{type}}" depart="{depart}" '
             f'departPos="{begin:.1f}"><walk from="{origin.id}" to="{target.id}" arrivalPos="{end:.1f}"/></person>',
         )

@@ -12,6 +12,10 @@ from .arrays import Float, Integer
 from .errors import SeipError
 
 Interval = tuple[float, float]  # least and largest value that a 95 % interval holds
+ANYTHING: Interval = (-math.inf, math.inf)  # what a figure can be that knows no bounds
+SHARE: Interval = (0.0, 1.0)  # what a share or an average precision can be
+COUNT: Interval = (0.0, math.inf)
+CHANGE_OF_SHARE: Interval = (-1.0, 1.0)
 TAIL_PROBABILITY = 0.025  # probability on either side of an interval
 NORMAL_QUANTILE = 1.959963984540054  # value that a standard normal variable exceeds with a probability of 2.5 %
 RESAMPLES = 2000  # of a bootstrap
@@ -97,8 +101,15 @@ def student_reach(values: Float | Sequence[float]) -> float:
     return student_quantile(len(values) - 1) * float(np.std(values, ddof=1)) / math.sqrt(len(values))
 
 
-def mean_interval(values: Sequence[float]) -> Interval:
+def mean_interval(values: Sequence[float], possible: Interval = ANYTHING) -> Interval:
     """Return the 95 % interval of the mean of what repetitions (seeds) gave; see `student_reach`.
+
+    What the mean cannot be is cut off: that takes nothing from the probability with which the interval holds it.
+
+    Parameters
+    ----------
+    possible : (float, float)
+        Least and largest value that the figure can have.
 
     Raises
     ------
@@ -110,7 +121,55 @@ def mean_interval(values: Sequence[float]) -> Interval:
             f"{len(values)} seed gives no interval: repeat the study with at least two, better three or more"
         )
     mean, reach = float(np.mean(values)), student_reach(values)
-    return mean - reach, mean + reach
+    return within((mean - reach, mean + reach), possible)
+
+
+def within(interval: Interval, possible: Interval) -> Interval:
+    """Return the part of an interval that is possible."""
+    return max(interval[0], possible[0]), min(interval[1], possible[1])
+
+
+def jackknife_reach(left_out: Float) -> float:
+    """Return half the width of the 95 % interval of a figure, from its values without each of n independent samples.
+
+    The delete-one jackknife (Tukey 1958) with Student's quantile of n − 1 degrees of freedom. A bootstrap over few
+    samples is too sure of itself: of 4 or 8 runs of traffic its percentiles hold the true figure in 77 to 89 of 100
+    cases where they should in 95.
+
+    Parameters
+    ----------
+    left_out : (n,) float64
+        At least two.
+    """
+    number = len(left_out)
+    spread = (number - 1) / number * float(((left_out - left_out.mean()) ** 2).sum())
+    return student_quantile(number - 1) * math.sqrt(spread)
+
+
+def share_interval(share: float, left_out: Float, count: float) -> Interval:
+    """Return the 95 % interval of a share, from its values without each of n independent samples.
+
+    `jackknife_reach` on the scale of log odds, where shares near 0 and 1 spread evenly to both sides: so the interval
+    lies between 0 and 1, and it holds the true share as often as it says near them, too.
+
+    Parameters
+    ----------
+    share : float, 0 to 1
+    left_out : (n,) float64, 0 to 1
+        At least two.
+    count : float
+        Of what the share is one: nearer to 0 and 1 than half of one no odds are told apart.
+    """
+    edge = 0.5 / count
+
+    def log_odds(value: Float | float) -> Float:
+        kept = np.clip(value, edge, 1.0 - edge)
+        odds: Float = np.log(kept / (1.0 - kept))
+        return odds
+
+    middle, reach = float(log_odds(share)), jackknife_reach(log_odds(left_out))
+    low, high = (float(0.5 + 0.5 * math.tanh(end / 2.0)) for end in (middle - reach, middle + reach))
+    return min(low, share), max(high, share)
 
 
 def student_quantile(freedom: int) -> float:

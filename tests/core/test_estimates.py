@@ -12,9 +12,13 @@ from hypothesis import strategies as st
 
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import (
+    COUNT,
+    SHARE,
+    jackknife_reach,
     mean_interval,
     rank_correlation,
     rank_correlation_interval,
+    share_interval,
     student_quantile,
 )
 
@@ -33,6 +37,32 @@ def test_three_seeds_are_covered_nineteen_times_of_twenty():
     rng = np.random.default_rng(1)
     intervals = np.array([mean_interval(values) for values in rng.normal(0.5, 0.1, (2000, 3))])
     assert ((intervals[:, 0] <= 0.5) & (intervals[:, 1] >= 0.5)).mean() == pytest.approx(0.95, abs=0.015)
+
+
+def test_intervals_of_means_stay_within_what_is_possible():
+    assert mean_interval([0.001, 0.003, 0.02], SHARE)[0] == 0.0
+    assert mean_interval([0.97, 0.99, 1.0], SHARE)[1] == 1.0
+    assert mean_interval([2.0, 60.0, 3.0], COUNT)[0] == 0.0
+    assert mean_interval([0.6, 0.61, 0.62], SHARE) == mean_interval([0.6, 0.61, 0.62])
+
+
+def test_cutting_off_what_is_impossible_loses_no_coverage():
+    values = np.random.default_rng(2).beta(0.4, 3.6, (2000, 3))
+    held = [[low <= 0.1 <= high for low, high in (mean_interval(v), mean_interval(v, SHARE))] for v in values]
+    assert all(plain == cut for plain, cut in held)
+
+
+def test_jackknife_of_a_mean_is_students_interval():
+    values = np.random.default_rng(3).normal(size=9)
+    left_out = np.array([np.delete(values, row).mean() for row in range(9)])
+    low, high = scipy.stats.t.interval(0.95, 8, values.mean(), scipy.stats.sem(values))
+    assert jackknife_reach(left_out) == pytest.approx((high - low) / 2)
+
+
+@given(st.integers(0, 100), st.lists(st.integers(0, 100), min_size=2, max_size=20))
+def test_intervals_of_shares_hold_the_share_and_stay_shares(share, left_out):
+    low, high = share_interval(share / 100, np.array(left_out) / 100, 50.0)
+    assert 0.0 <= low <= share / 100 <= high <= 1.0
 
 
 def test_one_seed_gives_no_interval():

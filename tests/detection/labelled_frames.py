@@ -13,7 +13,7 @@ def box(x, y=0.0, yaw=0.0, *, size=SIZES["car"]):
     return (x, y, size[2] / 2, *size, yaw)
 
 
-def truth(boxes, *, category="car", points=100, visibility=1.0, inside=True, distance=10.0):
+def truth(boxes, *, category="car", points=100, visibility=1.0, inside=True, distance=10.0, parked=False):
     count = len(boxes)
     return GroundTruth(
         boxes=np.array(boxes, dtype=float).reshape(-1, 7),
@@ -22,6 +22,7 @@ def truth(boxes, *, category="car", points=100, visibility=1.0, inside=True, dis
         visibility=np.broadcast_to(np.array(visibility, dtype=float), count),
         inside=np.broadcast_to(np.array(inside), count),
         distance=np.broadcast_to(np.array(distance, dtype=float), count),
+        parked=np.broadcast_to(np.array(parked), count),
     )
 
 

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.special
+import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from labelled_frames import SIZES, box, detected, frame, traffic, truth
@@ -12,10 +14,14 @@ from labelled_frames import SIZES, box, detected, frame, traffic, truth
 pytest.importorskip("torch", reason="the detector's torch is optional")
 
 from headless.detection.average_precision import (
+    CountedTruth,
+    EvaluatedDetections,
+    Evaluation,
     average_precision_interval,
     balanced_score,
     evaluate,
     precision_recall,
+    too_few_runs,
 )
 from headless.detection.kitti_precision import kitti
 from headless.detection.matching import NO_MATCH, VEHICLES, Rule, match
@@ -293,42 +299,87 @@ def test_a_lower_bar_finds_no_less(seed):
 # Its interval -----------------------------------------------------------------------------------------------------
 
 
+def runs_of(count, **told):
+    return [one for number in range(count) for one in traffic(number, run=f"run {number}", **told)]
+
+
 def test_interval_holds_the_estimate_and_repeats():
-    evaluation = evaluate(traffic(3, frames=120, seconds=2.0), AT_07)
-    low, high = average_precision_interval(evaluation, seed=0)
+    evaluation = evaluate(runs_of(8, frames=15), AT_07)
+    low, high = average_precision_interval(evaluation)
     assert low < evaluation.average_precision < high
-    assert 0.01 < high - low < 0.2
-    assert average_precision_interval(evaluation, seed=0) == (low, high)
-    assert average_precision_interval(evaluation, seed=1) != (low, high)
+    assert 0.005 < high - low < 0.2
+    assert average_precision_interval(evaluation) == (low, high)
 
 
 def test_repeated_frames_give_no_certainty():
-    """Each frame 20 times within a block: as sure as with one of them, and not √20 times as sure."""
-    once = traffic(4, frames=30, seconds=10.0)
+    """Each frame 20 times within its run: as sure as with one of them, and not √20 times as sure."""
+    once = runs_of(6, frames=2)
     often = [replace(told, time=told.time + 0.5 * step) for told in once for step in range(20)]
-    single, repeated = (average_precision_interval(evaluate(frames, AT_07), seed=0) for frames in (once, often))
-    assert np.diff(repeated) == pytest.approx(np.diff(single), rel=0.15)
+    single, repeated = (average_precision_interval(evaluate(frames, AT_07)) for frames in (once, often))
+    assert repeated == pytest.approx(single, abs=1e-3)
 
 
-def test_interval_is_that_of_the_plain_bootstrap():
-    """Blocks drawn and judged again, one by one."""
-    frames = traffic(5, frames=12, seconds=10.0)
-    rng = np.random.default_rng(1)
-    plain = [
-        average_precision([frames[row] for row in rng.integers(len(frames), size=len(frames))]) for _ in range(300)
-    ]
-    low, high = average_precision_interval(evaluate(frames, AT_07), seed=0)
-    assert (low, high) == pytest.approx(np.quantile(plain, [0.025, 0.975]), abs=0.02)
+def test_interval_leaves_out_each_run():
+    """Runs left out and judged again, one by one; Student's interval on the scale of log odds."""
+    frames = runs_of(7, frames=3)
+    names = sorted({told.run for told in frames})
+    left_out = scipy.special.logit([average_precision([told for told in frames if told.run != name]) for name in names])
+    spread = math.sqrt(6 / 7 * ((left_out - left_out.mean()) ** 2).sum())
+    theirs = scipy.special.expit(
+        scipy.stats.t.interval(0.95, 6, scipy.special.logit(average_precision(frames)), spread)
+    )
+    assert average_precision_interval(evaluate(frames, AT_07)) == pytest.approx(tuple(theirs), abs=1e-9)
 
 
-def test_runs_are_blocks_apart():
-    frames = [told for number in range(6) for told in traffic(number, frames=3, seconds=1.0, run=f"run {number}")]
-    assert len(set(evaluate(frames, AT_07).block.tolist())) == 6
-    assert average_precision_interval(evaluate(frames, AT_07), seed=0) is not None
+@pytest.mark.parametrize("runs", [4, 8])
+@pytest.mark.parametrize(("mean", "spread"), [(0.7, 0.08), (0.95, 0.035), (0.1, 0.08)])
+def test_interval_holds_the_true_value_nineteen_times_of_twenty(mean, spread, runs):
+    """Every run finds a share of its cars, drawn from a beta distribution, and nothing else: the AP is the mean share.
+
+    Over 4,000 trials each the interval held it in 94.7, 95.2, 94.4, 94.3, 93.9 and 93.9 % of the six cases; percentiles
+    of a bootstrap over the same runs in 77 to 89 %.
+    """
+    rng = np.random.default_rng([int(1000 * mean), runs])
+    weight = mean * (1 - mean) / spread**2 - 1
+    held, trials = 0, 1500
+    for _ in range(trials):
+        cars = rng.integers(100, 400, runs)
+        found = rng.binomial(cars, rng.beta(mean * weight, (1 - mean) * weight, runs))
+        low, high = average_precision_interval(found_of(cars, found))
+        held += low <= mean <= high
+    assert held / trials == pytest.approx(0.945, abs=0.02)
 
 
-def test_too_few_blocks_give_no_interval():
-    assert average_precision_interval(evaluate(traffic(6, frames=20, seconds=1.0), AT_07), seed=0) is None
+def found_of(cars, found):
+    """Runs of a frame each, with so many cars of which so many are found, by equally good detections."""
+    hits, run = int(found.sum()), np.arange(len(cars))
+    nothing, no_points = np.zeros(hits), np.zeros(hits, dtype=np.int64)
+    detections = EvaluatedDetections(
+        np.full(hits, 0.5), np.ones(hits, dtype=bool), np.repeat(run, found), nothing, no_points, nothing
+    )
+    every, count = np.repeat(run, cars), int(cars.sum())
+    wanted = CountedTruth(
+        np.zeros(count), every, np.full(count, "car"), np.zeros(count, dtype=np.int64), np.ones(count), np.zeros(count)
+    )
+    return Evaluation(AT_07, detections, wanted, run)
+
+
+def test_interval_stays_between_nought_and_one():
+    cars = np.full(4, 10)
+    for found in ([10, 10, 10, 9], [0, 0, 1, 0], [10, 0, 10, 0], [10, 10, 10, 10], [0, 0, 0, 0]):
+        evaluation = found_of(cars, np.array(found))
+        low, high = average_precision_interval(evaluation)
+        assert 0.0 <= low <= evaluation.average_precision <= high <= 1.0
+
+
+def test_too_few_runs_give_no_interval_and_a_sentence():
+    few = evaluate(runs_of(3, frames=20), AT_07)
+    assert average_precision_interval(few) is None
+    assert too_few_runs(3).startswith("3 test runs of traffic give no interval over traffic")
+    assert "test on 4 or more, better 8" in too_few_runs(1)
+    assert not too_few_runs(4)
+    cars = np.array([10, 10, 10, 0, 0, 0])  # runs without any show nothing of how runs differ
+    assert average_precision_interval(found_of(cars, cars)) is None
 
 
 # KITTI ------------------------------------------------------------------------------------------------------------

@@ -72,6 +72,13 @@ def test_figures_charts_and_detections_are_written(folder, capsys):
     assert [run["name"] for run in record["traffic"]] == ["first", "second"]
     assert {"bev_0.7", "car_van_0.7", "truck_bus_0.7"} <= set(record["average_precision"])
     assert "pedestrian_0.5" not in record["average_precision"]  # there is none
+    assert {"bev_0.7_moving", "bev_0.7_parked", "3d_0.7"} <= set(record["average_precision"])
+    users = {name: figure["road_users"] for name, figure in record["average_precision"].items()}
+    assert users["bev_0.7_moving"] + users["bev_0.7_parked"] == users["bev_0.7"]
+    assert users["bev_0.7_parked"] == users["truck_bus_0.7"]  # the bus alone stands
+    assert record["scans"]["rolling_shutter"] is True
+    assert all(figure["interval"] is None for figure in record["average_precision"].values())
+    assert any(line.startswith("2 test runs of traffic give no interval") for line in record["warnings"])
     frames = sum(run["frames"] for run in record["traffic"])
     for form in ("kitti", "openpcdet"):
         assert len(list((folder / "out" / form).glob("*.txt"))) == frames
@@ -104,7 +111,7 @@ def test_mistakes_are_named(folder, tmp_path):
     far = make_traffic(-3.5)
     far.position[:] += [5000.0, 0.0, 0.0]
     far.save(tmp_path / "far.npz")
-    with pytest.raises(SeipError, match="none of 3 frames has a car"):
+    with pytest.raises(SeipError, match=r"nobody of the run of traffic \(by hand, -3\.5\) is ever in the region"):
         detect.main(arguments(folder, "x", str(tmp_path / "far.npz")))
     assert not (folder / "x" / "detection.json").exists()
 

@@ -1,6 +1,7 @@
 """Each claim's verdict, both ways and open, on trials that are told and not run."""
 
 import math
+import re
 from dataclasses import replace
 
 from headless.detection.claims import SeedResult, detection_claims
@@ -63,6 +64,43 @@ def test_seeds_that_disagree_decide_nothing():
 def test_too_few_seeds_decide_nothing(count):
     assert set(verdicts(spread=SPREAD[:count]).values()) == {"undecided"}
     assert f"{count} seed" in evidence(5, spread=SPREAD[:count])
+
+
+def decided(**changed):
+    return {claim.number: claim for claim in detection_claims([replace(one, **changed) for one in trials(padded=1.0)])}
+
+
+def test_nothing_is_decided_of_detectors_that_find_next_to_nothing():
+    """An AP of 0.2 % everywhere would refute the gains of claims 5 to 7."""
+    untrained = decided(average_precision=0.002)
+    assert {claim.verdict for claim in untrained.values()} == {"undecided"}
+    for claim in untrained.values():
+        assert claim.evidence.startswith("no verdict, as the detectors reach an AP of 0.2% with the best")
+        assert "below 30% they say nothing about sensors" in claim.evidence
+    assert {claim.verdict for claim in decided().values()} == {"holds"}
+
+
+def test_nothing_is_decided_while_validation_still_rises():
+    rising = decided(still_rising=True)
+    assert {claim.verdict for claim in rising.values()} == {"undecided"}
+    assert (
+        "validation AP was still rising when 3 of 3 trainings ended: train longer, with --steps" in rising[5].evidence
+    )
+    assert "6 of 6 trainings" in rising[9].evidence
+
+
+def test_a_training_that_still_rises_speaks_for_its_own_claims_alone():
+    told = [replace(one, still_rising=one.padded) for one in trials(padded=1.0)]
+    verdicts = {claim.number: claim.verdict for claim in detection_claims(told)}
+    assert verdicts == {5: "holds", 6: "holds", 7: "holds", 8: "holds", 9: "undecided"}
+
+
+@pytest.mark.parametrize(("false", "share"), [((60.0, 3.0, 1.0), 0.9), ((0.1, 0.02, 0.01), 0.02)])
+def test_no_count_is_below_nought_and_no_share_beyond_a_hundred(false, share):
+    words = evidence(8, false=false, sparse=share, spread=(-0.01, 0.0, 0.09))
+    ends = [float(number) for number in re.findall(r"-?[0-9.]+(?= to|\))", words.replace("per frame:", ""))]
+    assert min(ends) >= 0.0
+    assert max(float(end) for end in re.findall(r"to ([0-9.]+) ?%?\)", words.partition("sparser half")[2])) <= 100.0
 
 
 def test_the_simplest_type_has_to_gain_more_than_every_other():

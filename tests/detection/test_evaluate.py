@@ -2,6 +2,8 @@
 
 import csv
 import json
+from dataclasses import replace
+from itertools import chain
 
 import pytest
 
@@ -9,11 +11,17 @@ pytest.importorskip("torch", reason="torch is not installed: make detection")
 
 from headless import evaluate
 from headless.detection import suitability
+from headless.detection.case_study import read_traffic
 from headless.detection.detector import Detector
+from headless.detection.rules import RULES
 
+import numpy as np
 from matplotlib.image import imread
+from small_scene import make_run
 
 from seip_addon.core.errors import SeipError
+from seip_addon.core.traffic import Trajectories
+from seip_addon.core.workflows.traffic import runs_in
 
 COARSE = ["--sensor", "type1", "--heights", "5.4", "--grid", "8", "--spacing", "20"]
 BRIEF = ["--every", "29", "--steps", "2", "--seeds", "2"]
@@ -59,6 +67,10 @@ def test_the_table_has_a_row_for_each_detector_and_placement(folder):
     assert coverage == sorted(coverage)
     assert all(0 <= float(row["ap_bev_0.7"]) <= float(row["ap_bev_0.5"]) + 1e-9 <= 1 for row in rows)
     assert {row["frames"] for row in rows} == {"2"}
+    for rule in RULES:
+        assert all(row[f"ap_{rule}_low"] == row[f"ap_{rule}_high"] == "" for row in rows)  # of two runs
+        assert {(row[f"ap_{rule}"] == "") == (row[f"road_users_{rule}"] == "0") for row in rows} == {True}
+    assert {row["road_users_pedestrian_0.5"] for row in rows} == {"0"}
 
 
 def test_detectors_know_what_they_have_learnt_from(folder):
@@ -72,6 +84,10 @@ def test_the_record_says_what_was_for_what(folder):
     names = {what: [run["name"] for run in runs] for what, runs in record["traffic"].items()}
     assert names == {"training": ["run-1"], "validation": ["run-2"], "test": ["run-3", "run-4"]}
     assert [claim["number"] for claim in record["claims"]] == [5, 8, 9]
+    assert {claim["verdict"] for claim in record["claims"]} == {"undecided"}  # after two steps
+    assert all("no verdict, as the detectors reach an AP of" in claim["evidence"] for claim in record["claims"])
+    assert all("AP was still rising when" in claim["evidence"] for claim in record["claims"])
+    assert all(one["still_rising"] and list(one["validation"]) == ["2"] for one in record["detectors"])
     assert [one["name"] for one in record["configurations"]] == ["1 × type1", "2 × type1", "4 × type1"]
 
 
@@ -84,8 +100,39 @@ def test_an_evaluation_goes_on_and_ends_the_same(run, folder, tmp_path, capsys, 
     assert all(f"warning: {count} × type1: " in said for count in (1, 2, 4))
     assert "vehicles of one run within 1 m of one of another at the same instant: run-1 and run-2 4%, " in said
     assert "of the pillars with points have more than the 16 that are kept" in said
+    assert "of the parked road users of a test run and of a run that was learnt from, at most 0% stand" in said
+    assert "warning: 2 test runs of traffic give no interval over traffic" in said
+    assert "bev_0.7_moving" in said
     for path in folder.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+
+
+def test_a_run_without_road_users_in_the_region_is_refused_before_training(run, runs, tmp_path):
+    elsewhere = Trajectories.load(runs[2])
+    moved = replace(elsewhere, position=elsewhere.position + 5000.0, source="of elsewhere")
+    moved.save(tmp_path / "run-9.npz")
+    with pytest.raises(SeipError, match=r"nobody of the run of traffic \(of elsewhere\) is ever in the region"):
+        run(tmp_path, runs=[*runs, tmp_path / "run-9.npz"])
+    assert not list(tmp_path.glob("detector*"))
+
+
+@pytest.mark.parametrize(
+    ("count", "learnt", "aside", "tested"), [(4, 1, 1, 2), (5, 2, 1, 2), (6, 2, 1, 3), (16, 6, 2, 8)]
+)
+def test_half_the_runs_are_for_tests_and_an_eighth_for_validation(tmp_path, count, learnt, aside, tested):
+    paths = [tmp_path / f"run-{number}.npz" for number in range(count)]
+    for number, path in enumerate(paths):
+        make_run(number, 5.0).save(path)
+    traffic = read_traffic(paths, np.zeros(3), 1.0)
+    names = [[sampled.name for sampled in part] for part in (traffic.training, traffic.validation, traffic.test)]
+    assert list(map(len, names)) == [learnt, aside, tested]
+    assert list(chain(*names)) == [path.stem for path in paths]
+
+
+def test_runs_beside_a_scene_are_ordered_by_their_numbers(tmp_path):
+    for name in ("run-10", "run-2", "run-1", "dense-3"):
+        (tmp_path / f"{name}.npz").touch()
+    assert [path.stem for path in runs_in(tmp_path)] == ["dense-3", "run-1", "run-2", "run-10"]
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,17 @@ def test_road_users_are_those_of_the_frame():
     assert len(told.detected) == 0
 
 
+def test_who_is_parked_goes_by_the_trajectories():
+    frame = simulated([])
+    known = {"classes": CLASSES, "region": REGION, "sensors": SENSORS, "run": "a"}
+    nothing = Detections(np.empty((0, 7)), np.empty(0), np.empty(0, dtype=np.int64))
+    parked = np.zeros(int(frame.labels.user.max()) + 1, dtype=bool)
+    parked[frame.labels.user[1]] = True
+    cloud = CloudInPlan(frame.points)
+    assert frame_result(frame, cloud, nothing, parked=parked, **known).truth.parked.tolist() == [False, True]
+    assert frame_result(frame, cloud, nothing, **known).truth.parked.tolist() == [False, False]
+
+
 def test_detections_get_their_class_place_and_distance():
     told = result([[0, 0, 0]], [[3, 4, 6, 4, 2, 2, 0], [30, 8, 0, 4, 2, 2, 0]])
     assert told.detected.category.tolist() == ["car", "truck"]

@@ -169,17 +169,14 @@ def test_a_course_trains_all_that_the_study_tries():
     assert not training_plan(configurations, NETWORK, TrainingSettings(), seeds=1, padding=False).padded
 
 
-def curve(*highs, halves=None):
+def curve(*highs):
     points = [
         DisturbanceEffect(
             DropOff(0.1 * (number + 1)),
             IntervalEstimate(0.8, 0.7, 0.9),
             IntervalEstimate(high - 0.01, high - 0.02, high),
-            half,
         )
-        for number, (high, half) in enumerate(
-            zip(highs, halves or [IntervalEstimate(h, h, h) for h in highs], strict=True)
-        )
+        for number, high in enumerate(highs)
     ]
     return DisturbanceCurve("4 × type2", IntervalEstimate(0.9, 0.88, 0.92), tuple(points))
 
@@ -187,8 +184,6 @@ def curve(*highs, halves=None):
 def test_it_begins_at_the_first_size_that_chance_does_not_explain():
     assert curve(0.01, 0.0, -0.001, -0.2).begins.disturbance.size == pytest.approx(0.3)
     assert curve(0.01, 0.0).begins is None
-    assert curve(0.01, -0.2).steady
-    assert not curve(0.01, -0.2, halves=[IntervalEstimate(0, 0, 0), IntervalEstimate(0, -0.1, 0.1)]).steady
 
 
 def test_changes_are_told_in_points():

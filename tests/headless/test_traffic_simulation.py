@@ -2,6 +2,7 @@
 
 import os
 from collections import Counter
+from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -90,6 +91,37 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
     streets = three_ways(tmp_path)
     assert routes(tmp_path, streets, seed=4)[1] == routes(tmp_path, streets, seed=4)[1]
     assert routes(tmp_path, streets, seed=4)[1] != routes(tmp_path, streets, seed=5)[1]
+
+
+def bays(root):
+    """Return lane and middle of each parked car."""
+    models = {f"parked_{name}": model for group in MODELS.values() for name, model in group.items()}
+    return [
+        (
+            vehicle.find("stop").get("lane"),
+            float(vehicle.find("stop").get("endPos")) - models[vehicle.get("type")].length / 2,
+        )
+        for vehicle in root.iter("vehicle")
+        if vehicle.get("id").startswith("parked")
+    ]
+
+
+@pytest.mark.parametrize("kerb", ["rows", "lanes"])
+def test_each_seed_parks_other_cars_in_other_places(tmp_path, kerb):
+    streets = three_ways(tmp_path)
+    if kerb == "lanes":
+        streets = network(
+            tmp_path, edge("in", "j", ROAD), edge("out", "end", BAYS, ROAD, length=200), way("in", "out", "s")
+        )
+    drawn = [routes(tmp_path, streets, seed=seed, duration=600.0)[0] for seed in range(1, 5)]
+    for one, other in combinations(map(bays, drawn), 2):
+        assert one
+        assert min(abs(a - b) for lane, a in one for there, b in other if lane == there or kerb == "lanes") > 1.0
+    names = [{entry.get("id") for entry in root if entry.tag in {"vehicle", "person"}} for root in drawn]
+    assert not any(one & other for one, other in combinations(names, 2))  # and so no paint is, which goes by the name
+    departures = [tuple(entry.get("depart") for entry in root if entry.tag in {"vehicle", "person"}) for root in drawn]
+    types = [tuple(vehicle.get("type") for vehicle in root.iter("vehicle")) for root in drawn]
+    assert len(set(departures)) == len(set(types)) == 4
 
 
 def test_every_model_is_read_back_as_its_category_and_size(tmp_path):

@@ -138,7 +138,7 @@ def precision_front(
                     run=run.name,
                 )
             )
-    precise = {name: ResampledPrecision(evaluate(own, Rule()), training.seed) for name, own in results.items()}
+    precise = {name: ResampledPrecision(evaluate(own, Rule())) for name, own in results.items()}
     return PrecisionFront(
         survey.site.name,
         configuration.name,

@@ -113,7 +113,7 @@ def _on_other_scene(
 
 
 def _studio(layout: Layout) -> Simulator:
-    return Simulator(layout.geometry, ScanSettings(engine=layout.settings.engine))
+    return Simulator(layout.geometry, ScanSettings(rolling_shutter=True, engine=layout.settings.engine))
 
 
 def _most(configurations: Sequence[SensorConfiguration]) -> SensorConfiguration:

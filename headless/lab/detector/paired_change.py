@@ -5,71 +5,97 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from headless.detection.average_precision import MIN_BLOCKS, RESAMPLES, Evaluation, resampled_average_precisions
+from headless.detection.average_precision import Evaluation, average_precisions_without_each_run
 
 import numpy as np
 
 from seip_addon.core.arrays import Float
-from seip_addon.core.estimates import IntervalEstimate, percentiles, student_reach
-
-DRAWS = 2 * RESAMPLES
-"""Resamples of the blocks of traffic; what the first half of them says must be what all say."""
+from seip_addon.core.estimates import (
+    CHANGE_OF_SHARE,
+    SHARE,
+    Interval,
+    IntervalEstimate,
+    jackknife_reach,
+    share_interval,
+    student_reach,
+    within,
+)
 
 
 class ResampledPrecision:
-    """One detector's average precision on some frames, with resamples of their traffic.
+    """One detector's average precision on some frames, and on those of all runs but one.
 
-    Parameters
-    ----------
-    seed : int
-        Of the resamples: what is compared pair by pair has the same, and the same frames.
+    What is compared pair by pair has the same frames, and so leaves out the same runs.
     """
 
-    def __init__(self, evaluation: Evaluation, seed: int = 0) -> None:
+    def __init__(self, evaluation: Evaluation) -> None:
         self.value = evaluation.average_precision
-        self.blocks = int(evaluation.block.max()) + 1
-        self.draws = resampled_average_precisions(evaluation, seed, DRAWS)
+        self.wanted = len(evaluation.wanted)
+        self.left_out = average_precisions_without_each_run(evaluation)
 
 
-def level(those: Sequence[ResampledPrecision], draws: int = DRAWS) -> IntervalEstimate:
+def level(those: Sequence[ResampledPrecision]) -> IntervalEstimate:
     """Return the mean average precision of detectors that differ in their seeds alone."""
-    return _estimate([one.value for one in those], [one.draws[:draws] for one in those], those[0].blocks)
+    values = [one.value for one in those]
+    left_out = _without_each_run(those)
+    if left_out is None:
+        return _open(values)
+    over_traffic = share_interval(float(np.mean(values)), left_out, those[0].wanted)
+    return _with_trainings(values, over_traffic, SHARE)
 
 
-def change(to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], draws: int = DRAWS) -> IntervalEstimate:
+def change(
+    to: Sequence[ResampledPrecision], of: Sequence[ResampledPrecision], *, same_traffic: bool = True
+) -> IntervalEstimate:
     """Return by how much the mean average precision changes from one trial to another of the same detectors.
 
-    Differences are taken detector by detector and, where both had the same
-    frames and seed, resample by resample: what makes traffic hard makes it hard
-    for both. So a change can be told that is far smaller than the interval of
-    either average precision.
+    Differences are taken detector by detector and, of the same traffic, run by
+    run: what makes traffic hard makes it hard for both. So a change can be told
+    that is far smaller than the interval of either average precision.
 
     Parameters
     ----------
     to, of : sequence of ResampledPrecision
         In the same order of detectors.
-    draws : int
-        Resamples that count.
+    same_traffic : bool
+        Whether both had the same frames.
     """
     pairs = list(zip(to, of, strict=True))
-    return _estimate(
-        [after.value - before.value for after, before in pairs],
-        [after.draws[:draws] - before.draws[:draws] for after, before in pairs],
-        min(min(after.blocks, before.blocks) for after, before in pairs),
-    )
+    values = [after.value - before.value for after, before in pairs]
+    after, before = _without_each_run(to), _without_each_run(of)
+    if after is None or before is None:
+        return _open(values)
+    value = float(np.mean(values))
+    if same_traffic:
+        reach = jackknife_reach(after - before)
+    else:
+        reach = math.hypot(jackknife_reach(after), jackknife_reach(before))
+    return _with_trainings(values, (value - reach, value + reach), CHANGE_OF_SHARE)
 
 
-def _estimate(values: Sequence[float], draws: Sequence[Float], blocks: int) -> IntervalEstimate:
+def _without_each_run(those: Sequence[ResampledPrecision]) -> Float | None:
+    """Return the mean average precision of detectors without each run (r,), or None on too few runs."""
+    known = [one.left_out for one in those if one.left_out is not None]
+    if len(known) < len(those):
+        return None
+    mean: Float = np.mean(known, axis=0)
+    return mean
+
+
+def _open(values: Sequence[float]) -> IntervalEstimate:
+    """Return the mean of detectors whose traffic is too little for an interval."""
+    return IntervalEstimate(float(np.mean(values)), -math.inf, math.inf)
+
+
+def _with_trainings(values: Sequence[float], over_traffic: Interval, possible: Interval) -> IntervalEstimate:
     """Return the mean over detectors; its 95 % interval is over other traffic and over other trainings.
 
-    Over traffic it is that of the bootstrap, over trainings Student's. Of two
-    independent errors the distances from the value to the ends add up as
-    squares (G. Y. Zou, A. Donner: Construction of confidence limits about
-    effect measures. Statistics in Medicine 27 (2008), 1693-1702).
+    Over trainings it is Student's. Of two independent errors the distances from
+    the value to the ends add up as squares (G. Y. Zou, A. Donner: Construction
+    of confidence limits about effect measures. Statistics in Medicine 27
+    (2008), 1693-1702).
     """
-    value = float(np.mean(values))
-    if blocks < MIN_BLOCKS:
-        return IntervalEstimate(value, -math.inf, math.inf)
-    low, high = percentiles(np.mean(draws, axis=0))
+    value, (low, high) = float(np.mean(values)), over_traffic
     reach = student_reach(values) if len(values) > 1 else 0.0
-    return IntervalEstimate(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach))
+    ends = value - math.hypot(value - low, reach), value + math.hypot(high - value, reach)
+    return IntervalEstimate(value, *within(ends, possible))

@@ -102,8 +102,7 @@ def _of_curve(curve: DisturbanceCurve, study: LimitsStudy) -> Row:
         f"{curve.name}{whose} with {curve.configuration}",
         _each_loss(curve) if isinstance(wrong, SensorFailure) else _begins(curve),
         f"{detectors} detectors on the same {study.frames} frames with and without; 95 % interval of the paired "
-        "difference, over blocks of traffic (bootstrap) and trainings (Student); half the resamples "
-        + ("say the same" if curve.steady else "say something else: test on more traffic"),
+        "difference, over runs of traffic (jackknife) and trainings (Student)",
         REMEDIES[curve.name],
     )
 

@@ -39,7 +39,7 @@ from .disturbances import (
     TiltError,
     YawError,
 )
-from .paired_change import DRAWS, ResampledPrecision, change, level
+from .paired_change import ResampledPrecision, change, level
 from .trials import DisturbedTrial, EvaluatedDetector, TrialSite, trials
 
 Series = tuple[Disturbance, ...]
@@ -86,14 +86,11 @@ class DisturbanceEffect:
     ----------
     precision, change : IntervalEstimate
         Mean average precision over the detectors, and by how much it differs from that without the disturbance.
-    change_by_half : IntervalEstimate
-        The same from half the resamples.
     """
 
     disturbance: Disturbance
     precision: IntervalEstimate
     change: IntervalEstimate
-    change_by_half: IntervalEstimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +121,6 @@ class DisturbanceCurve:
     def begins(self) -> DisturbanceEffect | None:
         """The smallest size that lowers average precision by more than chance, or None."""
         return next((point for point in self.points if point.change.high < 0), None)
-
-    @property
-    def steady(self) -> bool:
-        """Whether half the resamples give the same result for every size."""
-        return all((point.change.high < 0) == (point.change_by_half.high < 0) for point in self.points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,8 +418,7 @@ class _TrialRunner:
         for disturbance in series:
             tried = yield from self.run(configuration, disturbance, tested)
             own = [ResampledPrecision(trial.evaluation) for trial in tried]
-            by_all, by_half = (change(own, undisturbed, draws) for draws in (DRAWS, DRAWS // 2))
-            points.append(DisturbanceEffect(disturbance, level(own), by_all, by_half))
+            points.append(DisturbanceEffect(disturbance, level(own), change(own, undisturbed)))
         return DisturbanceCurve(configuration.name, level(undisturbed), tuple(points))
 
     def transfers(
@@ -472,10 +463,10 @@ class _TrialRunner:
             twin = next(one for one in configurations if one.name == configuration.name)
             own = yield from self.run(twin, Disturbance(), candidates.tested)
             against = "at home"
-        seed = 0 if other.trained_there else 1  # other frames: nothing is paired but the detectors
-        before = [ResampledPrecision(trial.evaluation, seed) for trial in own]
+        before = [ResampledPrecision(trial.evaluation) for trial in own]
         tried = f"{configuration.name}, {other.site.name}"
-        return TransferResult(self._home.simulator.site, tried, level(there), change(there, before), against)
+        difference = change(there, before, same_traffic=bool(other.trained_there))
+        return TransferResult(self._home.simulator.site, tried, level(there), difference, against)
 
     def padding(
         self, configurations: Sequence[SensorConfiguration], candidates: EvaluatedDetectors

@@ -35,7 +35,7 @@ from .disturbances import Disturbance
 
 FILE = ArrayFile(
     "seip.trial",
-    2,
+    3,
     "trial of a detector",
     "delete it, and it is tried again",
     {
@@ -53,7 +53,7 @@ FILE = ArrayFile(
         "wanted.visibility": ArrayRule("f8", ("t",), 0.0, 1.0),
         "wanted.distance": ArrayRule("f8", ("t",), 0.0),
         "wanted.border": ArrayRule("f8", ("t",), 0.0),
-        "block": ArrayRule("i8", ("f",), 0),
+        "run": ArrayRule("i8", ("f",), 0),
     },
 )
 
@@ -225,7 +225,7 @@ def _save(path: Path, header: dict[str, str], trial: DisturbedTrial) -> None:
         for part in fields(kind)
     }
     border = {f"{table}.border": getattr(beside, table).distance for table in TABLES}
-    FILE.save(path, header, arrays | border | {"block": evaluation.block})
+    FILE.save(path, header, arrays | border | {"run": evaluation.run})
 
 
 def _load(path: Path) -> DisturbedTrial:
@@ -234,10 +234,10 @@ def _load(path: Path) -> DisturbedTrial:
             table: kind(**{part.name: arrays[f"{table}.{part.name}"] for part in fields(kind)})
             for table, kind in TABLES.items()
         }
-        frames = len(arrays["block"])
+        frames = len(arrays["run"])
         if any((arrays[f"{table}.frame"] >= frames).any() for table in TABLES):
             raise ContentError("it has detections of frames that are not in it")
-        evaluation = Evaluation(RULE, tables["detections"], tables["wanted"], arrays["block"])
+        evaluation = Evaluation(RULE, tables["detections"], tables["wanted"], arrays["run"])
         beside = {
             table: replace(rows, distance=arrays[f"{table}.border"])  # type: ignore[type-var]  # each is a dataclass
             for table, rows in tables.items()

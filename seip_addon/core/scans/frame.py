@@ -47,7 +47,10 @@ STATIC_INSTANCE = -1
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """The road users of one instant, all of them, seen or not; k boxes.
+    """The road users of one frame, all of them, seen or not; k boxes.
+
+    They are those of the frame's time; with a rolling shutter each is at the mean time of its own returns, without
+    any halfway through the frame.
 
     Parameters
     ----------

@@ -48,6 +48,11 @@ class Motion:
             for one, two in ((self.position, other.position), (self.yaw, other.yaw), (self.pitch, other.pitch))
         )
 
+    def pose(self, delay: float) -> tuple[Float, float, float]:
+        """Return position (3,), yaw and pitch at a delay in seconds."""
+        position = np.array([np.interp(delay, self.delay, part) for part in self.position.T])
+        return position, float(np.interp(delay, self.delay, self.yaw)), float(np.interp(delay, self.delay, self.pitch))
+
     def at(self, delay: Float) -> tuple[Float, Float]:
         """Return positions (n, 3) and rotations (n, 3, 3) at delays (n,) in seconds."""
         position = np.stack([np.interp(delay, self.delay, part) for part in self.position.T], axis=1)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float
+from ..arrays import Float, Integer
 from ..errors import SeipError
 from ..lidar import measured_returns
 from ..progress import Progress
@@ -19,8 +19,8 @@ from ..settings import setting
 from ..traffic import Snapshot, Trajectories
 from ..traffic.bodies import Body
 from ..visibility.ray_casting import Engine, make_ray_caster
-from .frame import Frame, Labels
-from .motion import moving, rotations, still
+from .frame import STATIC_INSTANCE, Frame, Labels
+from .motion import Motion, moving, rotations, still
 from .scanner import BodySurface, MovingTraffic, ReflectiveSurface, Scan, Scanner, returns_by_user
 from .sensor import MountedSensor
 from .static_scene import StaticScene
@@ -37,8 +37,9 @@ class ScanSettings:
     noise : bool
         Whether ranges are noisy and returns get lost, as the sensors' models say.
     rolling_shutter : bool
-        Whether each azimuth is looked along at its own time (`Scanner.delay`) while the traffic moves. Else a
-        revolution takes no time.
+        Whether each azimuth is looked along at its own time (`Scanner.delay`) while the traffic moves. Each road user's
+        box is then where it is at the mean time of its returns of all sensors, and without returns halfway through the
+        frame. Else a revolution takes no time.
     engine : {"auto", "bvh", "embree"}
     weather, reflectivity : tuple of str
         What scene and sensors were made with, in words, for the record.
@@ -107,13 +108,14 @@ class Simulation:
             for sensor, (scanner, scan) in enumerate(zip(self.scanners, scans, strict=True))
         ]
         merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        labels = self._labels(snapshot, scans, [part["instance"] for part in parts])
-        return Frame(time=snapshot.time, labels=labels, **merged)
+        returns = np.stack([returns_by_user(part["instance"], len(self._trajectories)) for part in parts], axis=1)
+        if self._settings.rolling_shutter:
+            snapshot = self._when_seen(snapshot, merged["instance"], merged["delay"])
+        return Frame(time=snapshot.time, labels=self._labels(snapshot, scans, returns), **merged)
 
     def scans(self, snapshot: Snapshot) -> list[Scan]:
         """Return what the rays of each sensor end on, without noise or losses."""
-        rolling = self._settings.rolling_shutter
-        motions = moving(self._trajectories, snapshot, self._revolution) if rolling else still(snapshot)
+        motions = self._motions(snapshot)
         traffic = MovingTraffic.of(motions, [self._shapes[motion.user] for motion in motions])
 
         def scan(scanner: Scanner) -> Scan:
@@ -123,6 +125,29 @@ class Simulation:
         with ThreadPoolExecutor(min(len(self.scanners), self._threads)) as pool:
             return list(pool.map(scan, self.scanners))
 
+    def _motions(self, snapshot: Snapshot) -> list[Motion]:
+        rolling = self._settings.rolling_shutter
+        return moving(self._trajectories, snapshot, self._revolution) if rolling else still(snapshot)
+
+    def _when_seen(self, snapshot: Snapshot, instance: NDArray[np.int32], delay: NDArray[np.float32]) -> Snapshot:
+        """Return each road user where it is at the mean time of its returns, or without any halfway through the frame.
+
+        Parameters
+        ----------
+        instance, delay : (n,) array
+            Of the points of all sensors, as in `Frame`.
+        """
+        of_traffic = instance != STATIC_INSTANCE
+        most = len(self._trajectories)
+        count = np.bincount(instance[of_traffic], minlength=most)
+        total = np.bincount(instance[of_traffic], weights=delay[of_traffic], minlength=most)
+        mean = np.where(count > 0, total / np.maximum(count, 1), self._revolution / 2)
+        poses = [motion.pose(float(mean[motion.user])) for motion in self._motions(snapshot)]
+        if not poses:
+            return snapshot
+        position, yaw, pitch = (np.array(part) for part in zip(*poses, strict=True))
+        return replace(snapshot, position=position, yaw=yaw, pitch=pitch)
+
     def _random(self, sensor: int, frame: int) -> np.random.Generator | None:
         if not self._settings.noise:
             return None
@@ -131,8 +156,8 @@ class Simulation:
         seed = np.random.SeedSequence(entropy, spawn_key=(sensor, frame))
         return np.random.Generator(np.random.SFC64(seed))
 
-    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], instances: Sequence[NDArray[np.int32]]) -> Labels:
-        most = len(self._trajectories)
+    def _labels(self, snapshot: Snapshot, scans: Sequence[Scan], returns: Integer) -> Labels:
+        """Return the labels of road users at their places, given the returns (u, s) of each of all from each sensor."""
         users = [self._trajectories.users[number] for number in snapshot.user]
         size = np.array([(user.length, user.width, user.height) for user in users]).reshape(-1, 3)
         up = rotations(snapshot.yaw, snapshot.pitch)[:, :, 2]
@@ -147,7 +172,7 @@ class Simulation:
             yaw=(snapshot.yaw + math.pi) % (2 * math.pi) - math.pi,
             pitch=snapshot.pitch,
             speed=snapshot.speed,
-            points=np.stack([returns_by_user(instance, most)[snapshot.user] for instance in instances], axis=1),
+            points=returns[snapshot.user],
             visibility=(visible / np.maximum(unoccluded, 1))[snapshot.user],
             inside=self._static.inside(centre),
         )

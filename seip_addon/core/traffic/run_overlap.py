@@ -15,6 +15,8 @@ MATCH_RADIUS = 1.0  # metres in plan within which two vehicles are in one place
 MAX_OVERLAP = 0.5
 """Share of the vehicles beyond which two runs are held to be copies. Independent runs queue in the same places."""
 
+MOST_NAMED = 6  # pairs of runs that are named each; of more the range and the closest are said
+
 _INTERVAL = 1.0
 _SAME_TIME = 1e-3
 
@@ -97,7 +99,7 @@ def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions
     SeipError
         A pair overlaps by more than `MAX_OVERLAP`.
     """
-    said = []
+    said, shares = [], []
     for one, other in pairs:
         share = overlap_of(one, other)
         if share is not None and share > MAX_OVERLAP:
@@ -107,5 +109,9 @@ def require_independent(pairs: Iterable[tuple[VehiclePositions, VehiclePositions
                 "for runs that are to be independent: name runs that were simulated with other demand and other seeds"
             )
         said.append(f"{one.name} and {other.name} {'cannot be told' if share is None else format(share, '.0%')}")
+        shares.append(-1.0 if share is None else share)
+    if len(said) > MOST_NAMED:
+        known = [share for share in shares if share >= 0.0] or [0.0]
+        said = [f"{min(known):.0%} to {max(known):.0%} in {len(said)} pairs, most of {said[int(np.argmax(shares))]}"]
     measure = f"vehicles of one run within {MATCH_RADIUS:g} m of one of another at the same instant"
     return f"runs of traffic are independent (below {MAX_OVERLAP:.0%}): {measure}: {', '.join(said)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -104,8 +105,12 @@ def traffic_folder(scene: Path, kind: str = "") -> Path:
 
 
 def runs_in(folder: Path) -> list[Path]:
-    """Return the files of runs in a folder by their names, none where there is no such folder."""
-    return sorted(folder.glob("*.npz"))
+    """Return the files of runs in a folder by their names, numbers as such; none where there is no such folder."""
+
+    def by_number(path: Path) -> list[tuple[int, str]]:
+        return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"([0-9]+)", path.stem)]
+
+    return sorted(folder.glob("*.npz"), key=by_number)
 
 
 def load_runs(paths: Sequence[Path], origin: Float) -> list[Trajectories]:

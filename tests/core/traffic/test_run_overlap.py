@@ -53,6 +53,15 @@ def test_shipped_runs_are_independent(folder):
     assert max(shares(*runs)) < 0.3
 
 
+def test_of_many_pairs_the_range_and_the_closest_are_said():
+    paths = sorted((SHIPPED / "junction_traffic").glob("*.npz"))[:5]
+    runs = [vehicle_positions(path.stem, Trajectories.load(path)) for path in paths]
+    said = require_independent(combinations(runs, 2))
+    closest = max(combinations(runs, 2), key=lambda pair: overlap_of(*pair))
+    assert f"in 10 pairs, most of {closest[0].name} and {closest[1].name} {overlap_of(*closest):.0%}" in said
+    assert said.count(" and ") == 1
+
+
 def test_the_share_is_that_of_the_vehicles_within_a_metre():
     def standing(*places):
         return [[(0.0, x, 0.0, 0.0, 0.0, 0.0), (10.0, x, 0.0, 0.0, 0.0, 0.0)] for x in places]

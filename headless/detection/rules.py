@@ -1,0 +1,70 @@
+"""By which rules average precision is taken: the one table of every command."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seip_addon.core.errors import SeipError
+from seip_addon.core.estimates import Interval
+
+from .average_precision import average_precision_interval, evaluate
+from .frame_results import FrameResult
+from .matching import Rule
+from .settings import CLASS_CATEGORIES
+
+SMALL_OVERLAP = 0.5  # at which classes of small road users are evaluated, as KITTI does
+SMALL_CLASSES = ("cycle", "pedestrian")
+
+
+def _of_class(name: str) -> tuple[str, Rule]:
+    overlap = SMALL_OVERLAP if name in SMALL_CLASSES else Rule().iou
+    categories = CLASS_CATEGORIES[name]
+    return f"{'_'.join(categories)}_{overlap:g}", Rule(iou=overlap, categories=categories)
+
+
+RULES = {
+    "bev_0.7": Rule(),
+    "bev_0.5": Rule(iou=0.5),
+    "3d_0.7": Rule(in_space=True),
+    "bev_0.7_from_5_points": Rule(fewest_points=5),
+    "bev_0.7_moving": Rule(parked=False),
+    "bev_0.7_parked": Rule(parked=True),
+    **dict(_of_class(name) for name in CLASS_CATEGORIES),
+}
+"""How average precision is taken; the first is the study's own."""
+
+MAIN_RULE = next(iter(RULES.values()))
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Average precision by one rule.
+
+    Parameters
+    ----------
+    value : float, 0 to 1
+        NaN where no road user counts.
+    interval : (float, float) or None
+        Its 95 % interval over other traffic, where there are runs enough.
+    road_users : int
+        That count, over all frames.
+    """
+
+    value: float
+    interval: Interval | None
+    road_users: int
+
+
+def precision_by(frames: Sequence[FrameResult], rule: Rule) -> Precision:
+    """Return the average precision of all detections by a rule."""
+    try:
+        found = evaluate(frames, rule)
+    except SeipError:  # nobody counts
+        return Precision(np.nan, None, 0)
+    return Precision(found.average_precision, average_precision_interval(found), len(found.wanted))
+
+
+def precisions(frames: Sequence[FrameResult]) -> dict[str, Precision]:
+    """Return the average precision by every rule, by its name."""
+    return {name: precision_by(frames, rule) for name, rule in RULES.items()}

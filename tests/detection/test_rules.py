@@ -1,0 +1,67 @@
+"""The table of rules: classes, moving and parked, in plan and in space, each with its interval."""
+
+import math
+
+from headless.detection.rules import MAIN_RULE, RULES, precision_by, precisions
+
+import pytest
+from labelled_frames import SIZES, box, detected, frame, truth
+
+PLACES = [0.0, 30.0, 60.0, 90.0]
+
+
+def street(runs=4):
+    """Runs of a frame each: two cars drive, of two parked ones one is found; a van and a pedestrian are found."""
+    told = []
+    for number in range(runs):
+        cars, van, person = (
+            [box(x) for x in PLACES],
+            box(120.0, size=SIZES["van"]),
+            box(150.0, size=SIZES["pedestrian"]),
+        )
+        there = truth(
+            [*cars, van, person],
+            category=["car", "car", "car", "car", "van", "pedestrian"],
+            parked=[False, False, True, True, False, False],
+        )
+        found = detected([*cars[:3], van, person], [0.9, 0.8, 0.7, 0.6, 0.5], category=["car"] * 4 + ["pedestrian"])
+        told.append(frame(there, found, run=f"run {number}"))
+    return told
+
+
+def test_moving_and_parked_are_judged_apart_and_neither_punishes_the_other():
+    found = precisions(street())
+    assert {name: (found[name].value, found[name].road_users) for name in ("bev_0.7_moving", "bev_0.7_parked")} == {
+        "bev_0.7_moving": (1.0, 12),
+        "bev_0.7_parked": (0.5, 8),
+    }
+    assert found["bev_0.7"].value == pytest.approx(4 / 5)
+
+
+def test_each_class_is_judged_at_its_own_overlap():
+    found = precisions(street())
+    assert (found["car_van_0.7"].road_users, found["pedestrian_0.5"].road_users) == (20, 4)
+    assert found["pedestrian_0.5"].value == 1.0
+    assert (RULES["motorcycle_bicycle_0.5"].iou, RULES["pedestrian_0.5"].iou, RULES["truck_bus_0.7"].iou) == (
+        0.5,
+        0.5,
+        0.7,
+    )
+    assert found["truck_bus_0.7"].road_users == 0
+    assert math.isnan(found["truck_bus_0.7"].value)
+    assert found["truck_bus_0.7"].interval is None
+
+
+def test_every_rule_has_its_interval():
+    found = precisions(street())
+    for name, precision in found.items():
+        if precision.road_users:
+            low, high = precision.interval
+            assert 0.0 <= low <= precision.value <= high <= 1.0, name
+    assert all(precision.interval is None for precision in precisions(street(3)).values())
+
+
+def test_the_first_rule_is_the_studys_own():
+    assert RULES["bev_0.7"] is MAIN_RULE
+    assert RULES["3d_0.7"].in_space
+    assert precision_by(street(), MAIN_RULE) == precisions(street())["bev_0.7"]
