@@ -1,6 +1,9 @@
 """Simulated recordings of traffic for each sensor configuration, made on demand."""
 
+from __future__ import annotations
+
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from headless.coverage_study.cells import Case
@@ -8,8 +11,11 @@ from headless.coverage_study.cells import Case
 import numpy as np
 
 from seip_addon.core.arrays import Float
+from seip_addon.core.placement.deployment import Deployment
 from seip_addon.core.progress import finish
+from seip_addon.core.results.placement_record import versions
 from seip_addon.core.scans import Frame, MountedSensor, ScanSettings, Simulation, StaticScene, prepare
+from seip_addon.core.scans.run_folder import Run
 from seip_addon.core.storage.files import digest
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.bodies import fitted_body
@@ -40,22 +46,48 @@ class SampledRun:
 
 @dataclass(frozen=True, eq=False)
 class SensorConfiguration:
-    """A number of sensors of one type, placed where they cover most."""
+    """Sensors of a placement, however it came about.
 
-    case: Case
+    Parameters
+    ----------
+    sensor : str
+        What charts and tables group it under: the type, or the name of a placement that was read.
+    count : int
+        N, the number of sensors asked for.
+    status : str
+        As in `Placement`.
+    gap : float
+        Infinite where nothing bounds it.
+    read : bool
+        Whether it was read from a folder; it is no number of sensors of a type then.
+    """
 
-    @property
-    def name(self) -> str:
-        """For people: ``2 × type1``."""
-        return f"{self.case.count} × {self.case.sensor}"
+    name: str
+    deployment: Deployment
+    sensor: str
+    count: int
+    status: str
+    gap: float
+    read: bool = False
+
+    @classmethod
+    def of_case(cls, case: Case) -> SensorConfiguration:
+        """Return a number of sensors of one type, placed where they cover most."""
+        name = f"{case.count} × {case.sensor}"
+        return cls(name, case.deployment, case.sensor, case.count, case.placement.status, case.placement.gap)
 
     @property
     def sensors(self) -> tuple[MountedSensor, ...]:
         """The sensors where they hang."""
         return tuple(
             MountedSensor(sensor.label, sensor.model, sensor.xyz, sensor.orientation)
-            for sensor in self.case.deployment.sensors
+            for sensor in self.deployment.sensors
         )
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Catalogue keys of the sensors' types."""
+        return tuple(sorted({sensor.model.key for sensor in self.deployment.sensors}))
 
     @property
     def places(self) -> Float:
@@ -78,11 +110,28 @@ class Simulator:
         """Return the frames of a run, to be simulated when they are asked for."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
-        return Recording(name, run.key, frames, (configuration.case.sensor,), self.site)
+        return Recording(name, run.key, frames, configuration.types, self.site)
 
     def frame(self, configuration: SensorConfiguration, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""
         return self._simulation(configuration, run).frame(number, float(run.times[number]))
+
+    def key(self, configuration: SensorConfiguration, runs: Sequence[SampledRun]) -> str:
+        """Return a digest of all that the frames of some runs follow from."""
+        scans = (
+            Run(
+                static=self.static,
+                origin=run.trajectories.origin,
+                sensors=configuration.sensors,
+                trajectories=run.trajectories,
+                bodies=[fitted_body(user) for user in run.trajectories.users],
+                times=run.times,
+                settings=self.settings,
+                versions=versions(),
+            )
+            for run in runs
+        )
+        return digest(*(scan.key for scan in scans))
 
     def _prepared(self, configuration: SensorConfiguration, run: SampledRun) -> Simulation:
         bodies = [fitted_body(user) for user in run.trajectories.users]

@@ -111,7 +111,7 @@ def precision_front(
     progress = Progress(0, 1, "place")
     cell = Cell(lidar.key, None, count, 1.0)
     placed = solve_cell(survey.site, survey.models, survey.grid.visible, cell, survey.settings.limits)
-    configuration = SensorConfiguration((yield from within(progress, placed)))
+    configuration = SensorConfiguration.of_case((yield from within(progress, placed)))
     static = static_scene(survey.geometry)
     trained = yield from _trained(configuration, static, traffic, survey, training, folder)
 
@@ -160,7 +160,7 @@ def _trained(
 ) -> Generator[Progress, None, TrainedDetector]:
     network = NetworkSettings()
     simulator = Simulator(static, ScanSettings(seed=training.seed), survey.site.name)
-    name = f"detector-{configuration.case.sensor}-{training.steps}-{training.seed}"
+    name = f"detector-{configuration.sensor}-{training.steps}-{training.seed}"
     asked = case_study.ModelConfiguration(name, (configuration,), network, training)
     grid = grid_of(survey.geometry, network.pillar)
     learnt = yield from case_study.simulate_training_set(simulator, [configuration], traffic, grid, network.most_points)
