@@ -90,6 +90,11 @@ class SensorConfiguration:
         return tuple(sorted({sensor.model.key for sensor in self.deployment.sensors}))
 
     @property
+    def key(self) -> str:
+        """Digest of where which sensors hang."""
+        return digest(*(part for one in self.sensors for part in (one.model.key, one.xyz, one.orientation)))
+
+    @property
     def places(self) -> Float:
         """Positions of the sensors, (s, 3) in metres."""
         return np.array([sensor.xyz for sensor in self.sensors])
@@ -110,7 +115,7 @@ class Simulator:
         """Return the frames of a run, to be simulated when they are asked for."""
         frames = LazyFrames(len(run.times), lambda number: self.frame(configuration, run, number))
         name = f"{configuration.name} in {run.name}"
-        return Recording(name, run.key, frames, configuration.types, self.site)
+        return Recording(name, run.key, frames, configuration.types, self.site, configuration.key)
 
     def frame(self, configuration: SensorConfiguration, run: SampledRun, number: int) -> Frame:
         """Simulate a frame of a run."""

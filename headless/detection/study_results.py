@@ -79,9 +79,7 @@ def save_charts(folder: Path, results: StudyResults, trained: Sequence[TrainedDe
     save_count_chart(folder / "ap_by_count.png", points, results.name)
     save_price_chart(folder / "ap_by_price.png", points, results.name)
     save_coverage_chart(folder / "ap_by_coverage.png", points, *results.correlation, results.name)
-    curves = [
-        curve(one.configuration.sensor, one.configuration.count, one.evaluation) for one in results.first
-    ]
+    curves = [curve(one.configuration.sensor, one.configuration.count, one.evaluation) for one in results.first]
     save_precision_recall_chart(folder / "precision_recall.png", curves, results.name)
     for sensor in dict.fromkeys(one.configuration.sensor for one in results.first):
         own = [one for one in results.first if one.configuration.sensor == sensor]
