@@ -4,6 +4,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from headless.charts.style import COLOURS, DASHED, FAINT_COLOUR, colour, interval_ends, mark, new_figure, save_chart
 from headless.charts.style import style_axes as style
@@ -84,7 +85,15 @@ def save_placements_chart(
             zorder=4,
         )
     first = placements[0]
-    ring = {"linestyle": "none", "marker": "o", "mfc": "none", "mec": INK, "markersize": 13, "mew": 1.4, "zorder": 5}
+    ring: dict[str, Any] = {
+        "linestyle": "none",
+        "marker": "o",
+        "mfc": "none",
+        "mec": INK,
+        "markersize": 13,
+        "mew": 1.4,
+        "zorder": 5,
+    }
     panel.plot([first.coverage], [first.average_precision], **ring)
     panel.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.0f} %"))
     panel.margins(x=0.06, y=0.08)

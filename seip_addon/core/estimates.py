@@ -162,9 +162,8 @@ def rank_agreements(x: Float, y: Float) -> tuple[Float, Float]:
     -------
     spearman, kendall : (…) float64
     """
-    signs = [np.sign(values[..., :, None] - values[..., None, :]) for values in (x, y)]
-    ranks = [sign.sum(axis=-1) for sign in signs]
-    return _cosine(*ranks, (-1,)), _cosine(*signs, (-2, -1))
+    of_x, of_y = (np.sign(values[..., :, None] - values[..., None, :]) for values in (x, y))
+    return _cosine(of_x.sum(axis=-1), of_y.sum(axis=-1), (-1,)), _cosine(of_x, of_y, (-2, -1))
 
 
 def _cosine(one: Float, other: Float, axes: tuple[int, ...]) -> Float:

@@ -94,7 +94,7 @@ def correlate(criterion: Criterion, precise: Precisions, which: Boolean | None =
     found = rank_agreements(criterion.values[rows], precise.values[rows]) if len(rows) else (np.nan, np.nan)
     values = [float(value) for value in found]
     if len(rows) < MIN_PLACEMENTS or not precise.has_intervals or np.isnan(values).any():
-        return Correlation(len(rows), *(_open(value) for value in values), np.zeros(0))
+        return Correlation(len(rows), _open(values[0]), _open(values[1]), np.zeros(0))
     drawn = rows[_drawn(len(rows), precise.resampled.shape[1])]
     resamples = np.arange(len(drawn))[:, None]
     resampled = rank_agreements(criterion.values[drawn], precise.resampled[drawn, resamples])

@@ -1,5 +1,6 @@
 """Placements of one type and number: the optimal one, random ones, and some in between."""
 
+import functools
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
@@ -152,9 +153,9 @@ class _Drawing:
         ends = (self._worst(), self._optimal)
         pool: dict[frozenset[int], float] = {}
         for draw in range(SWAPS_PER_PLACEMENT * number):
-            swapped = self._new(lambda end=ends[draw % 2]: self._swapped(end), keep=False)
+            swapped = self._new(functools.partial(self._swapped, ends[draw % 2]), keep=False)
             pool[frozenset(swapped.tolist())] = self._coverage(swapped)
-        chosen = []
+        chosen: list[Integer] = []
         low, high = (self._coverage(end) for end in ends)
         for level in np.linspace(low, high, number + 2)[1:-1].tolist():
             if not pool:

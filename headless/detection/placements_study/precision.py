@@ -29,7 +29,7 @@ from headless.detection.settings import NetworkSettings, TrainingSettings
 
 import numpy as np
 
-from seip_addon.core.arrays import Float, Text
+from seip_addon.core.arrays import Boolean, Float, Text
 from seip_addon.core.estimates import Interval, percentiles
 from seip_addon.core.progress import Progress, within
 from seip_addon.core.storage.files import digest
@@ -119,7 +119,7 @@ class Precisions:
         """Share of the test frames' road users with `ENOUGH_RETURNS` or more, (n,)."""
         return np.array([float((own[0].wanted.points >= ENOUGH_RETURNS).mean()) for own in self.evaluations])
 
-    def _on_runs(self, frames: Text) -> Float:
+    def _on_runs(self, frames: Boolean) -> Float:
         """Return the average precision of each placement on some frames (f,) bool, the mean over the trainings."""
         return np.array(
             [

@@ -37,6 +37,7 @@ from .drawing import OPTIMAL, RANDOM, DrawnPlacements, PlacementsStudySettings
 from .precision import Precisions
 
 SCHEMA = "seip-placements-study/1"
+LEAST_PRECISION = 0.1  # below which a detector has not learnt enough for anything to follow
 POINT = 0.01  # of average precision: what a criterion has to gain to be worth its trouble
 
 
@@ -108,6 +109,12 @@ class PlacementsStudy:
                 f"{_written(one.difference, signed=True)}; AP of the placement that it likes best, against that of "
                 f"coverage: {_points(one.gain)}"
             )
+        if values.max() < LEAST_PRECISION:
+            yield (
+                f"nothing follows from this: the detector has hardly learnt, with AP@0.7 below {LEAST_PRECISION:.0%} "
+                "everywhere, so train it for more steps"
+            )
+            return
         yield self._of_correlations()
         yield self._of_gains()
 
