@@ -26,6 +26,7 @@ from headless.detection.placements_study.precision import Precisions
 from headless.detection.recordings import SampledRun, SensorConfiguration
 
 import numpy as np
+import shapely
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from labelled_frames import box, detected, traffic, truth
@@ -178,15 +179,18 @@ def run_of(trajectories):
 def test_occupancy_by_hand():
     """Turned by a quarter, 4 m long: it stands over the target at y = 1.9 for 4 of 10 s, and then drives away."""
     targets = np.array([[0.0, 1.9, 0.0], [0.0, 2.1, 0.0], [1.1, 0.0, 0.0], [-1.1, 0.0, 0.0]])
-    often = vehicle_occupancy(targets, [run_of(one_car())])
+    points = Targets(targets, np.ones(4), np.zeros(4, dtype=bool), 1e-3)
+    often = vehicle_occupancy(points, [run_of(one_car())])
     assert often[0] == pytest.approx(0.4, abs=0.06)
     assert often[1] == often[3] == 0
-    assert not vehicle_occupancy(targets, [run_of(one_car("pedestrian"))]).any()
+    squares = vehicle_occupancy(replace(points, spacing=0.5), [run_of(one_car())])
+    assert (squares[1:] == often[0]).all()
+    assert not vehicle_occupancy(points, [run_of(one_car("pedestrian"))]).any()
 
 
 @pytest.mark.parametrize("far", ["training", "test"])
 def test_traffic_without_vehicles_in_the_region_is_refused(far):
-    site = SimpleNamespace(targets=SimpleNamespace(xyz=np.zeros((1, 3))))
+    site = SimpleNamespace(region=shapely.box(-9, -9, 9, 9))
     runs = {what: (run_of(one_car(x=500.0 * (what == far))),) for what in ("training", "test")}
     with pytest.raises(SeipError, match="no vehicle is ever in the region of interest in the runs"):
         require_vehicles(SimpleNamespace(**runs), site)

@@ -56,7 +56,7 @@ def criteria_of(
     logarithm of a car's returns, as perception entropy takes it (Ma et al. 2021).
     """
     targets = survey.site.targets
-    often = vehicle_occupancy(targets.xyz, traffic.training)
+    often = vehicle_occupancy(targets, traffic.training)
     weights = {
         "weighted_coverage": ("coverage weighted by regions", targets.weight),
         "traffic_coverage": ("coverage weighted by traffic", often),
