@@ -21,7 +21,7 @@ from headless.detection import case_study, study_results
 from headless.detection.claims import detection_claims
 from headless.detection.detector import check_device
 from headless.detection.pillars import grid_of
-from headless.detection.placements_study.criteria import criteria_of
+from headless.detection.placements_study.criteria import criteria_of, weights_of_targets
 from headless.detection.placements_study.drawing import PlacementsStudySettings, draw_placements
 from headless.detection.placements_study.occupancy import require_vehicles
 from headless.detection.placements_study.precision import detectors_of, learnt_clouds, precisions
@@ -104,7 +104,9 @@ def _evaluate_placements(options: argparse.Namespace) -> None:
     site = prepare_site(options, settings.count)
     watch, folder = site.stopwatch, options.output
     require_vehicles(site.traffic, site.surveyed.site)
-    drawn = watch.run("placements", draw_placements(site.surveyed, settings))
+    drawn = watch.run(
+        "placements", draw_placements(site.surveyed, settings, weights_of_targets(site.surveyed, site.traffic))
+    )
     simulator, grid = site.simulator, grid_of(site.surveyed.geometry, NetworkSettings().pillar)
     models = detectors_of(drawn, settings)
     training_set = watch.run("simulation", learnt_clouds(simulator, drawn, site.traffic, grid))

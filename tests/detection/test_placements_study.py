@@ -16,6 +16,7 @@ from headless.detection.placements_study.criteria import criteria_of
 from headless.detection.placements_study.drawing import (
     BETWEEN,
     OPTIMAL,
+    OTHERWISE,
     RANDOM,
     PlacementsStudySettings,
     draw_placements,
@@ -69,7 +70,7 @@ def poses(configurations):
 
 
 def test_placements_are_feasible_different_and_spread(survey):
-    drawn = finish(draw_placements(survey, SETTINGS))
+    drawn = finish(draw_placements(survey, SETTINGS, {}))
     assert drawn.kind == (OPTIMAL, *[RANDOM] * 5, *[BETWEEN] * 5)
     everything = poses(drawn.evaluated) + poses(drawn.learnt)
     assert len(set(everything)) == len(everything) == 17
@@ -86,8 +87,24 @@ def test_placements_are_feasible_different_and_spread(survey):
     assert np.diff(between).max() < 0.5 * np.ptp(coverage)
 
 
+def test_the_optimal_placements_of_other_weights_are_evaluated_as_well(survey):
+    site, visible = survey.site, survey.grid.visible
+    central = site.targets.central.astype(float)
+    drawn = finish(draw_placements(survey, SETTINGS, {"regions": central, "alike": np.ones(len(site.targets))}))
+    assert drawn.kind[-1] == OTHERWISE
+    assert len(drawn.evaluated) == SETTINGS.placements + 1  # all alike is coverage itself
+    positions = site.candidates.position_of
+    best = max(
+        (visible[a] | visible[b]) @ central
+        for a in range(len(visible))
+        for b in range(a)
+        if positions[a] != positions[b]
+    )
+    assert (drawn.evaluated[-1].deployment.seen_by > 0) @ central == best
+
+
 def test_a_seed_draws_the_same_and_another_others(survey):
-    again = [finish(draw_placements(survey, replace(SETTINGS, seed=seed))) for seed in (0, 0, 1)]
+    again = [finish(draw_placements(survey, replace(SETTINGS, seed=seed), {})) for seed in (0, 0, 1)]
     first, same, other = [poses(one.evaluated) + poses(one.learnt) for one in again]
     assert first == same
     assert first[0] == other[0]
@@ -99,7 +116,7 @@ def test_random_placements_are_uniform(survey):
     number = len(survey.site.candidates)
     counts = np.zeros(number)
     for seed in range(12):
-        drawn = finish(draw_placements(survey, replace(SETTINGS, placements=60, seed=seed)))
+        drawn = finish(draw_placements(survey, replace(SETTINGS, placements=60, seed=seed), {}))
         for some in poses(drawn.evaluated[1:31]):
             counts[list(some)] += 1
     expected = counts.sum() / number
@@ -122,7 +139,7 @@ def test_what_cannot_be_studied_is_refused(changed, sensors, sentence):
 
 def test_more_placements_than_there_are_get_a_sentence(survey):
     with pytest.raises(SeipError, match="ask for fewer placements"):
-        finish(draw_placements(survey, replace(SETTINGS, placements=400, count=1)))
+        finish(draw_placements(survey, replace(SETTINGS, placements=400, count=1), {}))
 
 
 def rectangle(sensor, target):

@@ -41,6 +41,22 @@ class Criterion:
     beforehand: bool = True
 
 
+WEIGHTED = {
+    "coverage weighted by regions": "weighted_coverage",
+    "coverage weighted by traffic": "traffic_coverage",
+    "occupancy entropy seen (S-MIG)": "occupancy_entropy",
+}
+"""Keys of criteria that are coverage with other weights of targets, by name."""
+
+
+def weights_of_targets(survey: Survey, traffic: Traffic) -> dict[str, Float]:
+    """Return the weights of targets (t,) of the criteria that are weighted coverage, by name; see `criteria_of`."""
+    targets = survey.site.targets
+    often = vehicle_occupancy(targets, traffic.training)
+    weights = dict(zip(WEIGHTED, (targets.weight, often, _entropy(often)), strict=True))
+    return {name: weight for name, weight in weights.items() if weight is not targets.weight or targets.central.any()}
+
+
 def criteria_of(
     survey: Survey,
     simulator: Simulator,
@@ -56,21 +72,13 @@ def criteria_of(
     logarithm of a car's returns, as perception entropy takes it (Ma et al. 2021).
     """
     targets = survey.site.targets
-    often = vehicle_occupancy(targets, traffic.training)
-    weights = {
-        "weighted_coverage": ("coverage weighted by regions", targets.weight),
-        "traffic_coverage": ("coverage weighted by traffic", often),
-        "occupancy_entropy": ("occupancy entropy seen (S-MIG)", _entropy(often)),
-    }
-    if not targets.central.any():
-        del weights["weighted_coverage"]
     seen = [one.deployment.seen_by > 0 for one in placements]
     returns = yield from _returns(simulator, placements, targets.xyz)
     return (
         Criterion("coverage", "coverage", np.array([one.deployment.coverage for one in placements])),
         *(
-            Criterion(key, name, np.array([weighted_share(one, weight) for one in seen]))
-            for key, (name, weight) in weights.items()
+            Criterion(WEIGHTED[name], name, np.array([weighted_share(one, weight) for one in seen]))
+            for name, weight in weights_of_targets(survey, traffic).items()
         ),
         Criterion(
             "targets_with_returns",

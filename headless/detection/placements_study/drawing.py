@@ -1,27 +1,27 @@
 """Placements of one type and number: the optimal one, random ones, and some in between."""
 
 import functools
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from headless.coverage_study.cells import Cell, solve_cell
 from headless.detection.recordings import SensorConfiguration
 
 import numpy as np
 
-from seip_addon.core.arrays import Integer
+from seip_addon.core.arrays import Float, Integer
 from seip_addon.core.errors import SeipError
-from seip_addon.core.placement import PlacementProblem
+from seip_addon.core.placement import Placement, PlacementProblem, solve
 from seip_addon.core.placement.deployment import deploy
 from seip_addon.core.placement.objective import Objective, placement_problem
-from seip_addon.core.progress import Progress
+from seip_addon.core.progress import Progress, within
 from seip_addon.core.workflows.survey import Survey
 
 MIN_PLACEMENTS = 4
 MAX_TRIES = 20_000  # draws for one placement, before it is said that there are no more
 SWAPS_PER_PLACEMENT = 20  # draws from which those in between are taken
 
-OPTIMAL, RANDOM, BETWEEN = "optimal", "random", "in between"
+OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal otherwise"
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class PlacementsStudySettings:
     Parameters
     ----------
     placements : int
-        Evaluated ones, the optimal one included.
+        Evaluated ones, the optimal one included; the optimal ones of other weights come on top.
     count : int
         Sensors of each.
     learnt : int
@@ -80,7 +80,7 @@ class DrawnPlacements:
     evaluated : tuple of SensorConfiguration
         The optimal one first.
     kind : tuple of str
-        Of each: `OPTIMAL`, `RANDOM` or `BETWEEN`.
+        Of each: `OPTIMAL`, `RANDOM`, `BETWEEN`, or `OTHERWISE` for the optimal one of other weights of targets.
     learnt : tuple of SensorConfiguration
         None of them is among the evaluated.
     """
@@ -90,13 +90,21 @@ class DrawnPlacements:
     learnt: tuple[SensorConfiguration, ...]
 
 
-def draw_placements(survey: Survey, settings: PlacementsStudySettings) -> Generator[Progress, None, DrawnPlacements]:
+def draw_placements(
+    survey: Survey, settings: PlacementsStudySettings, weights: Mapping[str, Float]
+) -> Generator[Progress, None, DrawnPlacements]:
     """Draw placements of a survey's one type.
 
-    Half of them (beside the optimal one) are drawn uniformly from all feasible sets of poses. Most of these cover
-    about the same; the others are therefore the nearest to steps evenly spread from the coverage of the worst placement
-    (greedily, each sensor adds least) to that of the optimal one, of many that differ in one sensor from either. Those
-    to learn from are drawn in the same way, afterwards.
+    With the optimal placement go those of other weights: random placements alone do not show what weights are for.
+    Half of the others are drawn uniformly from all feasible sets of poses. Most of these cover about the same; the rest
+    are therefore the nearest to steps evenly spread from the coverage of the worst placement (greedily, each sensor
+    adds least) to that of the optimal one, of many that differ in one sensor from either. Those to learn from are drawn
+    in the same way, afterwards.
+
+    Parameters
+    ----------
+    weights : mapping of str to (t,) float64
+        Other weights of targets, by name.
 
     Raises
     ------
@@ -107,9 +115,21 @@ def draw_placements(survey: Survey, settings: PlacementsStudySettings) -> Genera
     site, visible, count = survey.site, survey.grid.visible, settings.count
     yield Progress(0, 2, f"place {count} × {sensor}")
     case = yield from solve_cell(site, survey.models, visible, Cell(sensor, None, count, 1.0), survey.settings.limits)
-    yield Progress(1, 2, "draw placements")
     problem = placement_problem(site, visible, survey.models, Objective(count=count))
-    drawing = _Drawing(problem, count, case.placement.chosen, np.random.default_rng(settings.seed))
+    otherwise: dict[frozenset[int], tuple[str, Placement]] = {}
+    for name, weight in weights.items():
+        progress = Progress(1, 2, f"place {count} × {sensor} for {name}")
+        yield progress
+        placement = yield from within(progress, solve(replace(problem, weights=weight), survey.settings.limits))
+        if set(placement.chosen.tolist()) != set(case.placement.chosen.tolist()):
+            otherwise.setdefault(frozenset(placement.chosen.tolist()), (name, placement))
+    yield Progress(1, 2, "draw placements")
+    drawing = _Drawing(
+        problem,
+        count,
+        [case.placement.chosen, *(one.chosen for _, one in otherwise.values())],
+        np.random.default_rng(settings.seed),
+    )
     random = drawing.random(settings.placements // 2)
     between = drawing.between(settings.placements - 1 - len(random))
     learnt = drawing.random((settings.learnt + 1) // 2)
@@ -124,8 +144,14 @@ def draw_placements(survey: Survey, settings: PlacementsStudySettings) -> Genera
         )
 
     optimal = SensorConfiguration.of_case(case)
-    evaluated = (optimal, *configurations(RANDOM, random), *configurations(BETWEEN, between))
-    kind = (OPTIMAL, *[RANDOM] * len(random), *[BETWEEN] * len(between))
+    others = [
+        SensorConfiguration(
+            f"optimal for {name}", deploy(site, survey.models, visible, one.chosen), sensor, count, one.status, one.gap
+        )
+        for name, one in otherwise.values()
+    ]
+    evaluated = (optimal, *configurations(RANDOM, random), *configurations(BETWEEN, between), *others)
+    kind = (OPTIMAL, *[RANDOM] * len(random), *[BETWEEN] * len(between), *[OTHERWISE] * len(others))
     yield Progress(2, 2, "placements drawn")
     return DrawnPlacements(evaluated, kind, configurations("learnt", learnt))
 
@@ -135,14 +161,16 @@ class _Drawing:
 
     Parameters
     ----------
-    optimal : (k,) int64
-        Is not drawn again.
+    optimal : list of (k,) int64
+        Are not drawn again; the first is that of coverage.
     """
 
-    def __init__(self, problem: PlacementProblem, count: int, optimal: Integer, random: np.random.Generator) -> None:
-        self._problem, self._count, self._optimal, self._random = problem, count, optimal, random
+    def __init__(
+        self, problem: PlacementProblem, count: int, optimal: Sequence[Integer], random: np.random.Generator
+    ) -> None:
+        self._problem, self._count, self._optimal, self._random = problem, count, optimal[0], random
         self._poses = np.flatnonzero(problem.allowed)
-        self._taken = {frozenset(optimal.tolist())}
+        self._taken = {frozenset(one.tolist()) for one in optimal}
 
     def random(self, number: int) -> list[Integer]:
         """Draw sets uniformly from all that are feasible."""
