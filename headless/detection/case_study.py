@@ -19,7 +19,7 @@ import numpy as np
 from seip_addon.core.arrays import Float
 from seip_addon.core.errors import SeipError
 from seip_addon.core.estimates import Interval
-from seip_addon.core.progress import Progress, side_by_side, within
+from seip_addon.core.progress import Progress, in_detail, side_by_side, within
 from seip_addon.core.traffic import Trajectories
 from seip_addon.core.traffic.run_overlap import require_independent, vehicle_positions
 from seip_addon.core.workflows.survey import Survey
@@ -292,8 +292,6 @@ def evaluate_all(
     validated: dict[tuple[str, str], list[FrameResult]] = {}
     tested: dict[tuple[str, str], list[FrameResult]] = {}
     for done, configuration in enumerate(configurations):
-        progress = Progress(done, len(configurations), f"detect with {configuration.name}")
-        yield progress
         asked = [
             (model, detector)
             for model, detector in zip(models, detectors, strict=True)
@@ -303,12 +301,11 @@ def evaluate_all(
         steps = detect_in_runs(
             simulator, configuration, runs, [detector for _, detector in asked], models[0].training.threads
         )
-        found = yield from within(progress, steps)
+        found = yield from in_detail(Progress(done, len(configurations), "detect"), steps)
         aside = sum(len(run.times) for run in traffic.validation)
         for (model, _), frames in zip(asked, found, strict=True):
             validated[model.name, configuration.name] = frames[:aside]
             tested[model.name, configuration.name] = frames[aside:]
-    yield Progress(len(configurations), len(configurations), "evaluated")
     return [outcome for model in models for outcome in _outcomes(model, validated, tested)]
 
 

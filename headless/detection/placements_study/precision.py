@@ -31,7 +31,7 @@ import numpy as np
 
 from seip_addon.core.arrays import Boolean, Float, Text
 from seip_addon.core.estimates import Interval, percentiles
-from seip_addon.core.progress import Progress, within
+from seip_addon.core.progress import Progress, in_detail
 from seip_addon.core.storage.files import digest
 from seip_addon.core.storage.source_digest import source_digest
 
@@ -167,18 +167,15 @@ def precisions(
     evaluations = []
     runs: Text = np.repeat([run.name for run in traffic.test], [len(run.times) for run in traffic.test])
     for done, placement in enumerate(placements):
-        progress = Progress(done, len(placements), f"detect with {placement.name}")
-        yield progress
         scene = digest(source_digest(detect_in_runs.__module__), simulator.key(placement, traffic.test))
         paths = [folder / FOLDER / f"{digest(scene, key)[:32]}.npz" for key in detector_keys]
         missing = [number for number, path in enumerate(paths) if not path.exists()]
         if missing:
             steps = detect_in_runs(simulator, placement, traffic.test, [detectors[number] for number in missing], 1)
-            found = yield from within(progress, steps)
+            found = yield from in_detail(Progress(done, len(placements), "detect"), steps)
             for number, frames in zip(missing, found, strict=True):
                 save_frames(paths[number], frames)
         evaluations.append(tuple(evaluate(load_frames(path), MAIN_RULE) for path in paths))
-    yield Progress(len(placements), len(placements), "detected")
     return Precisions(runs, tuple(evaluations))
 
 
