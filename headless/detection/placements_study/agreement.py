@@ -16,7 +16,7 @@ from seip_addon.core.estimates import IntervalEstimate, percentiles, rank_agreem
 
 from .criteria import Criterion
 from .drawing import MIN_PLACEMENTS
-from .precision import Precisions
+from .precision import PLACEMENT_SEED, Precisions
 
 NEAR = 0.05  # of the targets: how much less than the optimal placement one near it covers at most
 MAX_CORRELATION = 1 - 1e-6  # beyond it Fisher's scale is endless
@@ -169,7 +169,7 @@ def _spearman_brown(agreement: Float, times: int) -> Float:
 
 def _drawn(number: int, resamples: int) -> Integer:
     """Return resamples of so many placements, the same ones each time, (r, n) int64."""
-    return np.random.default_rng(0).integers(number, size=(resamples, number))
+    return np.random.default_rng(PLACEMENT_SEED).integers(number, size=(resamples, number))
 
 
 def _difference(one: Correlation, other: Correlation) -> IntervalEstimate:

@@ -38,6 +38,7 @@ from seip_addon.core.storage.source_digest import source_digest
 from .drawing import DrawnPlacements, PlacementsStudySettings
 from .kept_frames import load_frames, save_frames
 
+TRAFFIC_SEED, TRAINING_SEED, PLACEMENT_SEED = 0, 1, 2  # of resamples: draws of one must not follow from another's
 MAX_HALVES = 20  # ways to cut the test runs into halves that are tried
 FOLDER = "detections"  # of the folder of results: what was detected with each placement
 ENOUGH_RETURNS = 10  # from a road user, to be counted as seen well
@@ -81,21 +82,23 @@ class Precisions:
         A resample draws the same traffic and the same trainings for all placements.
         """
         trainings = self.trainings
-        times = np.random.default_rng(0).multinomial(trainings, np.full(trainings, 1 / trainings), RESAMPLES)
+        times = np.random.default_rng(TRAINING_SEED).multinomial(
+            trainings, np.full(trainings, 1 / trainings), RESAMPLES
+        )
         return np.array(
             [
                 sum(
-                    times[:, number] / trainings * resampled_average_precisions(one, seed=0)
+                    times[:, number] / trainings * resampled_average_precisions(one, seed=TRAFFIC_SEED)
                     for number, one in enumerate(own)
                 )
                 for own in self.evaluations
             ]
         )
 
-    @property
+    @cached_property
     def has_intervals(self) -> bool:
         """Whether there is enough test traffic for intervals."""
-        return average_precision_interval(self.evaluations[0][0], seed=0) is not None
+        return average_precision_interval(self.evaluations[0][0], seed=TRAFFIC_SEED) is not None
 
     def interval(self, placement: int) -> Interval | None:
         """Return the 95 % interval of a placement's average precision over other traffic and trainings like these."""
@@ -106,8 +109,11 @@ class Precisions:
         """Average precision on two halves of the test runs, for each way to halve them, (h, 2, n)."""
         names = np.unique(self.runs).tolist()
         ways = [some for some in combinations(names, len(names) // 2) if len(names) % 2 or names[0] in some]
-        random = np.random.default_rng(0)
-        picked = random.permutation(len(ways))[:MAX_HALVES] if len(names) > 1 else np.zeros(0, dtype=np.int64)
+        picked = (
+            np.random.default_rng(TRAFFIC_SEED).permutation(len(ways))[:MAX_HALVES]
+            if len(names) > 1
+            else np.zeros(0, dtype=np.int64)
+        )
         halves = [
             [self._on_runs(np.isin(self.runs, ways[way]) == first) for first in (True, False)]
             for way in sorted(picked.tolist())
