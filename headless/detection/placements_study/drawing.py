@@ -21,7 +21,7 @@ MIN_PLACEMENTS = 4
 MAX_TRIES = 20_000  # draws for one placement, before it is said that there are no more
 SWAPS_PER_PLACEMENT = 20  # draws from which those in between are taken
 
-OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal otherwise"
+OPTIMAL, RANDOM, BETWEEN, OTHERWISE = "optimal", "random", "in between", "optimal by other weights"
 
 
 @dataclass(frozen=True)
