@@ -249,10 +249,10 @@ def _record(
             }
             for one in study.judged
         ],
-        "coverage_over": {
-            name: {"placements": part.placements, "spearman": _estimate(part.spearman)}
+        "coverage_over": [
+            {"what": name, "placements": part.placements, "spearman": _estimate(part.spearman)}
             for name, part in study.parts.items()
-        },
+        ],
         "noise_ceiling": {
             "halves_of_test_runs": _estimate(ceiling.halves),
             "trainings": None if ceiling.trainings is None else _estimate(ceiling.trainings),
