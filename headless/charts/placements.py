@@ -115,7 +115,8 @@ def save_criteria_chart(
         panel.barh(row, value, height=0.62, color=face, zorder=2)
         if math.isfinite(one.correlation.high - one.correlation.low):
             panel.plot(interval_ends(one.correlation), [row, row], color=INK, linewidth=1.3, marker="|", zorder=4)
-        panel.text(0.01, row, f"{one.correlation.value:.2f}", va="center", size=8.5, color=PAPER, zorder=5)
+        ink = PAPER if one.beforehand else INK
+        panel.text(0.01, row, f"{one.correlation.value:.2f}", va="center", size=8.5, color=ink, zorder=5)
     if math.isfinite(ceiling.value):
         panel.axvspan(*interval_ends(ceiling), color="#eef0f2", zorder=0)
         panel.axvline(
